@@ -1,0 +1,78 @@
+"""What can go wrong at the public border: every error names the argument, its value and what was expected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+_SHOWN_CHARACTERS = 120  # a value longer than this is cut in messages: a message is read, an array is not
+
+
+def shown(value: Any) -> str:
+    """Return a short one-line rendering of a value for an error message."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+class IapbError(Exception):
+    """Root of every error that iapb raises on purpose."""
+
+
+class ArgumentError(IapbError, ValueError):
+    """An argument at the public border has a value that the call cannot take."""
+
+    def __init__(self, argument: str, value: Any, expected: str) -> None:
+        self.argument, self.value, self.expected = argument, value, expected
+        super().__init__(f"{argument} = {shown(value)}: expected {expected}")
+
+
+class RangeError(IapbError, OverflowError):
+    """A result would leave the range of double precision numbers."""
+
+    def __init__(self, quantity: str, explanation: str) -> None:
+        self.quantity = quantity
+        super().__init__(f"{quantity} leaves the range of double precision: {explanation}")
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One mistake of a scene file: where it stands, what it says, what was expected.
+
+    Lines and columns count from 1; `path` is the field's path, such as ``bodies[0].mass``.
+    """
+
+    file: str
+    line: int
+    column: int
+    path: str
+    value: str
+    expected: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: {self.path} = {self.value}: expected {self.expected}"
+
+
+class SceneError(IapbError, ValueError):
+    """A scene file cannot be used; carries *all* of its mistakes."""
+
+    def __init__(self, mistakes: list[Mistake]) -> None:
+        self.mistakes = tuple(mistakes)
+        count = len(self.mistakes)
+        head = "1 mistake in the scene" if count == 1 else f"{count} mistakes in the scene"
+        super().__init__("\n".join([f"{head}:", *(f"  {mistake}" for mistake in self.mistakes)]))
+
+
+class MissingDependencyError(IapbError, ImportError):
+    """An optional package is not installed; the message says how to install it."""
+
+    def __init__(self, package: str, purpose: str, install: str) -> None:
+        self.package = package
+        super().__init__(f"{purpose} needs {package}, which is not installed. Install it with: {install}")
+
+
+class RunFileError(IapbError):
+    """A file is not a readable run of this project."""
+
+
+class SolverError(IapbError):
+    """A solver could not be used on a problem (refused or failed); never a silent bad answer."""

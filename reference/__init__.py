@@ -1,0 +1,1 @@
+"""Independent answers: nothing here shares an algorithm with the engine."""

@@ -1,0 +1,1 @@
+"""Runs on disk, figures, the report and the command line."""
