@@ -1,0 +1,221 @@
+"""Shapes of a scene and the arrays that the narrow phase reads and writes.
+
+Three planar shapes: half-plane, circle and convex polygon (a box is a polygon). Every shape belongs to a
+body and is written in that body's frame; body -1 is the static world and its frame the world frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.errors import ArgumentError
+
+HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
+WORLD = -1  # the body index of the static world
+
+# A polygon counts as convex when no corner turns inwards by more than this [rad]: vertices typed with six
+# digits describe straight edges to about 1e-6, and an inward turn that small moves no surface visibly.
+CONVEXITY_TOLERANCE = 1e-6
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int32]
+
+
+class Shapes(NamedTuple):
+    """All shapes of a scene, n of them with m vertices in total, as contiguous arrays for the kernels."""
+
+    kind: Integers  # (n,) HALF_PLANE, CIRCLE or POLYGON
+    body: Integers  # (n,) body that carries the shape, -1 = the static world
+    radius: Floats  # (n,) [m] of a circle, else 0
+    first: Integers  # (n,) row of `vertices` where the shape begins
+    count: Integers  # (n,) its rows: 2 for a half-plane, 1 for a circle, >= 3 for a polygon
+    vertices: Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
+
+
+class ContactBuffer(NamedTuple):
+    """Contacts of one step in arrays of a fixed capacity c; the caller keeps how many rows are in use.
+
+    Filled by `detect`: the geometry. Filled by the contact-set kernels: what follows `gap`.
+    """
+
+    shape_a: Integers  # (c,)
+    shape_b: Integers  # (c,)
+    body_a: Integers  # (c,) moving body that the normal points into
+    body_b: Integers  # (c,) other body, -1 = the static world
+    feature: NDArray[np.int64]  # (c,) which vertex and edge touch; stable while they do
+    point: Floats  # (c, 3) [m] world, midway between the two surfaces along the normal
+    normal: Floats  # (c, 3) unit, from b into a
+    gap: Floats  # (c,) [m] negative = overlap
+    is_new: NDArray[np.bool_]  # (c,) not a contact of the previous step
+    collides: NDArray[np.bool_]  # (c,) enters the impact of this step
+    normal_velocity: Floats  # (c,) [m/s] positive separates
+    tangential_velocity: Floats  # (c, 3) [m/s] of a relative to b, orthogonal to the normal
+    normal_force: Floats  # (c,) [N] on a along the normal
+    friction_force: Floats  # (c, 3) [N] on a
+    mark: NDArray[np.int8]  # (c,) scratch of the clustering
+
+
+@dataclass(frozen=True)
+class HalfPlane:
+    """All points x with (x - point)·normal <= 0: the solid lies behind the outward normal (length > 0)."""
+
+    point: ArrayLike
+    normal: ArrayLike
+    body: int = WORLD
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A disc: radius [m] and centre [m] in the frame of its body."""
+
+    radius: float
+    center: ArrayLike = (0.0, 0.0)
+    body: int = WORLD
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A convex polygon: vertices (k, 2) [m] in the frame of its body, either orientation (stored CCW)."""
+
+    vertices: ArrayLike
+    body: int = WORLD
+
+
+Shape = HalfPlane | Circle | Polygon
+
+
+def box(size: ArrayLike, center: ArrayLike = (0.0, 0.0), angle: float = 0.0, body: int = WORLD) -> Polygon:
+    """Return the rectangle of full side lengths `size` [m] about `center`, turned by `angle` [rad]."""
+    width, height = _plane_vector("size", size)
+    if not (width > 0.0 and height > 0.0):
+        raise ArgumentError("size", size, "two side lengths > 0")
+    corners = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+    cos, sin = math.cos(angle), math.sin(angle)
+    return Polygon(corners @ np.array([[cos, sin], [-sin, cos]]) + _plane_vector("center", center), body)
+
+
+def make_shapes(descriptions: Sequence[Shape]) -> Shapes:
+    """Return the arrays of the given shapes, in the given order.
+
+    Raises
+    ------
+    ArgumentError
+        A radius or a normal of length 0, a polygon that is not strictly convex, values that are not finite.
+    """
+    blocks = [_vertex_block(f"shapes[{i}]", shape) for i, shape in enumerate(descriptions)]
+    count = np.array([len(block) for block in blocks], np.int32)
+    first = (np.cumsum(count) - count).astype(np.int32)
+    kinds = {HalfPlane: HALF_PLANE, Circle: CIRCLE, Polygon: POLYGON}
+    return Shapes(
+        kind=np.array([kinds[type(shape)] for shape in descriptions], np.int32),
+        body=np.array([shape.body for shape in descriptions], np.int32),
+        radius=np.array([getattr(shape, "radius", 0.0) for shape in descriptions], np.float64),
+        first=first,
+        count=count,
+        vertices=np.concatenate(blocks) if blocks else np.zeros((0, 2)),
+    )
+
+
+def candidate_pairs(shapes: Shapes, may_touch: Callable[[int, int], bool] | None = None) -> Integers:
+    """Return the pairs (k, 2) of shape indices to test: bodies differ, shape a moves, a half-plane is b.
+
+    `may_touch(body_a, body_b)` leaves out pairs of bodies (links joined to each other, for instance).
+    Between two moving bodies a is the one with the smaller body index, so that the contacts of one pair of
+    bodies agree about the direction of their normals.
+    """
+    pairs = []
+    for i in range(len(shapes.kind)):
+        for j in range(i + 1, len(shapes.kind)):
+            pair = _ordered_pair(shapes, i, j)
+            if pair is None:
+                continue
+            body_a, body_b = (int(shapes.body[k]) for k in pair)
+            if may_touch is None or may_touch(body_a, body_b):
+                pairs.append(pair)
+    return np.array(pairs, np.int32).reshape(-1, 2)
+
+
+def make_contact_buffer(capacity: int) -> ContactBuffer:
+    """Return an empty buffer for `capacity` contacts (>= 1)."""
+    if capacity < 1:
+        raise ArgumentError("capacity", capacity, "at least one contact")
+    vectors = {"point", "normal", "tangential_velocity", "friction_force"}
+    dtypes: dict[str, Any] = dict.fromkeys(("shape_a", "shape_b", "body_a", "body_b"), np.int32)
+    dtypes |= {"feature": np.int64, "is_new": np.bool_, "collides": np.bool_, "mark": np.int8}
+    arrays = {
+        name: np.zeros((capacity, 3) if name in vectors else capacity, dtypes.get(name, np.float64))
+        for name in ContactBuffer._fields
+    }
+    return ContactBuffer(**arrays)
+
+
+def contact_capacity(shapes: Shapes, pairs: Integers) -> int:
+    """Return a capacity that `detect` cannot exceed for these pairs (at least 1)."""
+    total = 0
+    for a, b in pairs:
+        if shapes.kind[b] == HALF_PLANE:
+            total += int(shapes.count[a])  # one contact per vertex
+        else:
+            total += 2 if shapes.kind[a] == POLYGON and shapes.kind[b] == POLYGON else 1
+    return max(total, 1)
+
+
+def _ordered_pair(shapes: Shapes, i: int, j: int) -> tuple[int, int] | None:
+    body_i, body_j = int(shapes.body[i]), int(shapes.body[j])
+    if body_i == body_j:
+        return None
+    swap = body_i == WORLD or (body_j != WORLD and body_j < body_i)
+    a, b = (j, i) if swap else (i, j)
+    if shapes.kind[a] == HALF_PLANE:
+        if shapes.body[b] == WORLD or shapes.kind[b] == HALF_PLANE:
+            return None  # a moving half-plane against the world, or two half-planes: no contact is defined
+        a, b = b, a
+    return a, b
+
+
+def _vertex_block(name: str, shape: Shape) -> Floats:
+    """Return the rows of `Shapes.vertices` for one shape."""
+    if isinstance(shape, HalfPlane):
+        point = _plane_vector(f"{name}.point", shape.point)
+        normal = _plane_vector(f"{name}.normal", shape.normal)
+        length = math.hypot(*normal)
+        if length == 0.0:
+            raise ArgumentError(f"{name}.normal", shape.normal, "a vector longer than 0")
+        return np.array([point, normal / length])
+    if isinstance(shape, Circle):
+        if not (math.isfinite(shape.radius) and shape.radius > 0.0):
+            raise ArgumentError(f"{name}.radius", shape.radius, "a finite radius > 0")
+        return _plane_vector(f"{name}.center", shape.center)[None, :]
+    return _convex_vertices(f"{name}.vertices", shape.vertices)
+
+
+def _convex_vertices(name: str, vertices: ArrayLike) -> Floats:
+    """Return the vertices counterclockwise, or raise when they are no convex polygon."""
+    corners = np.asarray(vertices, np.float64)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.all(np.isfinite(corners)):
+        raise ArgumentError(name, vertices, "an array (k, 2) of finite numbers, k >= 3")
+    edges = np.roll(corners, -1, axis=0) - corners
+    following = np.roll(edges, -1, axis=0)
+    turns = np.arctan2(
+        edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0], np.sum(edges * following, axis=1)
+    )
+    orientation = math.copysign(1.0, turns.sum())
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    once_around = abs(abs(turns.sum()) - 2.0 * math.pi) < CONVEXITY_TOLERANCE
+    if lengths.min() == 0.0 or not once_around or (orientation * turns).min() < -CONVEXITY_TOLERANCE:
+        expected = "the corners of a convex polygon in order, no two neighbours equal"
+        raise ArgumentError(name, vertices, expected)
+    return np.ascontiguousarray(corners if orientation > 0.0 else corners[::-1])
+
+
+def _plane_vector(name: str, value: ArrayLike) -> Floats:
+    vector = np.asarray(value, np.float64)
+    if vector.shape != (2,) or not np.all(np.isfinite(vector)):
+        raise ArgumentError(name, value, "two finite numbers")
+    return vector
