@@ -1,0 +1,104 @@
+"""One impact on plain arrays: whiten, project, return to v, clamp. Allocation-free given an `ImpactWork`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from iapb.contact.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
+from iapb.contact.kernels.compensated import quadratic_forms
+from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
+
+UNIT_ROUNDOFF = 2.0**-53
+# Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. Restitution is
+# then unmet by at most (1 + e) · tolerance · |u|. Larger would leave real contacts unmet (the kit asks 1e-8);
+# smaller would take rounding of a computed Jacobian (1e-16, amplified by √κ(M)) for a contact.
+RANK_TOLERANCE = 1e-10
+_NOISE_FACTOR = 8.0  # rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
+
+
+class ImpactWork(NamedTuple):
+    """Scratch of one impact: d coordinates, up to c contacts."""
+
+    columns: np.ndarray  # (d, c) rows of J as columns, then of A, then their residuals
+    rows: np.ndarray  # (d, c) unit rows of A as columns, kept for impulses
+    length: np.ndarray  # (c,) lengths of the rows of A
+    basis: np.ndarray  # (d, d) rows are the orthonormal basis Q
+    closing: np.ndarray  # (c,)
+    size: np.ndarray  # (c,)
+    overlap: np.ndarray  # (c,)
+    u: np.ndarray  # (d,) whitened velocity
+    change: np.ndarray  # (d,) Δu
+    v_change: np.ndarray  # (d,) Δv
+
+
+def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
+    """Allocate the scratch for up to `contacts` rows on `coordinates` generalized velocities."""
+    d, c = coordinates, contacts
+    wide, long, short = (d, c), (c,), (d,)
+    return ImpactWork(np.zeros(wide), np.zeros(wide), np.zeros(long), np.zeros((d, d)), np.zeros(long),
+                      np.zeros(long), np.zeros(long), np.zeros(short), np.zeros(short), np.zeros(short))
+
+
+@njit(cache=True)
+def rank_tolerance(lower):
+    """Eligibility tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding noise where that is larger."""
+    d = lower.shape[0]
+    largest = smallest = lower[0, 0]
+    for k in range(1, d):
+        largest = max(largest, lower[k, k])
+        smallest = min(smallest, lower[k, k])
+    return max(RANK_TOLERANCE, _NOISE_FACTOR * d * UNIT_ROUNDOFF * largest / smallest)
+
+
+@njit(cache=True)
+def energy_clamp(mass_matrix, v, change):
+    """Largest factor α in [0, 1] for which v + α Δv has no more kinetic energy than v, for M itself.
+
+    ΔKE(α) = α vᵀMΔv + ½ α² ΔvᵀMΔv (design: energy clamp), evaluated in double-double.
+    """
+    cross, square = quadratic_forms(mass_matrix, v, change)
+    if not square > 0.0 or cross >= 0.0:
+        return 0.0
+    return min(1.0, -2.0 * cross / square)
+
+
+@njit(cache=True)
+def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
+    """Resolve `count` rows, given as columns of `work.columns`, by (21) in factored form.
+
+    Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u; returns (rank, clamp).
+    Every row is an equality J v⁺ = −e J v⁻, whatever its sign; choosing the rows is the caller's.
+    """
+    d = v.shape[0]
+    to_whitened(lower, v, work.u)
+    whiten_columns(lower, work.columns, count)
+    unit_columns(work.columns, count, work.length)
+    for k in range(d):
+        for i in range(count):
+            work.rows[k, i] = work.columns[k, i]
+    rank = orthonormal_basis(work.columns, count, work.u, tolerance, budget, work.basis, work.closing, work.size,
+                             work.overlap)
+    projected_change(work.basis, rank, work.u, 1.0 + restitution, work.change)
+    clamp = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
+    return rank, clamp
+
+
+@njit(cache=True)
+def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
+    """v⁺ = v + α L⁻ᵀ Δu with the clamp's α; generalized impulse α L Δu. Returns α."""
+    d = v.shape[0]
+    from_whitened(lower, work.change, work.v_change)
+    alpha = 1.0
+    moved = False
+    for k in range(d):
+        moved = moved or work.v_change[k] != 0.0
+    if clamped and moved:
+        alpha = energy_clamp(mass_matrix, v, work.v_change)
+    for k in range(d):
+        work.change[k] *= alpha
+        v_plus[k] = v[k] + alpha * work.v_change[k]
+    to_momentum(lower, work.change, momentum)
+    return alpha

@@ -1,0 +1,60 @@
+"""The minimum-norm impulses p among all with Jᵀ p = given generalized impulse."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True)
+def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, tall, triangle, target):
+    """Write the p of least Euclidean norm with Aᵀ p = Δu, for Δu in the span of the basis.
+
+    With B = A Qᵀ (c × r, full column rank) the condition reads Bᵀ p = Q Δu; B = V T by twice-applied
+    Gram-Schmidt gives p = V T⁻ᵀ Q Δu.
+
+    Parameters
+    ----------
+    rows, length : unit rows of A as columns (d, ≥c) and their lengths (≥c,) [√kg⁻¹].
+    basis, rank : orthonormal rows Q.
+    change : (d,) Δu.
+    impulses : (≥c,) output [N s].
+    tall : (≥rank, ≥c) scratch for Vᵀ.  triangle : (≥rank, ≥rank) scratch for T.  target : (≥rank,) scratch.
+    """
+    d = change.shape[0]
+    for j in range(rank):
+        for i in range(count):
+            total = 0.0
+            for k in range(d):
+                total += rows[k, i] * basis[j, k]
+            tall[j, i] = total * length[i]
+    for j in range(rank):
+        for m in range(j):
+            triangle[m, j] = 0.0
+        for _ in range(2):  # twice is enough for orthogonality to rounding
+            for m in range(j):
+                overlap = 0.0
+                for i in range(count):
+                    overlap += tall[m, i] * tall[j, i]
+                triangle[m, j] += overlap
+                for i in range(count):
+                    tall[j, i] -= overlap * tall[m, i]
+        square = 0.0
+        for i in range(count):
+            square += tall[j, i] * tall[j, i]
+        triangle[j, j] = math.sqrt(square)
+        for i in range(count):
+            tall[j, i] /= triangle[j, j]
+    for j in range(rank):
+        total = 0.0
+        for k in range(d):
+            total += basis[j, k] * change[k]
+        for m in range(j):
+            total -= triangle[m, j] * target[m]
+        target[j] = total / triangle[j, j]
+    for i in range(count):
+        impulses[i] = 0.0
+    for j in range(rank):
+        for i in range(count):
+            impulses[i] += tall[j, i] * target[j]

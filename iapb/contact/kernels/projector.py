@@ -1,0 +1,134 @@
+"""The factored impact map u⁺ = u − (1 + e) Q Qᵀ u: equation (21) without a Delassus matrix.
+
+Arrays hold one contact per *column*: `columns[:, i]` is row i of A = J L⁻ᵀ.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True)
+def unit_columns(columns, count, length):
+    """Scale every column to unit length (zero columns stay) and write the lengths."""
+    d = columns.shape[0]
+    for i in range(count):
+        length[i] = 0.0
+    for k in range(d):
+        for i in range(count):
+            length[i] += columns[k, i] * columns[k, i]
+    for i in range(count):
+        length[i] = math.sqrt(length[i])
+    for k in range(d):
+        for i in range(count):
+            if length[i] > 0.0:
+                columns[k, i] /= length[i]
+
+
+@njit(cache=True)
+def _most_violating(closing, size, count, eligible_above):
+    """Pivot: the eligible residual row with the largest |rᵢ·u| / ‖rᵢ‖, −1 if none is left."""
+    best = -1
+    best_speed = -1.0
+    for i in range(count):
+        if size[i] > eligible_above:
+            speed = abs(closing[i]) / math.sqrt(size[i])
+            if speed > best_speed:
+                best = i
+                best_speed = speed
+    return best
+
+
+@njit(cache=True)
+def _next_direction(columns, pivot, basis, rank):
+    """Orthonormalize the pivot's residual row against the basis once more and append it."""
+    d = columns.shape[0]
+    q = basis[rank]
+    for k in range(d):
+        q[k] = columns[k, pivot]
+    for j in range(rank):  # the residual is nearly orthogonal already: one more pass makes it so to rounding
+        overlap = 0.0
+        for k in range(d):
+            overlap += basis[j, k] * q[k]
+        for k in range(d):
+            q[k] -= overlap * basis[j, k]
+    square = 0.0
+    for k in range(d):
+        square += q[k] * q[k]
+    inverse = 1.0 / math.sqrt(square)
+    for k in range(d):
+        q[k] *= inverse
+
+
+@njit(cache=True)
+def _deflate(columns, count, q, along_q, closing, size, overlap):
+    """Remove the direction q from every residual row; update rᵢ·u and ‖rᵢ‖²."""
+    d = columns.shape[0]
+    for i in range(count):
+        overlap[i] = 0.0
+        size[i] = 0.0
+    for k in range(d):
+        factor = q[k]
+        for i in range(count):
+            overlap[i] += factor * columns[k, i]
+    for k in range(d):
+        factor = q[k]
+        for i in range(count):
+            entry = columns[k, i] - overlap[i] * factor
+            columns[k, i] = entry
+            size[i] += entry * entry
+    for i in range(count):
+        closing[i] -= overlap[i] * along_q
+
+
+@njit(cache=True)
+def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size, overlap):
+    """Orthonormal basis of A's row space, most violated rows first; return its size.
+
+    Parameters
+    ----------
+    columns : (d, ≥count) unit-scaled rows of A as columns; overwritten by their residuals.
+    u : (d,) whitened velocity Lᵀ v.
+    tolerance : a residual row is eligible only above `tolerance` × its unit row.
+    budget : largest number of rows to use. Every truncation is passive.
+    basis : (≥d, d) output, rows 0 … rank − 1.
+    closing, size, overlap : (≥count,) scratch.
+    """
+    d = u.shape[0]
+    for i in range(count):
+        closing[i] = 0.0
+        size[i] = 0.0
+    for k in range(d):
+        for i in range(count):
+            closing[i] += columns[k, i] * u[k]
+            size[i] += columns[k, i] * columns[k, i]
+    rank = 0
+    while rank < d and rank < budget:
+        pivot = _most_violating(closing, size, count, tolerance * tolerance)
+        if pivot < 0:
+            break
+        _next_direction(columns, pivot, basis, rank)
+        q = basis[rank]
+        along_q = 0.0
+        for k in range(d):
+            along_q += q[k] * u[k]
+        _deflate(columns, count, q, along_q, closing, size, overlap)
+        size[pivot] = 0.0  # its residual is rounding only
+        rank += 1
+    return rank
+
+
+@njit(cache=True)
+def projected_change(basis, rank, u, factor, change):
+    """Δu = −factor · Q Qᵀ u, with factor = 1 + e (21)."""
+    d = u.shape[0]
+    for k in range(d):
+        change[k] = 0.0
+    for j in range(rank):
+        along = 0.0
+        for k in range(d):
+            along += basis[j, k] * u[k]
+        for k in range(d):
+            change[k] -= factor * along * basis[j, k]

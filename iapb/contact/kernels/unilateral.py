@@ -1,0 +1,157 @@
+"""Impulses that push only: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution built on it.
+
+The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. Active-set method of Lawson and Hanson
+(Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factors.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+# A row counts as still closing when it does so faster than this share of |b|: rounding of a d-term sum of unit rows.
+_CLOSING = 1e-13
+
+
+@njit(cache=True)
+def _solve_passive(rows, b, passive, size, q, triangle, solution):
+    """Least squares on the passive rows: solution[j] for passive[j]; False if they are dependent."""
+    d = b.shape[0]
+    for j in range(size):
+        for k in range(d):
+            q[j, k] = rows[k, passive[j]]
+        for m in range(j):
+            triangle[m, j] = 0.0
+        for _ in range(2):
+            for m in range(j):
+                overlap = 0.0
+                for k in range(d):
+                    overlap += q[m, k] * q[j, k]
+                triangle[m, j] += overlap
+                for k in range(d):
+                    q[j, k] -= overlap * q[m, k]
+        square = 0.0
+        for k in range(d):
+            square += q[j, k] * q[j, k]
+        if square <= _CLOSING * _CLOSING:
+            return False
+        triangle[j, j] = math.sqrt(square)
+        for k in range(d):
+            q[j, k] /= triangle[j, j]
+    for j in range(size - 1, -1, -1):
+        total = 0.0
+        for k in range(d):
+            total -= q[j, k] * b[k]
+        for m in range(j + 1, size):
+            total -= triangle[j, m] * solution[m]
+        solution[j] = total / triangle[j, j]
+    return True
+
+
+@njit(cache=True)
+def _most_closing(rows, count, residual, held):
+    """Free row with the most negative rᵢ·residual, and that speed."""
+    best, speed = -1, 0.0
+    for i in range(count):
+        if not held[i]:
+            closing = 0.0
+            for k in range(residual.shape[0]):
+                closing += rows[k, i] * residual[k]
+            if closing < speed:
+                best, speed = i, closing
+    return best, speed
+
+
+@njit(cache=True)
+def push_only(rows, count, b, p, residual):
+    """Solve `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`; write p and residual = b + Aᵀp. Return False if it did not converge.
+
+    rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,).
+    """
+    d = b.shape[0]
+    q, triangle, solution = np.zeros((d + 1, d)), np.zeros((d + 1, d + 1)), np.zeros(d + 1)
+    passive, held, banned = np.zeros(d + 1, np.int64), np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    norm, size = 0.0, 0
+    for k in range(d):
+        residual[k] = b[k]
+        norm += b[k] * b[k]
+    for i in range(count):
+        p[i] = 0.0
+    threshold = _CLOSING * math.sqrt(norm) * max(1, d)
+    for _ in range(10 * (count + d) + 10):
+        entering, speed = _most_closing(rows, count, residual, held | banned)
+        if entering < 0 or speed >= -threshold:
+            return True
+        passive[size] = entering
+        size += 1
+        if size > d or not _solve_passive(rows, b, passive, size, q, triangle, solution):
+            banned[entering] = True  # dependent to rounding: it cannot close by itself
+            size -= 1
+            continue
+        held[entering] = True
+        size = _retreat(rows, b, passive, size, q, triangle, solution, held, p)
+        _set_residual(rows, b, passive, size, p, residual)
+        for i in range(count):
+            banned[i] = False
+    return False
+
+
+@njit(cache=True)
+def _retreat(rows, b, passive, size, q, triangle, solution, held, p):
+    """Move p towards the passive solution, letting go of rows that would pull; return the passive size."""
+    while True:
+        step, blocking = 1.0, -1
+        for j in range(size):
+            if solution[j] <= 0.0:
+                ratio = p[passive[j]] / (p[passive[j]] - solution[j]) if p[passive[j]] > 0.0 else 0.0
+                if ratio < step or blocking < 0:
+                    step, blocking = ratio, j
+        for j in range(size):
+            p[passive[j]] += step * (solution[j] - p[passive[j]])
+        if blocking < 0:
+            return size
+        p[passive[blocking]] = 0.0
+        held[passive[blocking]] = False
+        for j in range(blocking, size - 1):
+            passive[j] = passive[j + 1]
+        size -= 1
+        if not _solve_passive(rows, b, passive, size, q, triangle, solution):
+            return size
+
+
+@njit(cache=True)
+def _set_residual(rows, b, passive, size, p, residual):
+    """residual = b + Aᵀp."""
+    for k in range(b.shape[0]):
+        total = b[k]
+        for j in range(size):
+            total += rows[k, passive[j]] * p[passive[j]]
+        residual[k] = total
+
+
+@njit(cache=True)
+def poisson_impulses(rows, count, u, restitution, p, change):
+    """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. False: no convergence.
+
+    Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
+    p = p_c + p_e (design.md section 4; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
+    """
+    d = u.shape[0]
+    compressed, final = np.zeros(d), np.zeros(d)
+    more = np.zeros(count)
+    if not push_only(rows, count, u, p, compressed):
+        return False
+    for i in range(count):
+        returned = restitution[i] * p[i]
+        for k in range(d):
+            compressed[k] += rows[k, i] * returned
+        p[i] += returned
+    if not push_only(rows, count, compressed, more, final):
+        return False
+    for i in range(count):
+        p[i] += more[i]
+    for k in range(d):
+        change[k] = final[k] - u[k]
+    return True
