@@ -1,1 +1,1 @@
-"""Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns plain records, writes no files."""
+"""Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns records, writes no files."""

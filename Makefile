@@ -1,0 +1,87 @@
+# `make test` and `make reproduce` are all that a fresh machine needs (python >= 3.11 with venv, make, git).
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+
+# The first python that is new enough; choose another one with `make PYTHON=python3.12 test`.
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python; do \
+	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+
+VENV := .venv
+BIN := $(VENV)/bin
+# The stamps carry what they were made from, so that another lock makes another environment.
+LOCK_STAMP := $(VENV)/.lock-$(shell cksum < requirements.lock | cut -d ' ' -f 1)
+PROJECT_STAMP := $(VENV)/.project-$(shell cksum < pyproject.toml | cut -d ' ' -f 1)
+PYTEST_WORKERS ?= 2
+
+.PHONY: help
+help: ## show this list
+	@echo "iapb: the commands of this project"
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1|/' | \
+		while IFS='|' read -r name text; do printf '  make %-11s %s\n' "$$name" "$$text"; done
+
+.PHONY: setup
+setup: $(PROJECT_STAMP) ## make .venv from the hashed lock, if it is missing or stale
+
+$(LOCK_STAMP):
+	@test -n "$(PYTHON)" || { echo "make: no python >= 3.11 with venv was found; set PYTHON=..." >&2; exit 1; }
+	@echo "Making $(VENV) from requirements.lock with $$($(PYTHON) --version); this takes a minute or two ..."
+	@$(PYTHON) -m venv --clear $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--no-deps --require-hashes -r requirements.lock
+	@touch $@
+
+$(PROJECT_STAMP): $(LOCK_STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--no-deps --no-build-isolation --editable .
+	@rm -f $(VENV)/.project-*
+	@touch $@
+
+.PHONY: test
+test: lint types imports pytest ## everything that must pass: ruff, mypy, import contracts, pytest
+
+.PHONY: reproduce
+reproduce: setup ## regenerate every figure, table and claim into out/report.html
+	@$(BIN)/iapb reproduce
+
+.PHONY: lint
+lint: setup ## ruff
+	@$(BIN)/ruff check .
+
+.PHONY: types
+types: setup ## mypy
+	@$(BIN)/mypy
+
+.PHONY: imports
+imports: setup ## import-linter: the packages import one way
+	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
+
+.PHONY: pytest
+pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
+	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
+
+.PHONY: deep
+deep: setup ## the test suite with long property searches
+	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
+
+.PHONY: format
+format: setup ## let ruff repair what it can
+	@$(BIN)/ruff check --fix .
+
+.PHONY: wheel
+wheel: setup ## build dist/*.whl
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+
+.PHONY: lock
+lock: ## resolve requirements.lock again from pyproject.toml (needs uv)
+	@uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-emit-find-links \
+		--python-version 3.11 --custom-compile-command "make lock" --group dev pyproject.toml -o requirements.lock
+
+.PHONY: clean
+clean: ## remove what runs, tests and builds left (keeps .venv)
+	@rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis *.egg-info
+	@find iapb reference verification reports tests -name __pycache__ -prune -exec rm -rf {} +
+
+.PHONY: distclean
+distclean: clean ## as clean, and .venv too
+	@rm -rf $(VENV)

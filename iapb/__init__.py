@@ -1,0 +1,73 @@
+"""iapb: rigid contact by impulses where a contact is new and penalties while it lasts.
+
+The names below are loaded when first used, so that ``import iapb`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from iapb.contact.impact import Impact as Impact
+    from iapb.contact.impact import resolve_impact as resolve_impact
+    from iapb.effects import Effect as Effect
+    from iapb.effects import decide_effects as decide_effects
+    from iapb.errors import ArgumentError as ArgumentError
+    from iapb.errors import IapbError as IapbError
+    from iapb.errors import MissingDependencyError as MissingDependencyError
+    from iapb.errors import RangeError as RangeError
+    from iapb.errors import RunFileError as RunFileError
+    from iapb.errors import SceneError as SceneError
+    from iapb.errors import SolverError as SolverError
+    from iapb.mechanics.mechanism import Body as Body
+    from iapb.mechanics.mechanism import Joint as Joint
+    from iapb.mechanics.mechanism import Mechanism as Mechanism
+    from iapb.run import Run as Run
+    from iapb.scene import Scene as Scene
+    from iapb.scene import load_scene as load_scene
+    from iapb.scene_files import find_scene as find_scene
+    from iapb.scene_files import scene_folder as scene_folder
+    from iapb.simulation import Simulation as Simulation
+    from iapb.simulation import simulate as simulate
+
+    __version__: str
+
+_HOME = {
+    "iapb.contact.impact": ("Impact", "resolve_impact"),
+    "iapb.effects": ("Effect", "decide_effects"),
+    "iapb.errors": (
+        "ArgumentError",
+        "IapbError",
+        "MissingDependencyError",
+        "RangeError",
+        "RunFileError",
+        "SceneError",
+        "SolverError",
+    ),
+    "iapb.mechanics.mechanism": ("Body", "Joint", "Mechanism"),
+    "iapb.run": ("Run",),
+    "iapb.scene": ("Scene", "load_scene"),
+    "iapb.scene_files": ("find_scene", "scene_folder"),
+    "iapb.simulation": ("Simulation", "simulate"),
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = sorted([*_MODULE_OF, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("iapb")
+    elif name in _MODULE_OF:
+        value = getattr(import_module(_MODULE_OF[name]), name)
+    else:
+        raise AttributeError(f"module 'iapb' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,16 @@
+"""What every test shares: the hypothesis profiles."""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+# No deadline in any profile: the first call of a compiled kernel takes seconds, the next one microseconds.
+settings.register_profile(
+    "quick", deadline=None, max_examples=60, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile(
+    "deep", deadline=None, max_examples=3000, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile(os.environ.get("IAPB_HYPOTHESIS_PROFILE", "quick"))
