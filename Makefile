@@ -54,7 +54,7 @@ types: setup ## mypy
 
 .PHONY: imports
 imports: setup ## import-linter: the packages import one way
-	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
+	@$(BIN)/lint-imports --no-logo
 
 .PHONY: pytest
 pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
