@@ -9,6 +9,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python; do \
 
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check --no-input
 # The stamps carry what they were made from, so that another lock makes another environment.
 LOCK_STAMP := $(VENV)/.lock-$(shell cksum < requirements.lock | cut -d ' ' -f 1)
 PROJECT_STAMP := $(VENV)/.project-$(shell cksum < pyproject.toml | cut -d ' ' -f 1)
@@ -27,13 +28,11 @@ $(LOCK_STAMP):
 	@test -n "$(PYTHON)" || { echo "make: no python >= 3.11 with venv was found; set PYTHON=..." >&2; exit 1; }
 	@echo "Making $(VENV) from requirements.lock with $$($(PYTHON) --version); this takes a minute or two ..."
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--no-deps --require-hashes -r requirements.lock
+	@$(PIP) install --no-deps --require-hashes -r requirements.lock
 	@touch $@
 
 $(PROJECT_STAMP): $(LOCK_STAMP)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--no-deps --no-build-isolation --editable .
+	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@rm -f $(VENV)/.project-*
 	@touch $@
 
@@ -70,7 +69,7 @@ format: setup ## let ruff repair what it can
 
 .PHONY: wheel
 wheel: setup ## build dist/*.whl
-	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+	@$(PIP) wheel --no-deps --no-build-isolation -w dist .
 
 .PHONY: lock
 lock: ## resolve requirements.lock again from pyproject.toml (needs uv)
