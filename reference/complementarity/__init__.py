@@ -1,0 +1,7 @@
+"""Impacts as complementarity problems: problems, solutions that judge themselves, solvers, laws."""
+
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Residuals, Solution
+from reference.complementarity.solvers import SOLVERS, solve, solver_names
+
+__all__ = ["SOLVERS", "ImpactProblem", "Residuals", "Solution", "solve", "solver_names"]

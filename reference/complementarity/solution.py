@@ -1,0 +1,127 @@
+"""Solution: what a solver answered, judged by residuals recomputed from the problem alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.complementarity.cones import (
+    de_saxce_shift,
+    distance_to_cone,
+    distance_to_dual_cone,
+    project_on_cone,
+)
+from reference.complementarity.problem import ImpactProblem
+
+Floats = NDArray[np.float64]
+
+# First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting ones 1e-12.
+SOLVED_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """How far an impulse is from solving its problem, relative to the velocity scale; inf = unknown.
+
+    impulse_cone : distance of the scaled impulse from its cone (frictionless: adhesive impulses)
+    velocity_cone : distance of the complementary velocity from the dual cone (penetrating velocities)
+    complementarity : largest |p_i · w_i| of a contact
+    natural_map : largest component of p - proj_K(p - w), which vanishes at solutions only
+    """
+
+    impulse_cone: float = np.inf
+    velocity_cone: float = np.inf
+    complementarity: float = np.inf
+    natural_map: float = np.inf
+
+    @property
+    def worst(self) -> float:
+        """The largest of the four."""
+        return max(self.impulse_cone, self.velocity_cone, self.complementarity, self.natural_map)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An answer to an ImpactProblem.
+
+    Attributes
+    ----------
+    impulse : (n,) p [N s], or None when the solver gave none
+    solver : name in the table of solvers
+    note : what the solver said; shown, never believed
+    refused : True when the solver does not take this kind of problem
+    seconds : wall time of the call [s]
+    """
+
+    problem: ImpactProblem
+    impulse: Floats | None
+    solver: str = ""
+    note: str = ""
+    refused: bool = False
+    seconds: float = np.nan
+
+    @cached_property
+    def residuals(self) -> Residuals:
+        """Residuals recomputed from the problem; all infinite when there is no usable impulse."""
+        if self.impulse is None or self.impulse.shape != self.problem.gamma_minus.shape:
+            return Residuals()
+        if not np.isfinite(self.impulse).all():
+            return Residuals()
+        return residuals(self.problem, self.impulse)
+
+    def solved(self, tolerance: float = SOLVED_TOLERANCE) -> bool:
+        """Whether every recomputed residual is at most `tolerance` of the velocity scale."""
+        return self.residuals.worst <= tolerance
+
+    def verdict(self, tolerance: float = SOLVED_TOLERANCE) -> str:
+        """Return "solved", "refused" or "failed"; a refusal is never counted as an answer."""
+        if self.solved(tolerance):
+            return "solved"
+        return "refused" if self.refused else "failed"
+
+    def answer(self) -> Floats:
+        """Return the impulse (n,), or NaN where there is none, so that nothing is silently zero."""
+        return np.full(self.problem.size, np.nan) if self.impulse is None else self.impulse
+
+    @property
+    def gamma_plus(self) -> Floats:
+        """Contact velocities after the impact (n,) [m/s]."""
+        return self.problem.gamma_plus(self.answer())
+
+    @property
+    def velocity_plus(self) -> Floats:
+        """Generalized velocity after the impact (d,)."""
+        return self.problem.velocity_plus(self.answer())
+
+
+def velocity_scale(problem: ImpactProblem) -> float:
+    """Largest |b| [m/s], against which residuals are measured; 1 for the trivial problem b = 0."""
+    return float(np.abs(problem.offset).max(initial=0.0)) or 1.0
+
+
+def impulse_scale(problem: ImpactProblem) -> Floats:
+    """Per contact (k,) the largest |W| entry of its rows [1/kg]: turns an impulse into a velocity."""
+    scale = np.abs(problem.delassus).max(axis=1, initial=0.0).reshape(-1, problem.contact_size).max(axis=1)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
+    """Return the residuals of `impulse` (n,), recomputed from the problem (scale: `velocity_scale`)."""
+    if problem.size == 0:
+        return Residuals(0.0, 0.0, 0.0, 0.0)
+    mu, size, scale = problem.friction_or_zero, problem.contact_size, velocity_scale(problem)
+    w = problem.contact_velocity(impulse).reshape(-1, size) / scale
+    if problem.friction is not None and not problem.relaxed:
+        w = de_saxce_shift(w, mu)
+    p = impulse_scale(problem)[:, None] * impulse.reshape(-1, size) / scale
+    natural = p - project_on_cone(p - w, mu)
+    product = np.abs(np.einsum("ij,ij->i", p, w)) / np.maximum(1.0, np.linalg.norm(p, axis=1))
+    return Residuals(
+        float(distance_to_cone(p, mu).max()),
+        float(distance_to_dual_cone(w, mu).max()),
+        float(product.max()),
+        float(np.abs(natural).max()),
+    )

@@ -1,0 +1,106 @@
+"""One table of solvers, one file each; a solver's package is imported when the solver is first called.
+
+A solver module offers ``solve(problem) -> Answer``. It may raise SolverError to refuse a problem.
+To add one: write the file, add a line to SOLVERS.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from iapb.errors import ArgumentError, MissingDependencyError, SolverError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Solution
+from reference.complementarity.solvers.answer import Answer
+
+
+@dataclass(frozen=True)
+class SolverEntry:
+    """A solver by name: its module here, its call, the package it needs and what it takes.
+
+    `takes`: "lcp" any frictionless problem, "convex" only with symmetric semidefinite W, "cone" friction.
+    """
+
+    module: str
+    package: str
+    method: str
+    takes: str
+    option: str = ""  # handed to the module's solve where it serves several solvers
+
+
+_CVXPY = "reference.complementarity.solvers.cvxpy_qp"
+_HERE = "reference.complementarity.solvers"
+
+SOLVERS: dict[str, SolverEntry] = {
+    "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp"),
+    "lemke": SolverEntry(f"{_HERE}.lemke", "quantecon", "complementary pivoting (Lemke)", "lcp"),
+    "gauss_seidel": SolverEntry(f"{_HERE}.gauss_seidel", "numba", "projected Gauss-Seidel", "lcp"),
+    "daqp": SolverEntry(f"{_HERE}.daqp_qp", "daqp", "dual active set", "convex"),
+    "quadprog": SolverEntry(f"{_HERE}.quadprog_qp", "quadprog", "Goldfarb-Idnani active set", "convex"),
+    "proxqp": SolverEntry(f"{_HERE}.proxqp_qp", "proxsuite", "proximal augmented Lagrangian", "convex"),
+    "cvxpy_clarabel": SolverEntry(_CVXPY, "clarabel", "interior point", "convex", "CLARABEL"),
+    "cvxpy_osqp": SolverEntry(_CVXPY, "osqp", "ADMM", "convex", "OSQP"),
+    "cvxpy_scs": SolverEntry(_CVXPY, "scs", "ADMM on the conic form", "convex", "SCS"),
+}
+
+
+def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
+    """Return the solvers' names; with a problem, only those that take its kind (friction or not)."""
+    if problem is None:
+        return tuple(SOLVERS)
+    frictional = problem.friction is not None
+    return tuple(name for name, entry in SOLVERS.items() if (entry.takes == "cone") == frictional)
+
+
+def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
+    """Solve `problem` by the solver of that name.
+
+    Raises
+    ------
+    ArgumentError
+        for an unknown name
+    MissingDependencyError
+        when the solver's package is not installed, with the install line
+
+    A solver that refuses or breaks gives a Solution without impulse, whose residuals are infinite.
+    """
+    if solver not in SOLVERS:
+        raise ArgumentError("solver", solver, "one of " + ", ".join(SOLVERS))
+    entry = SOLVERS[solver]
+    call = _load(solver, entry)
+    started = time.perf_counter()
+    try:
+        answer = _known_without_solver(problem, entry) or call(problem, *filter(None, [entry.option]))
+    except SolverError as error:
+        answer = Answer(None, str(error), refused=str(error).startswith("refused"))
+    except (
+        ArithmeticError,
+        LookupError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # raised inside a foreign package
+        answer = Answer(None, f"{type(error).__name__}: {error}")
+    seconds = time.perf_counter() - started
+    impulse = None if answer.impulse is None else np.asarray(answer.impulse, dtype=np.float64)
+    return Solution(problem, impulse, solver, answer.note, answer.refused, seconds)
+
+
+def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
+    try:
+        importlib.import_module(entry.package)
+        return importlib.import_module(entry.module).solve
+    except ImportError as error:
+        install = f"pip install {entry.package}"
+        raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
+
+
+def _known_without_solver(problem: ImpactProblem, entry: SolverEntry) -> Answer | None:
+    """Refuse friction to a frictionless solver and the other way round: these are different questions."""
+    if (entry.takes == "cone") != (problem.friction is not None):
+        kind = "frictionless problems only" if entry.takes != "cone" else "problems with friction only"
+        return Answer(None, f"refused: takes {kind}", refused=True)
+    return Answer(np.zeros(0), "no contacts") if problem.size == 0 else None

@@ -1,0 +1,25 @@
+"""Lemke's complementary pivoting (quantecon), for any W: find z >= 0 with W z + b >= 0 and z·(W z + b) = 0.
+
+Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992), 4.4.
+Semidefinite W is degenerate, and rounding can then end a solvable problem on a ray: reported, not hidden.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import velocity_scale
+from reference.complementarity.solvers.answer import Answer
+
+_STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
+
+
+def solve(problem: ImpactProblem) -> Answer:
+    """Return Lemke's solution, or none where it ends on a ray."""
+    from quantecon.optimize import lcp_lemke
+
+    inertia, speed = float(np.abs(problem.delassus).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    result = lcp_lemke(problem.delassus / inertia, problem.offset / speed)
+    note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
+    return Answer(result.z * speed / inertia if result.success else None, note)

@@ -1,0 +1,106 @@
+"""Every solver answers the same question: compare velocities and residuals, never impulses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError, MissingDependencyError, SolverError
+from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
+from reference.complementarity.solvers import SolverEntry
+from reference.complementarity.solvers.enumeration import all_solutions
+
+# What each solver reaches on small redundant problems, relative velocity, with a factor ten of room.
+REACHED = {"proxqp": 1e-5, "cvxpy_scs": 1e-5, "cvxpy_osqp": 1e-6, "cvxpy_clarabel": 1e-8}
+# quadprog and Lemke can end without an answer on exactly redundant rows, Gauss-Seidel can be too slow on
+# nearly dependent ones; their solution must then judge itself unsolved, and in a few of the SEEDS only.
+MAY_FAIL = {"quadprog", "lemke", "gauss_seidel"}
+SEEDS, FAILURES_ALLOWED = 12, 2
+
+
+def random_impact(seed: int) -> ImpactProblem:
+    rng = np.random.default_rng(seed)
+    d, c = rng.integers(1, 7), rng.integers(1, 8)
+    rank = rng.integers(1, d + 1)
+    root = rng.normal(size=(d, d))
+    rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    return ImpactProblem.from_impact(root @ root.T + 0.1 * np.eye(d), rows, rng.normal(size=d), rng.uniform())
+
+
+@pytest.mark.parametrize("name", [name for name in SOLVERS if SOLVERS[name].takes != "cone"])
+def test_solvers_agree_with_enumeration_by_velocities(name: str) -> None:
+    failures = 0
+    for seed in range(SEEDS):
+        problem = random_impact(seed)
+        truth = solve(problem, "enumeration").velocity_plus
+        solution = solve(problem, name)
+        if name in MAY_FAIL and not solution.solved():
+            assert solution.verdict() == "failed"
+            failures += 1
+            continue
+        assert solution.solved(), (seed, solution.note, solution.residuals)
+        error = np.abs(solution.velocity_plus - truth).max() / np.abs(problem.velocity).max()
+        assert error <= REACHED.get(name, 1e-10)
+    assert failures <= FAILURES_ALLOWED
+
+
+def test_redundant_contacts_have_many_impulses_and_one_velocity() -> None:
+    """A block on two equal corners, each struck twice: impulses differ, velocities do not."""
+    rows = np.array([[1.0, 0.5], [1.0, -0.5], [1.0, 0.5], [1.0, -0.5]])
+    problem = ImpactProblem.from_impact(np.diag([1.0, 0.1]), rows, [-1.0, 0.2], 0.3)
+    solutions = all_solutions(problem)
+    velocities = [problem.velocity_plus(p) for p in solutions]
+    assert len(solutions) > 1
+    assert max(np.abs(v - velocities[0]).max() for v in velocities) <= 1e-12
+
+
+@pytest.mark.parametrize(
+    "wrong", [[0.0, 0.0], [-1.0, 3.0], [5.0, 5.0], [np.nan, 1.0], [np.inf, 1.0], [1.0], [1.0, 1.0, 0.0]]
+)
+def test_planted_wrong_solutions_are_judged_unsolved(wrong: list[float]) -> None:
+    problem = ImpactProblem.from_delassus([[2.0, 1.0], [1.0, 2.0]], [-5.0, -6.0])
+    assert Solution(problem, np.array(solve(problem).impulse)).solved(1e-12)
+    assert not Solution(problem, np.array(wrong), note="optimal").solved()
+
+
+def test_no_impulse_is_infinite_residual() -> None:
+    problem = ImpactProblem.from_delassus([[1.0]], [-1.0])
+    assert Solution(problem, None, note="solved to 1e-16").residuals.worst == np.inf
+
+
+def test_asymmetric_and_indefinite_matrices_are_refused_by_convex_solvers() -> None:
+    asymmetric = ImpactProblem.from_delassus([[1.0, 0.0], [2.0, 1.0]], [-1.0, -1.0])
+    indefinite = ImpactProblem.from_delassus([[0.0, 1.0], [1.0, 0.0]], [-1.0, -1.0])
+    for problem in (asymmetric, indefinite):
+        with pytest.raises(SolverError):
+            _ = problem.factor
+        assert solve(problem, "daqp").verdict() == "refused"
+        assert solve(problem, "enumeration").solved(1e-12)
+    assert "asymmetric" in solve(asymmetric, "daqp").note
+
+
+def test_a_problem_without_solution_is_not_solved_by_anyone() -> None:
+    """w = -1 whatever p: the rows forbid what the velocity demands."""
+    problem = ImpactProblem.from_delassus([[0.0]], [-1.0])
+    assert all(not solve(problem, name).solved() for name in solver_names(problem))
+
+
+def test_zero_contacts() -> None:
+    problem = ImpactProblem.from_impact(np.eye(2), np.zeros((0, 2)), [1.0, 2.0], 0.5)
+    for name in solver_names(problem):
+        solution = solve(problem, name)
+        assert solution.solved() and np.array_equal(solution.velocity_plus, [1.0, 2.0]), name
+
+
+def test_border(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ArgumentError, match="one of enumeration"):
+        solve(ImpactProblem.from_delassus([[1.0]], [0.0]), "simplex")
+    with pytest.raises(ArgumentError, match="restitution"):
+        ImpactProblem.from_impact(np.eye(1), [[1.0]], [1.0], 1.5)
+    with pytest.raises(ArgumentError, match="columns"):
+        ImpactProblem.from_impact(np.eye(2), [[1.0]], [1.0, 0.0], 1.0)
+    with pytest.raises(ArgumentError, match="positive definite"):
+        ImpactProblem.from_impact(-np.eye(1), [[1.0]], [1.0], 1.0)
+    monkeypatch.setitem(SOLVERS, "absent", SolverEntry("nowhere", "not_a_package", "", "lcp"))
+    with pytest.raises(MissingDependencyError, match="pip install not_a_package"):
+        solve(ImpactProblem.from_delassus([[1.0]], [0.0]), "absent")
