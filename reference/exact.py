@@ -1,0 +1,218 @@
+"""The truth for hard impacts: exact rationals, and balls of certified radius (python-flint).
+
+Every finite double is a rational number, so an impact given in doubles has an exact outcome of (21),
+v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal independent subset
+of the rows (33). The subset is found without rounding: redundant rows are decided, not estimated. Rows that
+are redundant only up to rounding *are* independent here; give fractions where exact redundancy is meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.errors import ArgumentError, MissingDependencyError, SolverError
+
+Floats = NDArray[np.float64]
+Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
+
+_FIRST_BALL_BITS = 256  # working precision tried first; doubled until the ball is narrow
+_LAST_BALL_BITS = 1 << 14  # a ball still wide at this precision is given up, with an error
+_BALL_ACCURACY_BITS = 80  # narrow enough to round to the nearest double and to judge its last bit
+
+
+@dataclass(frozen=True)
+class ExactImpact:
+    """The outcome of (21) for the given numbers, without rounding.
+
+    Attributes
+    ----------
+    velocity : v⁺, d fractions
+    generalized_impulse : M (v⁺ − v⁻), d fractions
+    independent_rows : indices of the rows Jₙ
+    energy_before, energy_after : kinetic energies [J]
+    """
+
+    velocity: tuple[Fraction, ...]
+    generalized_impulse: tuple[Fraction, ...]
+    independent_rows: tuple[int, ...]
+    energy_before: Fraction
+    energy_after: Fraction
+
+    @property
+    def rank(self) -> int:
+        """Exact rank of the contact Jacobian."""
+        return len(self.independent_rows)
+
+    @property
+    def rounded_velocity(self) -> Floats:
+        """v⁺ rounded once to doubles (d,)."""
+        return np.array([float(x) for x in self.velocity])
+
+
+def exact_impact(
+    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float | Fraction
+) -> ExactImpact:
+    """Return the exact outcome of (21) for M (d, d), J (c, d), v (d,) and scalar e.
+
+    Entries are doubles or `fractions.Fraction`; M is taken as symmetric positive definite.
+    """
+    mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
+    chosen = independent_rows(contact_jacobian)
+    rows = _take_rows(rational_matrix("contact_jacobian", contact_jacobian, mass.ncols()), chosen)
+    impulse = _generalized_impulse(mass, rows, v, _fmpq(Fraction(restitution)))
+    v_plus = v + mass.solve(impulse)
+    before, after = (_fraction((x.transpose() * mass * x)[0, 0]) / 2 for x in (v, v_plus))
+    return ExactImpact(_fractions(v_plus), _fractions(impulse), chosen, before, after)
+
+
+def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
+    """Return the indices of the first maximal set of linearly independent rows, decided exactly."""
+    jacobian = rational_matrix("contact_jacobian", contact_jacobian)
+    if 0 in (jacobian.nrows(), jacobian.ncols()):
+        return ()
+    reduced, rank = jacobian.transpose().rref()
+    return tuple(_first_nonzero(reduced, i) for i in range(rank))
+
+
+def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
+    """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded once; > 0 is a gain.
+
+    KE⁻ = 0 gives 0 when KE⁺ = 0 and infinity otherwise. For bulk see `reference.energy_gain`.
+    """
+    mass = rational_matrix("mass_matrix", mass_matrix)
+    before, after = (
+        _fraction((x.transpose() * mass * x)[0, 0])
+        for x in (rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus))
+    )
+    if before == 0:
+        return 0.0 if after == 0 else np.inf
+    return float((after - before) / before)
+
+
+def ball_impact(
+    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float
+) -> tuple[Floats, Floats]:
+    """Return v⁺ of (21) as doubles (d,) and certified bounds (d,) of their error, by ball arithmetic.
+
+    Faster than `exact_impact` for large problems: only the choice of independent rows is rational. Precision
+    doubles until every ball is as narrow as 2⁻⁸⁰ of the largest component.
+
+    Raises
+    ------
+    SolverError
+        if the ball stays wide at 16384 bits
+    """
+    flint = _flint()
+    mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
+    jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
+    rows, e = _take_rows(jacobian, independent_rows(contact_jacobian)), _fmpq(Fraction(restitution))
+    bits, before = _FIRST_BALL_BITS, flint.ctx.prec
+    try:
+        while bits <= _LAST_BALL_BITS:
+            flint.ctx.prec = bits
+            balls = _try_balls(flint, mass, rows, v, e)
+            if balls is not None:
+                return balls
+            bits *= 2
+    finally:
+        flint.ctx.prec = before
+    raise SolverError(f"ball arithmetic did not narrow at {_LAST_BALL_BITS} bits")
+
+
+def condition_number(mass_matrix: ArrayLike) -> float:
+    """Return kappa(M) = largest / smallest eigenvalue, from the exact characteristic polynomial."""
+    eigenvalues = _nonzero_eigenvalues(rational_matrix("mass_matrix", mass_matrix))
+    return eigenvalues[-1] / eigenvalues[0]
+
+
+def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) -> float:
+    """Return kappa(A), A = J L⁻ᵀ: largest over smallest nonzero singular value; 1 when there is no row.
+
+    They are the square roots of the nonzero eigenvalues of M⁻¹JᵀJ, which is rational.
+    """
+    mass = rational_matrix("mass_matrix", mass_matrix)
+    jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
+    eigenvalues = _nonzero_eigenvalues(mass.solve(jacobian.transpose() * jacobian))
+    return float(np.sqrt(eigenvalues[-1] / eigenvalues[0])) if eigenvalues else 1.0
+
+
+def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None) -> Rational:
+    """Return `value` as a matrix of rationals, exactly; a vector becomes a column (unless `columns` is given)."""
+    flint = _flint()
+    array = np.array(value, dtype=object)
+    if array.ndim == 1:
+        array = array.reshape(-1, 1) if columns is None else array.reshape(-1, columns)
+    if array.ndim != 2:
+        raise ArgumentError(argument, array.shape, "a vector or a matrix")
+    if columns is not None and array.shape[1] != columns:
+        raise ArgumentError(argument, array.shape, f"{columns} columns")
+    try:
+        entries = [_fmpq(Fraction(x)) for x in array.ravel()]
+    except (OverflowError, ValueError, TypeError):
+        raise ArgumentError(argument, value, "finite doubles or fractions") from None
+    return flint.fmpq_mat(*array.shape, entries)
+
+
+def _flint() -> Any:
+    try:
+        import flint
+    except ImportError as error:
+        raise MissingDependencyError(
+            "python-flint", "exact arithmetic", "pip install python-flint"
+        ) from error
+    return flint
+
+
+def _fmpq(x: Fraction) -> Any:
+    return _flint().fmpq(x.numerator, x.denominator)
+
+
+def _fraction(x: Any) -> Fraction:
+    return Fraction(int(x.p), int(x.q))
+
+
+def _fractions(column: Rational) -> tuple[Fraction, ...]:
+    return tuple(_fraction(x) for x in column.entries())
+
+
+def _take_rows(matrix: Rational, rows: tuple[int, ...]) -> Rational:
+    entries = [matrix[i, j] for i in rows for j in range(matrix.ncols())]
+    return _flint().fmpq_mat(len(rows), matrix.ncols(), entries)
+
+
+def _first_nonzero(matrix: Rational, row: int) -> int:
+    return next(j for j in range(matrix.ncols()) if matrix[row, j] != 0)
+
+
+def _generalized_impulse(mass: Any, rows: Any, v: Any, e: Any) -> Any:
+    """−(1+e) Jₙᵀ (Jₙ M⁻¹ Jₙᵀ)⁻¹ Jₙ v, in whatever arithmetic the matrices bring (rationals or balls)."""
+    if rows.nrows() == 0:
+        return v - v
+    delassus = rows * mass.solve(rows.transpose())
+    return rows.transpose() * delassus.solve(rows * v) * -(1 + e)
+
+
+def _try_balls(flint: Any, mass: Any, rows: Any, v: Any, e: Any) -> tuple[Floats, Floats] | None:
+    ball_mass, ball_rows, ball_v = flint.arb_mat(mass), flint.arb_mat(rows), flint.arb_mat(v)
+    try:
+        impulse = _generalized_impulse(ball_mass, ball_rows, ball_v, flint.arb(e))
+        entries = (ball_v + ball_mass.solve(impulse)).entries()
+    except ZeroDivisionError:  # a pivot's ball contains zero: more bits are needed
+        return None
+    largest = max((float(abs(x).upper()) for x in entries), default=0.0)
+    if any(float(x.rad()) > largest * 2.0**-_BALL_ACCURACY_BITS for x in entries):
+        return None
+    middle = np.array([float(x.mid()) for x in entries])
+    bounds = [float(abs(x - flint.arb(m)).upper()) for x, m in zip(entries, middle, strict=True)]
+    return middle, np.nextafter(bounds, np.inf)  # float() rounds to nearest; a bound must round up
+
+
+def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
+    """Return the nonzero eigenvalues, ascending, of a matrix known to have real eigenvalues >= 0."""
+    roots = matrix.charpoly().complex_roots()
+    return sorted(float(root.real.mid()) for root, _ in roots if not root.contains(0))

@@ -1,0 +1,118 @@
+"""The judges are judged: rationals against hand results, balls and double-doubles against rationals."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError
+from reference.energy_gain import bulk_energy_gain
+from reference.exact import (
+    ball_impact,
+    condition_number,
+    exact_impact,
+    independent_rows,
+    relative_energy_gain,
+    row_condition_number,
+)
+
+SMALL = st.integers(-4, 4)
+
+
+def impact_of(seed: int, d: int = 4, c: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Random impact whose rows repeat, exactly, as multiples of one another."""
+    rng = np.random.default_rng(seed)
+    root = rng.integers(-4, 5, size=(d, d)).astype(float)
+    rows = rng.integers(-3, 4, size=(c, d)).astype(float)
+    rows[c // 2 :] = 2.0 * rows[: c - c // 2]
+    return root @ root.T + np.eye(d), rows, rng.normal(size=d)
+
+
+def test_one_mass_against_a_wall() -> None:
+    impact = exact_impact([[2.0]], [[1.0], [3.0]], [-0.25], Fraction(1, 2))
+    assert impact.velocity == (Fraction(1, 8),)
+    assert impact.generalized_impulse == (Fraction(3, 4),)
+    assert (impact.rank, impact.independent_rows) == (1, (0,))
+    assert impact.energy_after - impact.energy_before == Fraction(1, 64) - Fraction(1, 16)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_outcome_obeys_the_theorem_without_any_tolerance(seed: int) -> None:
+    """J v⁺ = −e J v⁻ on every row, redundant ones included, and elastic energy is conserved, exactly."""
+    mass, rows, v = impact_of(seed)
+    impact = exact_impact(mass, rows, v, 1)
+    assert impact.energy_after == impact.energy_before
+    exact_v = [Fraction(x) for x in v]
+    for row in rows:
+        after = sum(Fraction(r) * x for r, x in zip(row, impact.velocity, strict=True))
+        before = sum(Fraction(r) * x for r, x in zip(row, exact_v, strict=True))
+        assert after == -before
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_balls_contain_the_rational_outcome(seed: int) -> None:
+    mass, rows, v = impact_of(seed)
+    truth = exact_impact(mass, rows, v, 0.3).velocity
+    middle, bound = ball_impact(mass, rows, v, 0.3)
+    for m, b, x in zip(middle, bound, truth, strict=True):
+        assert abs(Fraction(m) - x) <= Fraction(b)
+        assert b <= np.spacing(abs(m)) + 1e-24
+
+
+@given(st.lists(st.lists(SMALL, min_size=3, max_size=3), min_size=1, max_size=6))
+def test_independent_rows_span_as_many_dimensions_as_the_rank(rows: list[list[int]]) -> None:
+    chosen = independent_rows(rows)
+    assert len(chosen) == np.linalg.matrix_rank(np.array(rows))
+    assert np.linalg.matrix_rank(np.array(rows)[list(chosen)].reshape(-1, 3)) == len(chosen)
+
+
+def test_near_redundancy_is_independence() -> None:
+    """Rounding makes rows independent: that is what the doubles say."""
+    assert independent_rows([[1.0, 0.0], [1.0, 2.0**-1000]]) == (0, 1)
+    assert independent_rows([[Fraction(1, 3), 0], [Fraction(1, 7), 0]]) == (0,)
+
+
+def test_condition_numbers() -> None:
+    assert condition_number(np.diag([1.0, 1e-12, 3.0])) == pytest.approx(3e12, rel=1e-14)
+    assert row_condition_number(np.eye(3), [[1.0, 0, 0], [0, 4.0, 0], [0, 4.0, 0]]) == pytest.approx(32**0.5)
+    assert row_condition_number(np.eye(2), np.zeros((0, 2))) == 1.0
+
+
+@pytest.mark.parametrize("kappa", [1.0, 1e6, 1e12])
+def test_double_double_gain_is_within_its_bound_of_the_rational_one(kappa: float) -> None:
+    rng = np.random.default_rng(int(np.log10(kappa)))
+    for _ in range(10):
+        d = int(rng.integers(1, 9))
+        q, _ = np.linalg.qr(rng.normal(size=(d, d)))
+        mass = (q * np.geomspace(1.0, kappa, d)) @ q.T
+        mass = 0.5 * (mass + mass.T)
+        before = q[:, 0] + 1e-9 * rng.normal(
+            size=d
+        )  # mostly the light direction, where cancellation is worst
+        after = before * (1.0 + 1e-15 * rng.normal(size=d))
+        gain, bound = bulk_energy_gain(mass, before, after)
+        exact = relative_energy_gain(mass, before, after)
+        assert abs(gain[0] - exact) <= bound[0]
+        assert bound[0] <= 1e-15 * abs(exact) + 1e-14 * kappa * 1e-12
+
+
+def test_a_planted_gain_of_one_part_in_1e15_is_seen() -> None:
+    mass, before = np.diag([1.0, 1e8]), np.array([1.0, 0.0])
+    after = before * (1.0 + 2.0**-50)
+    assert relative_energy_gain(mass, before, after) == pytest.approx(2.0**-49, rel=1e-12)
+    assert bulk_energy_gain(mass, before, after)[0][0] == pytest.approx(2.0**-49, rel=1e-12)
+
+
+def test_border() -> None:
+    with pytest.raises(ArgumentError, match="finite"):
+        exact_impact([[1.0]], [[np.nan]], [1.0], 1.0)
+    with pytest.raises(ArgumentError, match="columns"):
+        exact_impact([[1.0]], [[1.0, 2.0]], [1.0], 1.0)
+    with pytest.raises(ArgumentError, match="magnitudes"):
+        bulk_energy_gain([[1.0]], [1e200], [1.0])
+    assert relative_energy_gain([[1.0]], [0.0], [0.0]) == 0.0
+    assert relative_energy_gain([[1.0]], [0.0], [1.0]) == np.inf
