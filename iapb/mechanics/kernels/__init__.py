@@ -1,0 +1,33 @@
+"""Compiled kernels of the mechanics room: arrays in, `out` written, nothing allocated.
+
+Everything is expressed in world axes. Each degree of freedom k has one unit axis: it translates its body
+along it or turns it about the line through the body's origin; hence one formula serves every joint kind.
+Order of calls: `forward_kinematics` fills the workspace, everything else reads it.
+"""
+
+from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels.configuration import difference, integrate
+from iapb.mechanics.kernels.dynamics import bias, gravity, inverse_dynamics, mass_matrix
+from iapb.mechanics.kernels.energy import centroidal_momentum, kinetic_energy, potential_energy
+from iapb.mechanics.kernels.jacobians import add_point_force, frame_jacobian, point_jacobian, point_velocity
+from iapb.mechanics.kernels.kinematics import forward_kinematics
+
+__all__ = [
+    "MechanismArrays",
+    "Workspace",
+    "add_point_force",
+    "bias",
+    "centroidal_momentum",
+    "difference",
+    "forward_kinematics",
+    "frame_jacobian",
+    "gravity",
+    "integrate",
+    "inverse_dynamics",
+    "kinetic_energy",
+    "make_workspace",
+    "mass_matrix",
+    "point_jacobian",
+    "point_velocity",
+    "potential_energy",
+]

@@ -1,0 +1,158 @@
+"""Moving on the configuration manifold: q (+) v dt and its inverse, joint by joint.
+
+Vector joints add; (cos, sin) pairs and quaternions turn by the group exponential and are put back on the
+unit circle or sphere; velocities in body axes (free flyer, planar_se2) follow the screw of SE(3) or SE(2),
+as Pinocchio does.
+"""
+
+from math import atan2, cos, sin, sqrt
+
+from numba import njit
+
+from iapb.mechanics.kernels.arrays import CONTINUOUS, FIXED, FREE_FLYER, PLANAR_SE2, SPHERICAL
+from iapb.mechanics.kernels.vectors import add, cross, dot, scale
+
+# Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17, while the
+# closed forms lose digits: 1 - cos keeps eps / angle^2.
+SMALL_ANGLE = 1e-4
+
+
+@njit(cache=True, fastmath=False)
+def screw_coefficients(angle):
+    """Return ((1 - cos t) / t^2, (t - sin t) / t^3) of the angle t."""
+    square = angle * angle
+    if angle < SMALL_ANGLE:
+        return 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    half = sin(0.5 * angle)
+    return 2.0 * half * half / square, (angle - sin(angle)) / (square * angle)
+
+
+@njit(cache=True, fastmath=False)
+def turn_vector(x, y, z, s, a):
+    """Rotate a by the unit quaternion (x, y, z, s)."""
+    axis = (x, y, z)
+    twice = scale(2.0, cross(axis, a))
+    return add(a, add(scale(s, twice), cross(axis, twice)))
+
+
+@njit(cache=True, fastmath=False)
+def turn_pair(q, i, angle, out):
+    """(cos, sin) at i <- turned by the angle, length restored to one."""
+    c = q[i] * cos(angle) - q[i + 1] * sin(angle)
+    s = q[i + 1] * cos(angle) + q[i] * sin(angle)
+    length = sqrt(c * c + s * s)
+    out[i], out[i + 1] = c / length, s / length
+
+
+@njit(cache=True, fastmath=False)
+def turn_quaternion(q, i, phi, out):
+    """Quaternion at i <- q * exp(phi / 2), phi [rad] a rotation vector in body axes."""
+    angle = sqrt(dot(phi, phi))
+    factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin(0.5 * angle) / angle
+    b, t = scale(factor, phi), cos(0.5 * angle)
+    a, s = (q[i], q[i + 1], q[i + 2]), q[i + 3]
+    vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
+    scalar = s * t - dot(a, b)
+    length = sqrt(dot(vector, vector) + scalar * scalar)
+    out[i], out[i + 1], out[i + 2] = scale(1.0 / length, vector)
+    out[i + 3] = scalar / length
+
+
+@njit(cache=True, fastmath=False)
+def integrate_free_flyer(q, i, v, k, dt, out):
+    """p += R (1 + A [phi]x + B [phi]x^2) u with u = v_linear dt, phi = v_angular dt; R turns by phi."""
+    u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
+    phi = (v[k + 3] * dt, v[k + 4] * dt, v[k + 5] * dt)
+    first, second = screw_coefficients(sqrt(dot(phi, phi)))
+    turned = cross(phi, u)
+    path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
+    path = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], path)
+    out[i], out[i + 1], out[i + 2] = q[i] + path[0], q[i + 1] + path[1], q[i + 2] + path[2]
+    turn_quaternion(q, i + 3, phi, out)
+
+
+@njit(cache=True, fastmath=False)
+def integrate_planar_se2(q, i, v, k, dt, out):
+    """The same in the plane: q = (x, y, cos, sin), v = (u_x, u_y, omega) in body axes."""
+    u, phi = (v[k] * dt, v[k + 1] * dt, 0.0), (0.0, 0.0, v[k + 2] * dt)
+    first, second = screw_coefficients(abs(phi[2]))
+    turned = cross(phi, u)
+    path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
+    c, s = q[i + 2], q[i + 3]
+    out[i] = q[i] + c * path[0] - s * path[1]
+    out[i + 1] = q[i + 1] + s * path[0] + c * path[1]
+    turn_pair(q, i + 2, phi[2], out)
+
+
+@njit(cache=True, fastmath=False)
+def integrate(m, q, v, dt, out):
+    """out (nq,) <- q moved for dt with the constant velocity v; out may be q itself."""
+    for b in range(m.kind.shape[0]):
+        kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+        if kind == FIXED:
+            continue
+        elif kind == CONTINUOUS:
+            turn_pair(q, i, v[k] * dt, out)
+        elif kind == SPHERICAL:
+            turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
+        elif kind == FREE_FLYER:
+            integrate_free_flyer(q, i, v, k, dt, out)
+        elif kind == PLANAR_SE2:
+            integrate_planar_se2(q, i, v, k, dt, out)
+        else:
+            for j in range(m.v_count[b]):
+                out[i + j] = q[i + j] + dt * v[k + j]
+
+
+@njit(cache=True, fastmath=False)
+def quaternion_difference(q0, q1, i):
+    """Rotation vector phi in the body axes of q0 with q1 = q0 * exp(phi / 2), |phi| <= pi."""
+    a, s = (-q0[i], -q0[i + 1], -q0[i + 2]), q0[i + 3]
+    b, t = (q1[i], q1[i + 1], q1[i + 2]), q1[i + 3]
+    vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
+    scalar = s * t - dot(a, b)
+    if scalar < 0.0:  # q and -q are the same rotation: take the shorter way
+        vector, scalar = scale(-1.0, vector), -scalar
+    sine = sqrt(dot(vector, vector))
+    factor = 2.0 if sine == 0.0 else 2.0 * atan2(sine, scalar) / sine
+    return scale(factor, vector)
+
+
+@njit(cache=True, fastmath=False)
+def inverse_screw(path, phi):
+    """u with (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path)."""
+    angle = sqrt(dot(phi, phi))
+    square = angle * angle
+    if angle < SMALL_ANGLE:
+        factor = 1.0 / 12.0 + square / 720.0
+    else:
+        factor = (1.0 - 0.5 * angle * cos(0.5 * angle) / sin(0.5 * angle)) / square
+    turned = cross(phi, path)
+    return add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
+
+
+@njit(cache=True, fastmath=False)
+def difference(m, q0, q1, out):
+    """out (d,) <- the v with integrate(q0, v, 1) = q1, taking the shortest turns."""
+    for b in range(m.kind.shape[0]):
+        kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+        if kind == FIXED:
+            continue
+        elif kind == CONTINUOUS:
+            out[k] = atan2(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
+        elif kind == SPHERICAL:
+            out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
+        elif kind == FREE_FLYER:
+            phi = quaternion_difference(q0, q1, i + 3)
+            path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
+            path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
+            out[k], out[k + 1], out[k + 2] = inverse_screw(path, phi)
+            out[k + 3], out[k + 4], out[k + 5] = phi
+        elif kind == PLANAR_SE2:
+            c, s, x, y = q0[i + 2], q0[i + 3], q1[i] - q0[i], q1[i + 1] - q0[i + 1]
+            turn = atan2(c * q1[i + 3] - s * q1[i + 2], c * q1[i + 2] + s * q1[i + 3])
+            u = inverse_screw((c * x + s * y, c * y - s * x, 0.0), (0.0, 0.0, turn))
+            out[k], out[k + 1], out[k + 2] = u[0], u[1], turn
+        else:
+            for j in range(m.v_count[b]):
+                out[k + j] = q1[i + j] - q0[i + j]

@@ -1,0 +1,196 @@
+"""Equations of motion M dv/dt + B + G = tau (paper (1)) by composite bodies and by Newton-Euler.
+
+Sources: Walker and Orin 1982 (composite rigid bodies), Luh, Walker and Paul 1980 (Newton-Euler), both as in
+Featherstone, Rigid Body Dynamics Algorithms, 2008, here in world axes. Composite inertias are kept about the
+composite's own centre of mass, where merging two bodies only adds positive terms.
+"""
+
+from numba import njit
+
+from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2
+from iapb.mechanics.kernels.vectors import (
+    accumulate,
+    add,
+    cross,
+    dot,
+    load,
+    scale,
+    store,
+    subtract,
+    transform,
+    transform_back,
+)
+
+
+@njit(cache=True, fastmath=False)
+def start_composite(m, w, b):
+    """Composite of b <- body b alone, inertia turned into world axes: R I R^T."""
+    w.composite_mass[b] = m.mass[b]
+    store(w.composite_center, b, load(w.center, b))
+    for column in range(3):
+        f = w.rotation[b]
+        image = transform(m.inertia, b, (f[column, 0], f[column, 1], f[column, 2]))
+        image = transform(w.rotation, b, image)
+        for row in range(3):
+            w.composite_inertia[b, row, column] = image[row]
+
+
+@njit(cache=True, fastmath=False)
+def merge_composite(w, into, b):
+    """Add the composite of b to another: I = I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2)."""
+    m1, m2 = w.composite_mass[into], w.composite_mass[b]
+    total = m1 + m2
+    c1, c2 = load(w.composite_center, into), load(w.composite_center, b)
+    r = subtract(c2, c1)
+    share = m2 / total if total > 0.0 else 0.0
+    mu = m1 * share
+    square = dot(r, r)
+    for row in range(3):
+        for column in range(3):
+            parallel = (square if row == column else 0.0) - r[row] * r[column]
+            w.composite_inertia[into, row, column] += w.composite_inertia[b, row, column] + mu * parallel
+    w.composite_mass[into] = total
+    store(w.composite_center, into, add(c1, scale(share, r)))
+
+
+@njit(cache=True, fastmath=False)
+def composite_bodies(m, w):
+    """For each body: mass, centre and inertia of itself and all it carries."""
+    for b in range(m.kind.shape[0]):
+        start_composite(m, w, b)
+    for b in range(m.kind.shape[0] - 1, -1, -1):
+        if m.parent[b] >= 0:
+            merge_composite(w, m.parent[b], b)
+
+
+@njit(cache=True, fastmath=False)
+def mass_matrix(m, w, out):
+    """out (d, d) <- M(q), symmetric; entries between dofs that do not share a chain are zero.
+
+    Column j: a unit velocity of dof j gives its composite the linear momentum l and the angular momentum h
+    about the composite centre c; dof i before it sees a_i . l or a_i . (h + (c - o_i) x l).
+    """
+    composite_bodies(m, w)
+    out[:] = 0.0
+    for j in range(m.dof_body.shape[0]):
+        b = m.dof_body[j]
+        a, c = load(w.axis, j), load(w.composite_center, b)
+        if m.dof_rotates[j]:
+            linear = scale(w.composite_mass[b], cross(a, subtract(c, load(w.position, b))))
+            angular = transform(w.composite_inertia, b, a)
+        else:
+            linear = scale(w.composite_mass[b], a)
+            angular = (0.0, 0.0, 0.0)
+        i = j
+        while i >= 0:
+            if m.dof_rotates[i]:
+                lever = subtract(c, load(w.position, m.dof_body[i]))
+                entry = dot(load(w.axis, i), add(angular, cross(lever, linear)))
+            else:
+                entry = dot(load(w.axis, i), linear)
+            out[i, j] = entry
+            out[j, i] = entry
+            i = m.dof_parent[i]
+
+
+@njit(cache=True, fastmath=False)
+def gravity(m, w, g, out):
+    """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world axes."""
+    for b in range(m.kind.shape[0]):
+        store(w.force, b, scale(-m.mass[b], (g[0], g[1], g[2])))
+        store(w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b)))
+    project_forces(m, w, out)
+
+
+@njit(cache=True, fastmath=False)
+def project_forces(m, w, out):
+    """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof components."""
+    for b in range(m.kind.shape[0] - 1, -1, -1):
+        f, n = load(w.force, b), load(w.moment, b)
+        for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
+            out[k] = dot(load(w.axis, k), n if m.dof_rotates[k] else f)
+        parent = m.parent[b]
+        if parent >= 0:
+            lever = subtract(load(w.position, b), load(w.position, parent))
+            accumulate(w.force, parent, f)
+            accumulate(w.moment, parent, add(n, cross(lever, f)))
+
+
+@njit(cache=True, fastmath=False)
+def relative_motion(m, w, b, rates):
+    """Linear and angular part of the joint's motion for these rates of its dofs, world axes."""
+    linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
+        if m.dof_rotates[k]:
+            angular = add(angular, scale(rates[k], load(w.axis, k)))
+        else:
+            linear = add(linear, scale(rates[k], load(w.axis, k)))
+    return linear, angular
+
+
+@njit(cache=True, fastmath=False)
+def body_velocities(m, w, v):
+    """Angular velocity of each body and velocity of its origin."""
+    zero = (0.0, 0.0, 0.0)
+    for b in range(m.kind.shape[0]):
+        parent = m.parent[b]
+        linear, angular = relative_motion(m, w, b, v)
+        omega = load(w.angular_velocity, parent) if parent >= 0 else zero
+        origin = load(w.linear_velocity, parent) if parent >= 0 else zero
+        r = subtract(load(w.position, b), load(w.position, parent)) if parent >= 0 else zero
+        store(w.angular_velocity, b, add(omega, angular))
+        store(w.linear_velocity, b, add(add(origin, cross(omega, r)), linear))
+
+
+@njit(cache=True, fastmath=False)
+def body_accelerations(m, w, v, dv, g):
+    """Acceleration of each body for dv/dt = dv, the world accelerating by -g (so that weight is included).
+
+    With r = p_b - p_parent and joint motion (u, s) for v, (u', s') for dv:
+    alpha = alpha_p + omega_p x s + s',
+    a = a_p + alpha_p x r + omega_p x (omega_p x r) + 2 omega_p x u + u' [+ s x u, velocities in body axes].
+    """
+    zero = (0.0, 0.0, 0.0)
+    for b in range(m.kind.shape[0]):
+        parent = m.parent[b]
+        u, s = relative_motion(m, w, b, v)
+        du, ds = relative_motion(m, w, b, dv)
+        if m.kind[b] == FREE_FLYER or m.kind[b] == PLANAR_SE2:
+            du = add(du, cross(s, u))
+        omega, alpha, a, r = zero, zero, (-g[0], -g[1], -g[2]), zero
+        if parent >= 0:
+            omega, alpha = load(w.angular_velocity, parent), load(w.angular_acceleration, parent)
+            a = load(w.linear_acceleration, parent)
+            r = subtract(load(w.position, b), load(w.position, parent))
+        a = add(a, add(cross(alpha, r), cross(omega, add(cross(omega, r), scale(2.0, u)))))
+        store(w.angular_acceleration, b, add(alpha, add(cross(omega, s), ds)))
+        store(w.linear_acceleration, b, add(a, du))
+
+
+@njit(cache=True, fastmath=False)
+def inverse_dynamics(m, w, v, dv, g, out):
+    """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler."""
+    body_velocities(m, w, v)
+    body_accelerations(m, w, v, dv, g)
+    for b in range(m.kind.shape[0]):
+        omega, alpha = load(w.angular_velocity, b), load(w.angular_acceleration, b)
+        r = subtract(load(w.center, b), load(w.position, b))
+        a = add(load(w.linear_acceleration, b), add(cross(alpha, r), cross(omega, cross(omega, r))))
+        f = scale(m.mass[b], a)
+        h = turned_inertia(m, w, b, omega)
+        n = add(turned_inertia(m, w, b, alpha), cross(omega, h))
+        store(w.force, b, f)
+        store(w.moment, b, add(n, cross(r, f)))
+    project_forces(m, w, out)
+
+
+@njit(cache=True, fastmath=False)
+def turned_inertia(m, w, b, omega):
+    """R I R^T omega of body b alone."""
+    return transform(w.rotation, b, transform(m.inertia, b, transform_back(w.rotation, b, omega)))
+
+
+@njit(cache=True, fastmath=False)
+def bias(m, w, v, out):
+    """out (d,) <- B(q, v): Coriolis and centripetal generalized forces."""
+    inverse_dynamics(m, w, v, w.at_rest, (0.0, 0.0, 0.0), out)

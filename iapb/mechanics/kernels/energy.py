@@ -1,0 +1,51 @@
+"""Energies and momentum as sums over bodies: no cancellation between large entries of M."""
+
+from numba import njit
+
+from iapb.mechanics.kernels.dynamics import body_velocities, turned_inertia
+from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
+
+
+@njit(cache=True, fastmath=False)
+def center_velocity(w, b):
+    """Velocity of body b's centre of mass: v_o + omega x (c - o)."""
+    lever = subtract(load(w.center, b), load(w.position, b))
+    return add(load(w.linear_velocity, b), cross(load(w.angular_velocity, b), lever))
+
+
+@njit(cache=True, fastmath=False)
+def kinetic_energy(m, w, v):
+    """Return sum of (m |v_c|^2 + omega . I omega) / 2 [J]."""
+    body_velocities(m, w, v)
+    total = 0.0
+    for b in range(m.kind.shape[0]):
+        u, omega = center_velocity(w, b), load(w.angular_velocity, b)
+        total += 0.5 * (m.mass[b] * dot(u, u) + dot(omega, turned_inertia(m, w, b, omega)))
+    return total
+
+
+@njit(cache=True, fastmath=False)
+def potential_energy(m, w, g):
+    """Return -sum of m g . c [J], zero with every centre of mass at the world origin."""
+    total = 0.0
+    for b in range(m.kind.shape[0]):
+        total -= m.mass[b] * dot((g[0], g[1], g[2]), load(w.center, b))
+    return total
+
+
+@njit(cache=True, fastmath=False)
+def centroidal_momentum(m, w, v, out):
+    """out (6,) <- linear momentum [N s] and angular momentum about the common centre of mass [N m s]."""
+    body_velocities(m, w, v)
+    mass, first_moment, linear, angular = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for b in range(m.kind.shape[0]):
+        mass += m.mass[b]
+        first_moment = add(first_moment, scale(m.mass[b], load(w.center, b)))
+    common = scale(1.0 / mass if mass > 0.0 else 0.0, first_moment)
+    for b in range(m.kind.shape[0]):
+        momentum = scale(m.mass[b], center_velocity(w, b))
+        spin = turned_inertia(m, w, b, load(w.angular_velocity, b))
+        linear = add(linear, momentum)
+        angular = add(angular, add(spin, cross(subtract(load(w.center, b), common), momentum)))
+    out[0], out[1], out[2] = linear
+    out[3], out[4], out[5] = angular

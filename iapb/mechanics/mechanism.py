@@ -1,0 +1,243 @@
+"""Mechanism: bodies and joints as one point of configuration space (paper section IV, equations (1) to (3)).
+
+M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_1 ... M_m).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.errors import ArgumentError
+from iapb.mechanics import kernels, structure
+from iapb.mechanics.bodies import Body, finite_array, parent_indices, tree_indices
+from iapb.mechanics.joints import Joint
+from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
+
+__all__ = ["Body", "Joint", "Mechanism"]
+
+Floats = NDArray[np.float64]
+
+# Length of a quaternion or (cos, sin) pair given at the public border: single precision input passes.
+UNIT_TOLERANCE = 1e-6
+
+
+class Mechanism:
+    """Trees of rigid bodies.
+
+    Parameters
+    ----------
+    bodies : iterable of Body
+        Parents before children, the bodies of one tree together.
+
+    Attributes
+    ----------
+    bodies : tuple of Body
+    names : tuple of str
+    nq, nv : int
+        Length of q and of v; they differ for continuous, spherical, planar_se2 and free-flyer joints.
+    coordinate_names, coordinate_units : tuple of str (nq,)
+    velocity_names, velocity_units : tuple of str (nv,)
+    arrays : MechanismArrays
+        The same as contiguous arrays, for kernels.
+    tree_of_body : (n,) int array
+    tree_dofs : list of (start, stop)
+        Range in v of each tree; empty for a tree of fixed bodies.
+    has_constant_mass_matrix, has_velocity_terms : bool
+        See `iapb.mechanics.structure`.
+
+    Raises
+    ------
+    ArgumentError
+        Names, parents or order that do not form trees.
+    """
+
+    def __init__(self, bodies: Iterable[Body]) -> None:
+        self.bodies: tuple[Body, ...] = tuple(bodies)
+        parents = parent_indices(self.bodies)
+        self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
+        self.arrays: MechanismArrays = _collect(self.bodies, parents)
+        self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
+        self.nv: int = int(self.arrays.v_count.sum())
+        self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
+        self.tree_dofs: list[tuple[int, int]] = _tree_ranges(self.arrays, self.tree_of_body)
+        self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
+        self.has_velocity_terms: bool = structure.has_velocity_terms(self.arrays)
+
+    @classmethod
+    def from_urdf(cls, path: str | Path, floating_base: bool = False) -> Mechanism:
+        """Read a URDF file; see `iapb.mechanics.urdf.read_urdf`."""
+        from iapb.mechanics.urdf import read_urdf
+
+        return cls(read_urdf(path, floating_base))
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Name of each entry of q: body.suffix."""
+        return tuple(f"{b.name}.{suffix}" for b in self.bodies for suffix, _ in b.joint.layout.coordinates)
+
+    @property
+    def coordinate_units(self) -> tuple[str, ...]:
+        """Unit of each entry of q: m, rad, or 1 for cosines, sines and quaternions."""
+        return tuple(unit for b in self.bodies for _, unit in b.joint.layout.coordinates)
+
+    @property
+    def velocity_units(self) -> tuple[str, ...]:
+        """Unit of each entry of v: m/s or rad/s."""
+        return tuple(unit for b in self.bodies for unit in b.joint.layout.velocity_units)
+
+    def index(self, body: int | str) -> int:
+        """Return a body's index from its name or index."""
+        if isinstance(body, str) and body in self.names:
+            return self.names.index(body)
+        if isinstance(body, int | np.integer) and 0 <= body < len(self.bodies):
+            return int(body)
+        raise ArgumentError("body", body, f"a body name or an index below {len(self.bodies)}")
+
+    def workspace(self) -> Workspace:
+        """Return fresh scratch for the kernels."""
+        return make_workspace(len(self.bodies), self.nv)
+
+    def neutral(self) -> Floats:
+        """Return the configuration q (nq,) with every joint at rest."""
+        return np.array([x for b in self.bodies for x in b.joint.layout.neutral], dtype=np.float64)
+
+    def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
+        """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt where that makes sense."""
+        out = np.empty(self.nq)
+        kernels.integrate(self.arrays, self._configuration(q), self._velocity(v), float(dt), out)
+        return out
+
+    def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
+        """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest turns."""
+        out = np.empty(self.nv)
+        kernels.difference(self.arrays, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
+        return out
+
+    def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
+        workspace = self.at(q)
+        return workspace.rotation, workspace.position
+
+    def mass_matrix(self, q: ArrayLike) -> Floats:
+        """Return M(q) (d, d)."""
+        return self._filled((self.nv, self.nv), kernels.mass_matrix, self.at(q))
+
+    def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
+        return self._filled((self.nv,), kernels.bias, self.at(q), self._velocity(v))
+
+    def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
+        """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
+        return self._filled((self.nv,), kernels.gravity, self.at(q), _field(g))
+
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
+        """Return tau = M dv + B + G (d,)."""
+        rates, change = self._velocity(v), self._velocity(dv, "dv")
+        return self._filled((self.nv,), kernels.inverse_dynamics, self.at(q), rates, change, _field(g))
+
+    def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
+        """Return J (3, d): velocity, world axes, of the world point [m] taken as fixed to the body."""
+        place = finite_array("point", point, (3,), "m")
+        return self._filled((3, self.nv), kernels.point_jacobian, self.at(q), self.index(body), place)
+
+    def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
+        """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""
+        return self._filled((6, self.nv), kernels.frame_jacobian, self.at(q), self.index(body))
+
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
+        """Return the kinetic energy [J]."""
+        return float(kernels.kinetic_energy(self.arrays, self.at(q), self._velocity(v)))
+
+    def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
+        """Return -sum m g . c [J] for the field g (3,) [m/s^2]."""
+        return float(kernels.potential_energy(self.arrays, self.at(q), _field(g)))
+
+    def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """Return (6,): momentum [N s] and angular momentum about the common centre of mass [N m s]."""
+        return self._filled((6,), kernels.centroidal_momentum, self.at(q), self._velocity(v))
+
+    def at(self, q: ArrayLike) -> Workspace:
+        """Return a workspace holding the kinematics of the configuration q."""
+        workspace = self.workspace()
+        kernels.forward_kinematics(self.arrays, self._configuration(q), workspace)
+        return workspace
+
+    def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
+        out = np.zeros(shape)
+        kernel(self.arrays, *given, out)
+        return out
+
+    def _velocity(self, v: ArrayLike, argument: str = "v") -> Floats:
+        return finite_array(argument, v, (self.nv,))
+
+    def _configuration(self, q: ArrayLike, argument: str = "q") -> Floats:
+        values = finite_array(argument, q, (self.nq,))
+        for body, start in zip(self.bodies, self.arrays.q_start, strict=True):
+            entries = body.joint.layout.coordinates
+            unit = [start + i for i, (_, u) in enumerate(entries) if u == "1"]
+            if unit and abs(np.linalg.norm(values[unit]) - 1.0) > UNIT_TOLERANCE:
+                where = f"{argument} of body {body.name!r}"
+                raise ArgumentError(where, values[unit], "entries of total length one")
+        return values
+
+
+def _field(g: ArrayLike) -> Floats:
+    return finite_array("g", g, (3,), "m/s^2")
+
+
+def _collect(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
+    """Lay the bodies out as arrays."""
+    layouts = [body.joint.layout for body in bodies]
+    v_count = np.array([layout.nv for layout in layouts], dtype=np.int64)
+    v_start = np.cumsum(v_count) - v_count
+    q_count = np.array([layout.nq for layout in layouts], dtype=np.int64)
+    last_dof, dof_body, dof_parent = _chains(v_start, v_count, parents)
+    return MechanismArrays(
+        kind=np.array([layout.code for layout in layouts], dtype=np.int64),
+        parent=np.array(parents, dtype=np.int64),
+        q_start=np.cumsum(q_count) - q_count,
+        v_start=v_start,
+        v_count=v_count,
+        joint_axis=_stack([body.joint.unit_axis for body in bodies], (3,)),
+        placement_rotation=_stack([body.placement[0] for body in bodies], (3, 3)),
+        placement_position=_stack([body.placement[1] for body in bodies], (3,)),
+        mass=np.array([body.mass for body in bodies], dtype=np.float64),
+        center_of_mass=_stack([body.center_of_mass for body in bodies], (3,)),
+        inertia=_stack([body.inertia for body in bodies], (3, 3)),
+        last_dof=np.array(last_dof, dtype=np.int64),
+        dof_body=np.array(dof_body, dtype=np.int64),
+        dof_parent=np.array(dof_parent, dtype=np.int64),
+        dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], dtype=np.bool_),
+    )
+
+
+def _stack(rows: list[Floats], shape: tuple[int, ...]) -> Floats:
+    return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(len(rows), *shape))
+
+
+def _chains(v_start: Any, v_count: Any, parents: list[int]) -> tuple[list[int], list[int], list[int]]:
+    """For each body its last dof on the way from the world; for each dof its body and the dof before it."""
+    last_dof: list[int] = []
+    dof_body: list[int] = []
+    dof_parent: list[int] = []
+    for b, parent in enumerate(parents):
+        last = last_dof[parent] if parent >= 0 else -1
+        for k in range(int(v_start[b]), int(v_start[b] + v_count[b])):
+            dof_body.append(b)
+            dof_parent.append(last)
+            last = k
+        last_dof.append(last)
+    return last_dof, dof_body, dof_parent
+
+
+def _tree_ranges(m: MechanismArrays, tree_of_body: NDArray[np.int64]) -> list[tuple[int, int]]:
+    ranges = []
+    for tree in range(int(tree_of_body.max()) + 1 if len(tree_of_body) else 0):
+        members = np.flatnonzero(tree_of_body == tree)
+        ranges.append((int(m.v_start[members[0]]), int(m.v_start[members[-1]] + m.v_count[members[-1]])))
+    return ranges
