@@ -8,30 +8,49 @@ Source: Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solvers.answer import Answer
 
-_LOWER_BOUND = 0  # daqp's `sense` of an ordinary inequality
+Floats = NDArray[np.float64]
+
+_INEQUALITY = 0  # daqp's `sense` of an ordinary inequality
 _ACCURACY = 1e-13  # of unit rows and unit velocities: a few hundred roundings
 _INFINITE = 1e30  # daqp's own mark of an absent bound
 
 
 def solve(problem: ImpactProblem) -> Answer:
     """Return the impulse as the multipliers of the velocity form."""
+    try:
+        return Answer(multipliers(problem.factor, problem.offset), "daqp: optimal")
+    except SolverError as error:
+        if str(error).startswith("refused"):
+            raise
+        return Answer(None, str(error))
+
+
+def multipliers(rows: Floats, offset: Floats) -> Floats:
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,).
+
+    Raises
+    ------
+    SolverError
+        where daqp ends without a solution (exit flag below 1; -1 is an infeasible problem)
+    """
     import daqp
 
-    rows = np.ascontiguousarray(problem.factor)
     n, d = rows.shape
-    length = np.linalg.norm(rows, axis=1)
-    unit = np.where(length > 0.0, length, 1.0)  # unit rows: daqp's tolerances are absolute
-    scale = float(np.abs(problem.offset / unit).max(initial=0.0)) or 1.0
-    upper, lower = np.full(n, _INFINITE), -problem.offset / unit / scale
-    sense = np.full(n, _LOWER_BOUND, dtype=np.int32)
+    length = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    unit = np.where(length > 0.0, length, 1.0)  # unit rows, unit velocities: daqp's tolerances are absolute
+    scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
+    upper, lower = np.full(n, _INFINITE), -offset / unit / scale
+    sense = np.full(n, _INEQUALITY, dtype=np.int32)
     unit_rows = np.ascontiguousarray(rows / unit[:, None])
     _, _, flag, detail = daqp.solve(
         np.eye(d), np.zeros(d), unit_rows, upper, lower, sense, primal_tol=_ACCURACY, dual_tol=_ACCURACY
     )
     if flag < 1:
-        return Answer(None, f"daqp exit flag {flag}")
-    return Answer(-np.asarray(detail["lam"]) * scale / unit, f"daqp exit flag {flag}")
+        raise SolverError(f"daqp: exit flag {flag}" + (", infeasible" if flag == -1 else ""))
+    return -np.asarray(detail["lam"]) * scale / unit

@@ -1,0 +1,100 @@
+"""One rigid step: what it must satisfy, and what it does where the answer is known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError, SolverError
+from reference import time_stepping
+from reference.time_stepping import rigid_step, velocity_bounds
+
+DT = 1.0 / 512
+
+
+def step(mass, v, f, rows, gap, e):  # type: ignore[no-untyped-def]
+    rows, v = np.atleast_2d(np.asarray(rows, float)), np.asarray(v, float)
+    return rigid_step(
+        np.asarray(mass, float), v, np.asarray(f, float), DT, rows, np.asarray(gap, float), rows @ v, e
+    )
+
+
+def test_free_motion_is_semi_implicit_euler() -> None:
+    result = step(np.diag([2.0, 4.0]), [0.1, 0.0], [1.0, 2.0], [[1.0, 0.0]], [1.0], 0.0)
+    assert np.array_equal(result.velocity, [0.1 + DT / 2, DT / 2])
+    assert not result.impulse.any()
+
+
+def test_open_plastic_contact_closes_exactly_and_does_not_pass() -> None:
+    gap = 1e-4
+    result = step([[2.0]], [-1.0], [0.0], [[1.0]], [gap], 0.0)
+    assert gap + DT * result.velocity[0] == pytest.approx(0.0, abs=1e-18)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
+def test_closed_contact_obeys_newton(e: float) -> None:
+    result = step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], e)
+    assert result.velocity[0] == pytest.approx(e, abs=1e-15)
+    assert result.impulse[0] == pytest.approx(2.0 * (1.0 + e), rel=1e-15)
+
+
+def test_open_elastic_contact_is_left_alone() -> None:
+    assert step([[2.0]], [-1.0], [0.0], [[1.0]], [1e-9], 0.5).velocity[0] == -1.0
+
+
+def test_resting_contact_carries_the_load() -> None:
+    """A box on two equal corners under its weight: it stays, and the impulses sum to the weight times dt."""
+    result = step(
+        np.diag([2.0, 0.005]), [0.0, 0.0], [-20.0, 0.0], [[1.0, 0.01], [1.0, -0.01]], [0.0, 0.0], 0.0
+    )
+    assert np.abs(result.velocity).max() <= 1e-16
+    assert result.impulse.sum() == pytest.approx(20.0 * DT, rel=1e-13)
+    assert result.impulse.min() > 0.0
+
+
+@given(st.integers(0, 10_000))
+def test_every_step_satisfies_its_conditions(seed: int) -> None:
+    """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load never gains energy."""
+    rng = np.random.default_rng(seed)
+    d, c = int(rng.integers(1, 7)), int(rng.integers(1, 9))
+    root = rng.normal(size=(d, d))
+    mass, v = root @ root.T + 0.1 * np.eye(d), rng.normal(size=d)
+    rows = rng.normal(size=(c, d)) @ np.diag(rng.integers(0, 2, size=d))
+    gap = rng.choice([-1e-3, 0.0, 1e-4], size=c)
+    result = step(mass, v, np.zeros(d), rows, gap, 0.0)
+    bound = velocity_bounds(gap, rows @ v, 0.0, DT)
+    scale = np.abs(rows).max() * max(np.abs(v).max(), np.abs(result.velocity).max()) + 1.0
+    slack = rows @ result.velocity - bound
+    assert slack.min() >= -1e-9 * scale
+    assert result.impulse.min() >= 0.0
+    assert (
+        np.abs(mass @ (result.velocity - v) - rows.T @ result.impulse).max()
+        <= 1e-9 * scale * np.abs(mass).max()
+    )
+    assert result.residual <= time_stepping.STEP_TOLERANCE
+    if gap.max() <= 0.0:
+        assert result.velocity @ mass @ result.velocity <= (1.0 + 1e-12) * (v @ mass @ v)
+
+
+def test_facing_contacts_with_restitution_have_no_velocity_and_say_so() -> None:
+    with pytest.raises(SolverError, match="no accepted solution"):
+        step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 0.0], 0.5)
+
+
+def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = lambda rows, offset: np.full(len(offset), 0.123)  # noqa: E731
+    monkeypatch.setattr(time_stepping.daqp_qp, "multipliers", wrong)
+    assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # quadprog
+    monkeypatch.setattr(time_stepping.quadprog_qp, "multipliers", wrong)
+    with pytest.raises(SolverError, match="residual"):
+        step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
+
+
+def test_stabilization_removes_its_share_of_the_overlap() -> None:
+    overlap = np.array([-1e-3])
+    bound = velocity_bounds(overlap, np.array([0.0]), 0.0, DT, stabilization=0.25)
+    assert overlap[0] + DT * bound[0] == pytest.approx(0.75 * overlap[0])
+    with pytest.raises(ArgumentError, match="stabilization"):
+        velocity_bounds(overlap, overlap, 0.0, DT, stabilization=2.0)
