@@ -1,0 +1,110 @@
+"""Datasets as every file of this project has them: checksummed, compressed, with units and dimension scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import RunFileError
+
+# Chunks of about this size: small enough to look at a part, large enough to compress.
+_CHUNK_BYTES = 1 << 17
+_COMPRESSION_LEVEL = 4
+
+
+def write_text(group: Any, name: str, text: str) -> None:
+    """Write one text of any length as a scalar UTF-8 dataset."""
+    import h5py
+
+    group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
+
+
+def write_values(group: Any, name: str, values: Any) -> Any:
+    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle, gzip and fletcher32."""
+    import h5py
+
+    array = np.asarray(values)
+    if array.dtype.kind in "UO" or (array.size == 0 and isinstance(values, tuple)):
+        texts = [str(value) for value in values]
+        return group.create_dataset(name, data=np.array(texts, object), dtype=h5py.string_dtype("utf-8"))
+    if array.dtype == np.bool_:
+        array = array.astype(np.uint8)  # netCDF has no truth values
+    return group.create_dataset(
+        name,
+        data=array,
+        chunks=_chunk_shape(array),
+        maxshape=(None,) * array.ndim if array.size == 0 else array.shape,
+        compression="gzip",
+        compression_opts=_COMPRESSION_LEVEL,
+        shuffle=True,
+        fletcher32=True,
+    )
+
+
+def _chunk_shape(array: np.ndarray) -> tuple[int, ...]:
+    width = max(int(np.prod(array.shape[1:])) * array.itemsize, 1)
+    rows = min(max(_CHUNK_BYTES // width, 1), max(array.shape[0], 1))
+    return (rows, *(max(length, 1) for length in array.shape[1:]))
+
+
+def write_scale(group: Any, dimension: str, values: Any, unit: str) -> None:
+    """Write the values along a dimension, and make them its scale."""
+    scale = write_values(group, dimension, values)
+    scale.attrs["units"] = unit
+    scale.make_scale(dimension)
+
+
+def write_quantity(
+    group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str
+) -> Any:
+    """Write one quantity; the scales of its dimensions must be in `group` already."""
+    dataset = write_values(group, name, values)
+    dataset.attrs["units"] = unit
+    dataset.attrs["long_name"] = meaning
+    for axis, dimension in enumerate(dimensions):
+        dataset.dims[axis].attach_scale(group[dimension])
+    return dataset
+
+
+def mark_plottable(group: Any, signal: str, axes: Sequence[str]) -> None:
+    """Make `group` an NXdata, so that a viewer knows what to draw; ``"."`` is an axis without values."""
+    import h5py
+
+    group.attrs["NX_class"] = "NXdata"
+    group.attrs["signal"] = signal
+    group.attrs.create("axes", list(axes), dtype=h5py.string_dtype("utf-8"))
+
+
+def read_values(group: Any, name: str, path: str) -> Any:
+    """Return a dataset of `group` as an array, or as a tuple of texts.
+
+    Raises
+    ------
+    RunFileError
+        If there is no such dataset.
+    """
+    import h5py
+
+    if name not in group:
+        raise RunFileError(f"{path}: {group.name}/{name} is missing")
+    dataset = group[name]
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        return dataset[()]
+    texts = dataset.asstr()[()]
+    return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
+
+
+def texts_of(file: Any) -> dict[str, Any]:
+    """Return every text of a file by path, for the hash that covers them."""
+    import h5py
+
+    texts: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and h5py.check_string_dtype(item.dtype) is not None:
+            texts[name] = read_values(item.parent, item.name.rpartition("/")[2], file.filename)
+
+    file.visititems(visit)
+    return texts

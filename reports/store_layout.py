@@ -1,0 +1,163 @@
+"""What a run file holds, and where: the table that the writer and the reader share.
+
+    /scene, /law, /coupling   texts: name, YAML source, every setting as JSON
+    /trajectory               states at n + 1 instants
+    /steps                    forces, impulse and contact state of the n steps between them
+    /contacts                 ragged: those of step k are the rows offsets[k]:offsets[k + 1]
+    /impacts                  one row per colliding group and step
+    /energy                   the ledger, on instants and on steps
+    /effects                  what was on, and why
+    /timings, /provenance     outside the content hash: they differ from one machine to the next
+
+Each group carries its own dimension scales, so that it opens as one xarray dataset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.run import STATE_NAMES, Run
+
+FORMAT = "iapb run"
+FORMAT_VERSION = 1
+
+# Units of generalized quantities follow the unit of their coordinate.
+VELOCITY = {"m": "m/s", "rad": "rad/s"}
+FORCE = {"m": "N", "rad": "N m"}
+IMPULSE = {"m": "N s", "rad": "N m s"}
+POSITION = {"m": "m", "rad": "rad"}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One dataset: its name (also the attribute of the record), dimensions, unit and meaning.
+
+    A `unit` that is a mapping belongs to a generalized quantity: the unit for each unit of coordinate.
+    """
+
+    name: str
+    dimensions: tuple[str, ...]
+    unit: str | dict[str, str]
+    meaning: str
+
+
+TRAJECTORY = (
+    Quantity("q", ("time", "coordinate"), POSITION, "generalized configuration"),
+    Quantity("v", ("time", "velocity"), VELOCITY, "generalized velocity"),
+    Quantity("device_q", ("time", "device_coordinate"), POSITION, "configuration of the device"),
+    Quantity("device_v", ("time", "device_coordinate"), VELOCITY, "velocity of the device"),
+)
+
+STEPS = (
+    Quantity("hand_force", ("step", "velocity"), FORCE, "generalized force of the hand on the tool"),
+    Quantity("coupling_force", ("step", "velocity"), FORCE, "force of the coupling on the tool"),
+    Quantity("penalty_force", ("step", "velocity"), FORCE, "normal contact forces, or constraint forces"),
+    Quantity("friction_force", ("step", "velocity"), FORCE, "friction forces"),
+    Quantity("impulse", ("step", "velocity"), IMPULSE, "generalized collision impulse of the step"),
+    Quantity("environment_force", ("step", "velocity"), FORCE, "contact forces + impulse / dt (26)"),
+    Quantity("device_force", ("step", "device_coordinate"), FORCE, "what the device's actuators apply"),
+    Quantity("state", ("step",), "1", "contact state of the tool's group"),
+)
+
+CONTACTS = (
+    Quantity("offsets", ("step_edge",), "1", "first row of each step's contacts; the last entry closes"),
+    Quantity("body_a", ("contact",), "1", "moving body that the normal points into"),
+    Quantity("body_b", ("contact",), "1", "other body, -1 = the static world"),
+    Quantity("point", ("contact", "axis"), "m", "contact point, world axes"),
+    Quantity("normal", ("contact", "axis"), "1", "unit normal, from b into a"),
+    Quantity("gap", ("contact",), "m", "distance, negative = overlap"),
+    Quantity("normal_velocity", ("contact",), "m/s", "before the step's impulse, positive separates"),
+    Quantity("normal_force", ("contact",), "N", "force on a along the normal"),
+    Quantity("friction_force", ("contact", "axis"), "N", "friction force on a"),
+    Quantity("impulse", ("contact",), "N s", "collision impulse on a along the normal"),
+    Quantity("is_new", ("contact",), "1", "1 where the contact was not there in the step before"),
+)
+
+IMPACTS = (
+    Quantity("step", ("impact",), "1", "step in which it happened"),
+    Quantity("group", ("impact",), "1", "first tree of the colliding group"),
+    Quantity("v_minus", ("impact", "velocity"), VELOCITY, "generalized velocity before"),
+    Quantity("v_plus", ("impact", "velocity"), VELOCITY, "generalized velocity after"),
+    Quantity("impulse", ("impact", "velocity"), IMPULSE, "generalized impulse"),
+    Quantity("rows", ("impact",), "1", "rows given to the resolver"),
+    Quantity("rank", ("impact",), "1", "rows it found independent and used"),
+    Quantity("energy_lost", ("impact",), "J", "kinetic energy before minus after"),
+    Quantity("scale", ("impact",), "1", "factor by which the device limit scaled the impulse"),
+    Quantity("clamp", ("impact",), "1", "factor of the final energy clamp"),
+)
+
+TIMINGS = (
+    Quantity("chunk_steps", ("chunk",), "1", "steps per timed chunk"),
+    Quantity("chunk_seconds", ("chunk",), "s", "wall time of each chunk"),
+)
+
+# group -> its quantities, the record that holds them, and the quantity that a plotting tool shows first
+GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any], str]] = {
+    "trajectory": (TRAJECTORY, lambda run: run, "v"),
+    "steps": (STEPS, lambda run: run, "environment_force"),
+    "contacts": (CONTACTS, lambda run: run.contacts, "gap"),
+    "impacts": (IMPACTS, lambda run: run.impacts, "energy_lost"),
+    "timings": (TIMINGS, lambda run: run, "chunk_seconds"),
+}
+RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy ledger: the content hash
+
+# (group, name, attribute of Run): texts; those of `JSON_TEXTS` are stored as JSON
+TEXTS = (
+    ("scene", "name", "scene_name"),
+    ("scene", "source", "scene_source"),
+    ("scene", "resolved", "scene_resolved"),
+    ("law", "name", "law"),
+    ("law", "settings", "law_settings"),
+    ("law", "world", "world"),
+    ("law", "kernel", "kernel"),
+    ("coupling", "name", "coupling"),
+    ("coupling", "settings", "coupling_settings"),
+)
+JSON_TEXTS = frozenset({"scene_resolved", "law_settings", "coupling_settings"})
+
+STATE_ATTRIBUTES = {
+    "flag_values": np.arange(len(STATE_NAMES), dtype=np.int8),
+    "flag_meanings": " ".join(STATE_NAMES),
+}
+
+
+def energy_dimension(run: Run, name: str) -> str:
+    """Return the dimension of a ledger entry: ``time`` when it has n + 1 values, ``step`` when it has n."""
+    length = len(run.energy[name])
+    return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
+
+
+def column_units(unit: dict[str, str], coordinates: tuple[str, ...]) -> str:
+    """Return the unit of a generalized quantity: one, or one per column where the columns differ."""
+    units = [unit.get(coordinate, "1") for coordinate in coordinates]
+    return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
+
+
+def unit_of(quantity: Quantity, run: Run) -> str:
+    """Return the unit of `quantity` in `run`."""
+    if isinstance(quantity.unit, str):
+        return quantity.unit
+    start, stop = run.tool_dofs
+    units = run.coordinate_units
+    return column_units(quantity.unit, units[start:stop] if "device_coordinate" in quantity.dimensions else units)
+
+
+def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] | tuple[str, ...], str]:
+    """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
+    start, stop = run.tool_dofs
+    labels = {
+        "axis": ("x", "y", "z"),
+        "coordinate": run.coordinate_names,
+        "velocity": run.coordinate_names,
+        "device_coordinate": run.coordinate_names[start:stop],
+    }.get(dimension, ())
+    if labels and len(labels) == length:
+        return labels, "1"
+    if dimension == "time":
+        return np.asarray(run.time, np.float64), "s"
+    return np.arange(length, dtype=np.int64), "1"

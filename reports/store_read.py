@@ -1,0 +1,146 @@
+"""Read a Run back from HDF5, and judge whether the file can be trusted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import RunFileError
+from iapb.run import ContactTable, EffectRow, ImpactTable, Run
+from reports.store_datasets import read_values, texts_of
+from reports.store_keys import content_hash, text_hash
+from reports.store_layout import FORMAT, FORMAT_VERSION, GROUPS, JSON_TEXTS, TEXTS
+
+
+@contextmanager
+def opened(path: Path | str, expected_format: str = FORMAT) -> Iterator[Any]:
+    """Open a file of this project for reading.
+
+    Raises
+    ------
+    RunFileError
+        If the file is absent, is no HDF5 file, has another format, or fails in any way while it is read.
+    """
+    import h5py
+
+    path = Path(path)
+    if not path.is_file():
+        raise RunFileError(f"{path}: no such file")
+    try:
+        with h5py.File(path, "r") as file:
+            _check_format(file, path, expected_format)
+            yield file
+    except RunFileError:
+        raise
+    except Exception as error:  # a damaged file can fail anywhere, with whatever its broken bytes lead to
+        raise RunFileError(f"{path}: cannot be read, the file is damaged or not HDF5 ({error})") from error
+
+
+def _check_format(file: Any, path: Path, expected: str) -> None:
+    found = file.attrs.get("format")
+    if found != expected:
+        raise RunFileError(f"{path}: format is {found!r}: expected {expected!r}")
+    version = int(file.attrs.get("format_version", 0))
+    if version > FORMAT_VERSION:
+        raise RunFileError(f"{path}: format version is {version}: expected at most {FORMAT_VERSION}")
+
+
+def read_run(path: Path | str) -> Run:
+    """Return the run in a file, partial or complete.
+
+    Both hashes are computed again and compared, so a file whose bytes have changed is never taken for a run.
+
+    Raises
+    ------
+    RunFileError
+        If the file is absent, damaged or not a run.
+    """
+    with opened(path) as file:
+        check_texts(file, path)
+        run = Run(**_texts(file, path), **_head(file), **_arrays(file, path))
+        if content_hash(run) != file.attrs["content_hash"]:
+            raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
+        return run
+
+
+def check_texts(file: Any, path: Path | str) -> None:
+    """Raise RunFileError if a text of the file is not what was written."""
+    if text_hash(texts_of(file)) != file.attrs["text_hash"]:
+        raise RunFileError(f"{path}: the texts differ from their hash, the file is damaged")
+
+
+def read_provenance(path: Path | str) -> dict[str, str]:
+    """Return where a run or a table comes from, as texts by name."""
+    with opened(path, expected_format=_format_of(path)) as file:
+        return {name: read_values(file["provenance"], name, str(path)) for name in file["provenance"]}
+
+
+def read_head(path: Path | str) -> dict[str, Any]:
+    """Return a run file's attributes: title, status, run_key, content_hash, dt. Reads no array."""
+    with opened(path) as file:
+        return dict(file.attrs)
+
+
+def _format_of(path: Path | str) -> str:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return str(file.attrs.get("format", FORMAT))
+    except OSError:
+        return FORMAT
+
+
+def _texts(file: Any, path: Path | str) -> dict[str, Any]:
+    texts = {}
+    for group, name, attribute in TEXTS:
+        text = read_values(file[group], name, str(path))
+        texts[attribute] = json.loads(text) if attribute in JSON_TEXTS else text
+    return texts
+
+
+def _head(file: Any) -> dict[str, Any]:
+    start, stop = file.attrs["tool_dofs"]
+    return {
+        "dt": float(file.attrs["dt"]),
+        "complete": file.attrs["status"] == "complete",
+        "tool_dofs": (int(start), int(stop)),
+    }
+
+
+def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
+    place = str(path)
+    group = {
+        name: {quantity.name: read_values(file[name], quantity.name, place) for quantity in quantities}
+        for name, (quantities, _, _) in GROUPS.items()
+    }
+    contacts = group["contacts"]
+    contacts["is_new"] = contacts["is_new"].astype(np.bool_)
+    return {
+        "coordinate_names": read_values(file["mechanism"], "coordinate", place),
+        "coordinate_units": read_values(file["mechanism"], "coordinate_unit", place),
+        "body_names": read_values(file["mechanism"], "body", place),
+        "time": read_values(file["trajectory"], "time", place),
+        "contacts": ContactTable(**contacts),
+        "impacts": ImpactTable(**group["impacts"]),
+        "energy": _energy(file["energy"], place),
+        "effects": _effects(file["effects"], place),
+        **group["trajectory"],
+        **group["steps"],
+        **group["timings"],
+    }
+
+
+def _energy(group: Any, path: str) -> dict[str, Any]:
+    return {name: read_values(group, name, path) for name in group if not group[name].is_scale}
+
+
+def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:
+    names, active, reasons = (read_values(group, name, path) for name in ("effect", "active", "reason"))
+    rows = zip(names, active, reasons, strict=True)
+    return tuple(EffectRow(name, bool(on), reason) for name, on, reason in rows)

@@ -1,0 +1,192 @@
+"""Tables behind figures and claims, as HDF5: named columns with units and descriptions.
+
+    write_table("out/tables/fig03.h5", Table("fig03", (Column("restitution", e, "1", "…"), Column("energy", …))))
+
+opens as ``xarray.open_dataset(path, engine="h5netcdf", group="fig03")``; the first column is the coordinate of the
+rows unless it repeats values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import ArgumentError, RunFileError
+from reports.provenance import collect_provenance
+from reports.store_datasets import mark_plottable, read_values, texts_of, write_quantity, write_scale, write_text
+from reports.store_files import written_aside
+from reports.store_keys import add_array, text_hash
+from reports.store_layout import FORMAT_VERSION
+from reports.store_read import check_texts, opened
+
+TABLE_FORMAT = "iapb table"
+ROW = "row"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: numbers or truth values (an array), or texts (a tuple), all of one length.
+
+    `unit` is in SI, ``"1"`` for a pure number or a text.
+    """
+
+    name: str
+    values: Any  # (rows,)
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Named columns of one length.
+
+    `runs` names the run files that the numbers come from, `command` the one that makes the table again.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    title: str = ""
+    runs: tuple[str, ...] = ()
+    command: str = ""
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the values of a column."""
+        for column in self.columns:
+            if column.name == name:
+                return column.values
+        raise ArgumentError("column", name, f"one of: {', '.join(column.name for column in self.columns)}")
+
+
+def write_table(path: Path | str, table: Table, provenance: Mapping[str, str] | None = None) -> Path:
+    """Write one table to a file of its own, in the place of an older one. See `write_tables`."""
+    return write_tables(path, (table,), provenance)
+
+
+def write_tables(
+    path: Path | str, tables: Sequence[Table], provenance: Mapping[str, str] | None = None
+) -> Path:
+    """Write tables to one file, a group each, in one step.
+
+    Raises
+    ------
+    ArgumentError
+        If the columns of a table differ in length, or two things have one name.
+    """
+    import h5py
+
+    path = Path(path)
+    _check_names("tables", [table.name for table in tables])
+    for table in tables:
+        _check_columns(table)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with written_aside(path, replace=True) as aside, h5py.File(aside, "w") as file:
+        file.attrs.update(
+            {"NX_class": "NXroot", "default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
+        )
+        for table in tables:
+            _write(file.create_group(table.name, track_order=True), table)
+        for name, text in (collect_provenance() if provenance is None else provenance).items():
+            write_text(file.require_group("provenance"), name, text)
+        file.attrs["content_hash"] = tables_hash(tables)
+        file.attrs["text_hash"] = text_hash(texts_of(file))
+    return path
+
+
+def read_table(path: Path | str, name: str | None = None) -> Table:
+    """Return the table `name` of a file, or its first one.
+
+    Raises
+    ------
+    RunFileError
+        If the file is absent, damaged, no file of tables, or has no such table.
+    """
+    tables = read_tables(path)
+    if name is None:
+        return next(iter(tables.values()))
+    if name not in tables:
+        raise RunFileError(f"{path}: no table {name!r}: expected one of {', '.join(tables)}")
+    return tables[name]
+
+
+def read_tables(path: Path | str) -> dict[str, Table]:
+    """Return all tables of a file by name, the one to show first at the start; raises as `read_table`."""
+    with opened(path, TABLE_FORMAT) as file:
+        check_texts(file, path)
+        names = sorted(set(file) - {"provenance"}, key=lambda name: name != file.attrs["default"])
+        tables = {name: _read(file[name], str(path)) for name in names}
+        if tables_hash(list(tables.values())) != file.attrs["content_hash"]:
+            raise RunFileError(f"{path}: the numbers differ from their content hash, the file is damaged")
+        return tables
+
+
+def tables_hash(tables: Sequence[Table]) -> str:
+    """Return sha256 of all columns of all tables, in the order of the tables' names."""
+    import hashlib
+
+    digest = hashlib.sha256()
+    for table in sorted(tables, key=lambda table: table.name):
+        for column in table.columns:
+            add_array(digest, f"{table.name}/{column.name}", _hashable(column.values))
+    return digest.hexdigest()
+
+
+def _is_text(values: Any) -> bool:
+    return len(values) > 0 and isinstance(values[0], str)
+
+
+def _hashable(values: Any) -> Any:
+    """What a column is after a trip to a file: texts as bytes, truth values as small integers."""
+    if _is_text(values):
+        return np.frombuffer("\0".join(values).encode(), np.uint8)
+    array = np.asarray(values)
+    return array.astype(np.uint8) if array.dtype == np.bool_ else array
+
+
+def _check_names(argument: str, names: Sequence[str]) -> None:
+    if not names or len(set(names)) < len(names) or any("/" in name or not name for name in names):
+        raise ArgumentError(argument, list(names), "one or more different names without '/'")
+
+
+def _check_columns(table: Table) -> None:
+    _check_names("columns", [column.name for column in table.columns])
+    lengths = {len(column.values) for column in table.columns}
+    if len(lengths) > 1 or ROW in (column.name for column in table.columns):
+        shape = {column.name: len(column.values) for column in table.columns}
+        raise ArgumentError(f"columns of {table.name}", shape, f"columns of one length, none named {ROW!r}")
+
+
+def _write(group: Any, table: Table) -> None:
+    first = table.columns[0]
+    distinct = not _is_text(first.values) and len(np.unique(first.values)) == len(first.values) > 0
+    dimension = first.name if distinct else ROW
+    if distinct:
+        write_scale(group, dimension, first.values, first.unit)
+        group[dimension].attrs["long_name"] = first.description
+    else:
+        write_scale(group, dimension, np.arange(len(first.values), dtype=np.int64), "1")
+    for column in table.columns[1:] if distinct else table.columns:
+        values = tuple(column.values) if _is_text(column.values) else column.values
+        write_quantity(group, column.name, values, (dimension,), column.unit, column.description)
+    group.attrs["title"] = table.title
+    group.attrs["command"] = table.command
+    group.attrs["runs"] = "\n".join(table.runs)
+    mark_plottable(group, table.columns[min(1, len(table.columns) - 1)].name, [dimension])
+
+
+def _read(group: Any, path: str) -> Table:
+    columns = tuple(
+        Column(
+            name,
+            read_values(group, name, path),
+            str(group[name].attrs["units"]),
+            str(group[name].attrs["long_name"]),
+        )
+        for name in group
+        if name != ROW
+    )
+    runs = tuple(str(group.attrs["runs"]).split("\n")) if group.attrs["runs"] else ()
+    return Table(group.name.strip("/"), columns, str(group.attrs["title"]), runs, str(group.attrs["command"]))
