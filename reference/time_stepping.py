@@ -15,13 +15,17 @@ Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trin
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.laws import StepResult
 from iapb.errors import ArgumentError, SolverError
+from iapb.run import COLLIDING, FREE, RESTING
 from reference.complementarity.solvers import daqp_qp, quadprog_qp
+from reference.contact_rows import ContactRows, find_rows, write_contacts, write_impact
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +44,54 @@ class RigidStep(NamedTuple):
     velocity: Floats
     impulse: Floats
     residual: float
+
+
+@dataclass(frozen=True)
+class RigidConstraints:
+    """The law of the rigid worlds: frictionless contacts that no step ends by violating.
+
+    Parameters
+    ----------
+    margin : contacts with gap <= margin [m] are given to the step; infinity takes every candidate pair, a
+        finite margin must exceed the largest speed times the step
+    stabilization : share of an overlap removed in each step, 0 for none
+    """
+
+    margin: float = np.inf
+    stabilization: float = 0.0
+    name = "rigid constraints"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Margin and stabilization; the restitution is the scene's."""
+        return {"margin": self.margin, "stabilization": self.stabilization}
+
+    def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
+        """One step (see `iapb.contact.laws.ContactLaw`).
+
+        Impulses of contacts that approached faster than the scene's approach velocity are reported as collision
+        impulses, the rest as forces p/dt: only their sum is determined by the step.
+        """
+        mechanism, q, v = system.mechanism, state.q.copy(), state.v.copy()
+        mass = mechanism.mass_matrix(q)
+        found = find_rows(system, q, v, self.margin)
+        force = applied_force - mechanism.bias(q, v) - mechanism.gravity(q, system.gravity)
+        e = system.scene.contact.restitution
+        step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization)
+        blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.impulse > 0.0)
+        impulse = found.jacobian[blows].T @ step.impulse[blows]
+        pressing = found.jacobian[~blows].T @ step.impulse[~blows] / dt
+        write_contacts(state, found, step.impulse, ~blows, dt)
+        write_impact(state, system, v, np.linalg.solve(mass, impulse), impulse, found.jacobian[blows])
+        q_plus = mechanism.integrate(q, step.velocity, dt)
+        contact_state = _contact_state(found, step.impulse, blows)
+        return StepResult(q_plus, step.velocity, pressing, np.zeros_like(v), impulse, contact_state)
+
+
+def _contact_state(found: ContactRows, impulse: Floats, blows: NDArray[np.bool_]) -> int:
+    if blows.any():
+        return COLLIDING
+    return RESTING if ((found.gap <= 0.0) | (impulse > 0.0)).any() else FREE
 
 
 def rigid_step(

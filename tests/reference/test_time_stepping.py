@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iapb.contact.geometry import (
+    HalfPlane,
+    box,
+    candidate_pairs,
+    contact_capacity,
+    make_contact_buffer,
+    make_shapes,
+)
 from iapb.errors import ArgumentError, SolverError
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.run import COLLIDING, FREE, RESTING
 from reference import time_stepping
-from reference.time_stepping import rigid_step, velocity_bounds
+from reference.time_stepping import RigidConstraints, rigid_step, velocity_bounds
 
 DT = 1.0 / 512
 
@@ -98,3 +110,68 @@ def test_stabilization_removes_its_share_of_the_overlap() -> None:
     assert overlap[0] + DT * bound[0] == pytest.approx(0.75 * overlap[0])
     with pytest.raises(ArgumentError, match="stabilization"):
         velocity_bounds(overlap, overlap, 0.0, DT, stabilization=2.0)
+
+
+def peg_world(position, velocity, restitution=0.0):  # type: ignore[no-untyped-def]
+    """The paper's peg over a floor and beside a wall, with the least of a system that the law asks for."""
+    mechanism = Mechanism([Body("peg", None, Joint("planar"), mass=2.0, inertia=np.diag([1.0, 1.0, 0.005]))])
+    walls = [HalfPlane((0.0, 0.0), (0.0, 1.0)), HalfPlane((0.1, 0.0), (-1.0, 0.0))]
+    shapes = make_shapes([box((0.021, 0.0105), body=0), *walls])
+    pairs = candidate_pairs(shapes)
+    capacity = contact_capacity(shapes, pairs)
+    contact = SimpleNamespace(restitution=restitution, approach_velocity=1e-6)
+    system = SimpleNamespace(
+        mechanism=mechanism, shapes=shapes, pairs=pairs, capacity=capacity, tool_tree=0,
+        gravity=np.zeros(3), scene=SimpleNamespace(contact=contact),
+    )  # fmt: skip
+    log = SimpleNamespace(
+        count=np.zeros(1, int), group=np.zeros(1, int), rows=np.zeros(1, int), rank=np.zeros(1, int),
+        scale=np.zeros(1), clamp=np.zeros(1), energy_lost=np.zeros(1),
+        v_minus=np.zeros((1, 3)), v_plus=np.zeros((1, 3)), impulse=np.zeros((1, 3)),
+    )  # fmt: skip
+    state = SimpleNamespace(
+        q=np.array(position, float), v=np.array(velocity, float), contacts=make_contact_buffer(capacity),
+        count=np.zeros(2, int), contact_impulse=np.zeros(capacity), impacts=log,
+    )  # fmt: skip
+    return system, state
+
+
+def test_the_pushed_peg_comes_to_rest_in_the_corner_and_never_overlaps() -> None:
+    system, state = peg_world([0.06, 0.03, 0.1], [0.0, 0.0, 0.0])
+    force = np.array([3.2, -4.0, 0.0])
+    states, deepest = set(), 0.0
+    for _ in range(1500):
+        result = RigidConstraints().advance(system, state, force, DT)
+        state.q[:], state.v[:] = result.q, result.v
+        states.add(result.state)
+        deepest = min(deepest, state.contacts.gap[: state.count[0]].min(initial=0.0))
+    assert states == {FREE, COLLIDING, RESTING}
+    assert state.q == pytest.approx([0.1 - 0.0105, 0.00525, 0.0], abs=1e-5)
+    assert np.abs(state.v).max() <= 1e-9
+    assert np.abs(result.penalty_force + force).max() <= 1e-6  # the walls balance the hand
+    assert deepest >= -1e-4  # second order in the step: corners turn while they touch
+
+
+def test_the_parts_of_a_step_add_up_to_the_change_of_momentum() -> None:
+    system, state = peg_world([0.05, 0.006, 0.05], [0.1, -0.5, 0.3])
+    mass, force = np.diag([2.0, 2.0, 0.005]), np.array([0.3, -1.0, 0.01])
+    for _ in range(40):
+        before = state.v.copy()
+        result = RigidConstraints().advance(system, state, force, DT)
+        total = DT * (force + result.penalty_force) + result.impulse
+        assert np.abs(mass @ (result.v - before) - total).max() <= 1e-12
+        if state.impacts.count[0]:
+            assert state.impacts.energy_lost[0] >= 0.0 and result.state == COLLIDING
+        state.q[:], state.v[:] = result.q, result.v
+
+
+def test_elastic_peg_keeps_its_energy_over_many_bounces() -> None:
+    system, state = peg_world([0.05, 0.02, 0.2], [0.4, -0.5, 1.0], restitution=1.0)
+    mass, bounces = np.diag([2.0, 2.0, 0.005]), 0
+    energy = state.v @ mass @ state.v
+    for _ in range(200):
+        result = RigidConstraints(margin=0.0).advance(system, state, np.zeros(3), DT)
+        state.q[:], state.v[:] = result.q, result.v
+        bounces += result.state == COLLIDING
+    assert bounces >= 2
+    assert state.v @ mass @ state.v == pytest.approx(energy, rel=1e-13)

@@ -1,0 +1,88 @@
+"""Contacts of a system as rows, gaps and velocities, and back into the record of a step.
+
+Rows are built from `Mechanism.point_jacobian`, one contact at a time: nᵀ(J_a − J_b), (11)-(12).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.detection import detect_contacts
+from iapb.contact.geometry import WORLD, ContactBuffer, make_contact_buffer
+
+Floats = NDArray[np.float64]
+
+# nᵀJ smaller than this share of |J| is rounding of the kinematics, not a lever arm of the contact.
+ROW_NOISE = 1e-13
+_GEOMETRY = ("shape_a", "shape_b", "body_a", "body_b", "feature", "point", "normal", "gap")
+
+
+@dataclass(frozen=True)
+class ContactRows:
+    """c contacts of one configuration.
+
+    geometry : ContactBuffer, its first c rows in use
+    jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma : (c,) J v [m/s]
+    """
+
+    geometry: ContactBuffer
+    jacobian: Floats
+    gap: Floats
+    gamma: Floats
+
+
+def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
+    """Return the contacts of `system` at q (nq,) with gap <= margin [m]."""
+    geometry = make_contact_buffer(system.capacity)
+    placements = system.mechanism.placements(q)
+    count = (
+        detect_contacts(system.shapes, system.pairs, placements, margin, geometry) if len(system.pairs) else 0
+    )
+    rows = np.array([_row(system.mechanism, q, geometry, i) for i in range(count)]).reshape(count, len(v))
+    return ContactRows(geometry, rows, geometry.gap[:count].copy(), rows @ v)
+
+
+def _row(mechanism: Any, q: Floats, geometry: ContactBuffer, i: int) -> Floats:
+    """nᵀ(J_a − J_b) of contact i, (d,), exactly zero where it is only rounding."""
+    point, normal = geometry.point[i], geometry.normal[i]
+    jacobian = mechanism.point_jacobian(q, int(geometry.body_a[i]), point)
+    if geometry.body_b[i] != WORLD:
+        jacobian = jacobian - mechanism.point_jacobian(q, int(geometry.body_b[i]), point)
+    row = normal @ jacobian
+    return np.where(np.linalg.norm(row) > ROW_NOISE * np.linalg.norm(jacobian), row, 0.0)
+
+
+def write_contacts(state: Any, found: ContactRows, impulse: Floats, forced: Floats, dt: float) -> None:
+    """Record in `state` the contacts that touch or carry an impulse; `forced` marks p as a force, not a blow."""
+    kept = np.flatnonzero((found.gap <= 0.0) | (impulse > 0.0))
+    was = _identities(state.contacts, range(int(state.count[0])))
+    identity = _identities(found.geometry, kept)
+    for name in _GEOMETRY:
+        getattr(state.contacts, name)[: len(kept)] = getattr(found.geometry, name)[kept]
+    state.contacts.normal_velocity[: len(kept)] = found.gamma[kept]
+    state.contacts.normal_force[: len(kept)] = np.where(forced, impulse, 0.0)[kept] / dt
+    state.contacts.friction_force[: len(kept)] = 0.0
+    state.contacts.is_new[: len(kept)] = [name not in was for name in identity]
+    state.contact_impulse[: len(kept)] = np.where(forced, 0.0, impulse)[kept]
+    state.count[1], state.count[0] = state.count[0], len(kept)
+
+
+def write_impact(state: Any, system: Any, v: Floats, change: Floats, impulse: Floats, rows: Floats) -> None:
+    """Log the blows of a step as one impact: velocity before, its change, generalized impulse and rows (c, d)."""
+    log = state.impacts
+    log.count[0] = 0
+    if not len(rows):
+        return
+    log.group[0], log.rows[0], log.rank[0] = max(system.tool_tree, 0), len(rows), np.linalg.matrix_rank(rows)
+    log.scale[0], log.clamp[0] = 1.0, 1.0
+    log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
+    log.energy_lost[0] = -float((v + 0.5 * change) @ impulse)
+    log.count[0] = 1
+
+
+def _identities(contacts: ContactBuffer, rows: Any) -> list[tuple[int, int, int]]:
+    return [(int(contacts.shape_a[i]), int(contacts.shape_b[i]), int(contacts.feature[i])) for i in rows]
