@@ -1,0 +1,186 @@
+"""The contact set of a step (paper section III): clusters, what is new, groups, states, which rows collide."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from iapb.run import COLLIDING, FREE, RESTING
+
+# Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least this: 31.8
+# degrees. The facets of a 12-sided socket (30 degrees apart) then count as one round surface; a floor and a
+# wall, or two sides of a triangle, do not.
+ALIGNED_COSINE = 0.85
+
+_UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
+
+
+@njit(cache=True)
+def squared_distance(first, i, second, j):
+    """Squared distance of the points of two contacts [m²]."""
+    total = 0.0
+    for axis in range(3):
+        difference = first.point[i, axis] - second.point[j, axis]
+        total += difference * difference
+    return total
+
+
+@njit(cache=True)
+def same_surface(first, i, second, j, cosine):
+    """Is it the same pair of bodies, with aligned normals? (The pair may be listed the other way round.)"""
+    aligned = 0.0
+    for axis in range(3):
+        aligned += first.normal[i, axis] * second.normal[j, axis]
+    a, b = first.body_a[i], first.body_b[i]
+    if a == second.body_a[j] and b == second.body_b[j]:
+        return aligned >= cosine
+    return a == second.body_b[j] and b == second.body_a[j] and -aligned >= cosine
+
+
+@njit(cache=True)
+def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
+    """Collapse contacts of one surface closer than `distance` [m] into the deepest; return how many stay.
+
+    Deepest first: a contact stays unless one that stays lies deeper and closer than `distance`. So those that
+    stay are at least `distance` apart, in their former order, and each one dropped has its deeper neighbour.
+    """
+    contacts.mark[:count] = _UNDECIDED
+    kept = 0
+    while True:
+        deepest = -1
+        for i in range(count):
+            if contacts.mark[i] == _UNDECIDED and (deepest < 0 or contacts.gap[i] < contacts.gap[deepest]):
+                deepest = i
+        if deepest < 0:
+            break
+        contacts.mark[deepest] = _KEPT
+        kept += 1
+        for i in range(count):
+            near = contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, cosine)
+            if near and squared_distance(contacts, deepest, contacts, i) < distance * distance:
+                contacts.mark[i] = _DROPPED
+    if kept < count:
+        _close_ranks(contacts, count)
+    return kept
+
+
+@njit(cache=True)
+def _close_ranks(contacts, count):
+    """Move the kept contacts to the front, geometry only: nothing else is computed before clustering."""
+    row = 0
+    for i in range(count):
+        if contacts.mark[i] != _KEPT:
+            continue
+        if row < i:
+            contacts.shape_a[row], contacts.shape_b[row] = contacts.shape_a[i], contacts.shape_b[i]
+            contacts.body_a[row], contacts.body_b[row] = contacts.body_a[i], contacts.body_b[i]
+            contacts.feature[row], contacts.gap[row] = contacts.feature[i], contacts.gap[i]
+            for axis in range(3):
+                contacts.point[row, axis] = contacts.point[i, axis]
+                contacts.normal[row, axis] = contacts.normal[i, axis]
+        row += 1
+
+
+@njit(cache=True)
+def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED_COSINE):
+    """Write is_new: temporal coherence through space, or by identity alone where `distance` is 0.
+
+    A contact is old if the step before had one (gap <= 0) with the same shapes and feature, or within
+    `distance` [m] on the same surface. The distance must exceed (largest speed) × (step). One old contact
+    may vouch for several: a facet's edge that appears beside the facet is the same contact, as paper III says.
+    A corner that slides along the floor into a wall is new, since the normals differ though the point is one.
+    """
+    for i in range(count):
+        contacts.is_new[i] = True
+        for j in range(previous_count):
+            if previous.gap[j] <= 0.0 and _is_same(contacts, i, previous, j, distance, cosine):
+                contacts.is_new[i] = False
+                break
+
+
+@njit(cache=True)
+def _is_same(contacts, i, previous, j, distance, cosine):
+    if (
+        contacts.shape_a[i] == previous.shape_a[j]
+        and contacts.shape_b[i] == previous.shape_b[j]
+        and contacts.feature[i] == previous.feature[j]
+    ):
+        return True
+    if distance == 0.0 or not same_surface(contacts, i, previous, j, cosine):
+        return False
+    return squared_distance(contacts, i, previous, j) <= distance * distance
+
+
+@njit(cache=True)
+def moving_tree(body, tree_of_body, tree_start, tree_stop):
+    """Tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
+    if body < 0:
+        return -1
+    tree = tree_of_body[body]
+    return tree if tree_stop[tree] > tree_start[tree] else -1
+
+
+@njit(cache=True)
+def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree):
+    """Write group_of_tree: the first tree of the group that contacts between moving trees link it to."""
+    for t in range(group_of_tree.shape[0]):
+        group_of_tree[t] = t
+    for i in range(count):
+        a = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
+        b = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
+        if contacts.gap[i] > 0.0 or a < 0 or b < 0:
+            continue
+        while group_of_tree[a] != a:
+            a = group_of_tree[a]
+        while group_of_tree[b] != b:
+            b = group_of_tree[b]
+        group_of_tree[max(a, b)] = min(a, b)  # a root is the smallest tree of its group
+    for t in range(group_of_tree.shape[0]):
+        group_of_tree[t] = group_of_tree[group_of_tree[t]]  # smaller trees are settled already
+
+
+@njit(cache=True)
+def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree):
+    """Group of a contact, -1 when nothing at it can move."""
+    tree = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
+    if tree < 0:
+        tree = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
+    return group_of_tree[tree] if tree >= 0 else -1
+
+
+@njit(cache=True)
+def classify(
+    contacts, count, tree_of_body, tree_start, tree_stop, approach_velocity, spreading, group_of_tree, state_of_tree
+):
+    """Groups, the state of each (free, colliding, resting) and the contacts that collide.
+
+    A contact has gap <= 0; it approaches when v_n < −approach_velocity [m/s]. A group collides when a *new*
+    contact of it approaches, or any contact while an impulse is still being spread; then every contact of the
+    group that approaches, new or old, enters the impact.
+
+    contacts : is_new and normal_velocity up to date; collides is written
+    spreading (t,) bool : trees with an unfinished impulse; cleared where the group collides no more
+    group_of_tree (t,), state_of_tree (t,) : written, the state for every tree of the group
+    """
+    link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree)
+    trees = group_of_tree.shape[0]
+    for t in range(trees):
+        state_of_tree[t] = FREE
+        if spreading[t]:
+            spreading[group_of_tree[t]] = True
+    for i in range(count):
+        group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
+        contacts.collides[i] = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -approach_velocity
+        if contacts.gap[i] > 0.0 or group < 0:
+            continue
+        if contacts.collides[i] and (contacts.is_new[i] or spreading[group]):
+            state_of_tree[group] = COLLIDING
+        elif state_of_tree[group] == FREE:
+            state_of_tree[group] = RESTING
+    for i in range(count):
+        group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
+        if group < 0 or state_of_tree[group] != COLLIDING:
+            contacts.collides[i] = False
+    for t in range(trees):
+        state_of_tree[t] = state_of_tree[group_of_tree[t]]
+        if state_of_tree[t] != COLLIDING:
+            spreading[t] = False

@@ -1,0 +1,66 @@
+"""Resting forces of penetrating contacts: penalty (5), modified Coulomb friction (6), as generalized forces."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from iapb.contact.kernels.rows import add_body_row
+from iapb.mechanics.kernels.jacobians import add_point_force
+from iapb.mechanics.kernels.vectors import dot, load, scale
+
+
+@njit(cache=True)
+def normal_force(gap, normal_velocity, stiffness, damping, clamped):
+    """(5) F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; `clamped`: never below zero."""
+    force = -stiffness * gap
+    if damping != 0.0:
+        force -= damping * normal_velocity
+    return 0.0 if clamped and force < 0.0 else force
+
+
+@njit(cache=True)
+def friction_share(normal_force, speed, friction, friction_velocity):
+    """(6) F_f / v_t [N s/m]: −μ F_n t above the threshold speed, −(v_t / v_threshold) μ F_n below it.
+
+    A contact that pulls, F_n < 0 in (5) as printed, gets no friction: (6) would then push along the motion.
+    """
+    reach = max(speed, friction_velocity)
+    if normal_force <= 0.0 or reach == 0.0:
+        return 0.0
+    return -friction * normal_force / reach
+
+
+@njit(cache=True)
+def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
+    """Add the forces of all contacts with gap <= 0 to `penalty` and `drag` (d,), generalized forces Jᵀ F.
+
+    m, w : mechanism arrays and workspace at the current configuration
+    contacts : velocities up to date (`contact_velocities`); normal_force and friction_force are written
+    stiffness K [N/m], damping B [N s/m], friction μ, friction_velocity v_threshold [m/s]
+    """
+    for i in range(count):
+        contacts.normal_force[i] = 0.0
+        contacts.friction_force[i] = 0.0
+        if contacts.gap[i] > 0.0:
+            continue
+        force = normal_force(contacts.gap[i], contacts.normal_velocity[i], stiffness, damping, clamped)
+        contacts.normal_force[i] = force
+        x, n = load(contacts.point, i), load(contacts.normal, i)
+        add_body_row(m, w, contacts.body_a[i], x, n, force, penalty)
+        add_body_row(m, w, contacts.body_b[i], x, n, -force, penalty)
+        if friction != 0.0:
+            add_friction(m, w, contacts, i, friction, friction_velocity, drag)
+
+
+@njit(cache=True)
+def add_friction(m, w, contacts, i, friction, friction_velocity, drag):
+    """Friction (6) of contact i, opposed to the tangential velocity; `drag` (d,) += Jᵀ F_f."""
+    x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)
+    speed = math.sqrt(dot(tangential, tangential))
+    force = scale(friction_share(contacts.normal_force[i], speed, friction, friction_velocity), tangential)
+    for axis in range(3):
+        contacts.friction_force[i, axis] = force[axis]
+    add_point_force(m, w, contacts.body_a[i], x, force, drag)
+    add_point_force(m, w, contacts.body_b[i], x, scale(-1.0, force), drag)

@@ -1,0 +1,101 @@
+"""Contact Jacobian rows nᵀ(J_a − J_b) and contact velocities, from the motion of single points.
+
+A row maps generalized velocity to normal velocity [m/s]; positive separates.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from iapb.mechanics.kernels.jacobians import motion_at
+from iapb.mechanics.kernels.vectors import add, dot, load, scale, subtract
+
+# An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at and below this
+# share of what it was computed from. Kinematics round by about 2e-16 a joint, so that n and j are known to
+# 1e-13 for chains of some hundred joints; a direction that truly differs by 1e-13 rad from orthogonal cannot
+# be told from that, and no geometry is that accurate. Left alone, a row of such entries would be promoted to a
+# contact by the unit scaling of the resolver.
+ROW_NOISE = 1e-13
+
+
+@njit(cache=True)
+def row_entry(m, w, k, x, n):
+    """Entry n·j of dof k for the world point x and unit normal n, exact zero where it is only rounding.
+
+    |n·j| <= ROW_NOISE ‖j‖ is noise for a translation. For a rotation j = a × (x − o), and the lever x − o is
+    known no better than the coordinates it is the difference of, so their size counts too: a contact struck
+    at the joint itself has no lever at all.
+    """
+    j = motion_at(m, w, k, x)
+    entry = dot(n, j)
+    square = dot(j, j)
+    if m.dof_rotates[k]:
+        o = load(w.position, m.dof_body[k])
+        square += dot(x, x) + dot(o, o)
+    return 0.0 if entry * entry <= ROW_NOISE * ROW_NOISE * square else entry
+
+
+@njit(cache=True)
+def add_body_row(m, w, body, x, n, factor, out):
+    """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
+
+    Dofs that carry both bodies of a self-collision get the same number added and subtracted: exact zero.
+    """
+    if body < 0:
+        return
+    k = m.last_dof[body]
+    while k >= 0:
+        out[k] += factor * row_entry(m, w, k, x, n)
+        k = m.dof_parent[k]
+
+
+@njit(cache=True)
+def body_row(m, w, body, point, normal, out):
+    """(13), (14): nᵀJ_b of one body alone; out (d,)."""
+    out[:] = 0.0
+    x, n = (point[0], point[1], point[2]), (normal[0], normal[1], normal[2])
+    add_body_row(m, w, body, x, n, 1.0, out)
+
+
+@njit(cache=True)
+def contact_row(m, w, contacts, i, out):
+    """(11), (12): nᵀ(J_a − J_b) of contact i; out (d,)."""
+    out[:] = 0.0
+    x, n = load(contacts.point, i), load(contacts.normal, i)
+    add_body_row(m, w, contacts.body_a[i], x, n, 1.0, out)
+    add_body_row(m, w, contacts.body_b[i], x, n, -1.0, out)
+
+
+@njit(cache=True)
+def relative_jacobian_rows(m, w, contacts, count, out):
+    """out (count, d) <- the rows (11), (12) of the first `count` contacts."""
+    for i in range(count):
+        contact_row(m, w, contacts, i, out[i])
+
+
+@njit(cache=True)
+def velocity_at(m, w, body, x, v):
+    """Velocity J v of the world point x as fixed to the body [m/s]; zero for the static world."""
+    total = (0.0, 0.0, 0.0)
+    if body < 0:
+        return total
+    k = m.last_dof[body]
+    while k >= 0:
+        total = add(total, scale(v[k], motion_at(m, w, k, x)))
+        k = m.dof_parent[k]
+    return total
+
+
+@njit(cache=True)
+def contact_velocities(m, w, v, contacts, count):
+    """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each contact."""
+    for i in range(count):
+        x, n = load(contacts.point, i), load(contacts.normal, i)
+        relative = subtract(
+            velocity_at(m, w, contacts.body_a[i], x, v), velocity_at(m, w, contacts.body_b[i], x, v)
+        )
+        normal_velocity = dot(n, relative)
+        tangential = subtract(relative, scale(normal_velocity, n))
+        contacts.normal_velocity[i] = normal_velocity
+        for axis in range(3):
+            contacts.tangential_velocity[i, axis] = tangential[axis]
