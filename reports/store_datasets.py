@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from iapb.errors import RunFileError
+from reports.store_files import written_aside
+from reports.store_seal import seal
 
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
 _COMPRESSION_LEVEL = 4
+
+
+@contextmanager
+def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
+    """Give an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` in one step."""
+    import h5py
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with written_aside(path, replace=replace) as aside:
+        with h5py.File(aside, "w") as file:
+            yield file
+        seal(aside)
 
 
 def write_text(group: Any, name: str, text: str) -> None:
@@ -94,17 +110,3 @@ def read_values(group: Any, name: str, path: str) -> Any:
         return dataset[()]
     texts = dataset.asstr()[()]
     return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
-
-
-def texts_of(file: Any) -> dict[str, Any]:
-    """Return every text of a file by path, for the hash that covers them."""
-    import h5py
-
-    texts: dict[str, Any] = {}
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and h5py.check_string_dtype(item.dtype) is not None:
-            texts[name] = read_values(item.parent, item.name.rpartition("/")[2], file.filename)
-
-    file.visititems(visit)
-    return texts

@@ -91,8 +91,3 @@ def content_hash(run: Run) -> str:
     for name in sorted(run.energy):
         add_array(digest, f"energy/{name}", run.energy[name])
     return digest.hexdigest()
-
-
-def text_hash(texts: Mapping[str, Any]) -> str:
-    """Return sha256 of a file's texts by path: HDF5's own checksums cannot cover them."""
-    return hashlib.sha256(canonical_json(texts).encode()).hexdigest()

@@ -12,14 +12,15 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
-from reports.store_datasets import read_values, texts_of
-from reports.store_keys import content_hash, text_hash
+from reports.store_datasets import read_values
+from reports.store_keys import content_hash
 from reports.store_layout import FORMAT, FORMAT_VERSION, GROUPS, JSON_TEXTS, TEXTS
+from reports.store_seal import check_seal
 
 
 @contextmanager
-def opened(path: Path | str, expected_format: str = FORMAT) -> Iterator[Any]:
-    """Open a file of this project for reading.
+def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
+    """Open a file of this project for reading; a format of None takes any.
 
     Raises
     ------
@@ -31,14 +32,16 @@ def opened(path: Path | str, expected_format: str = FORMAT) -> Iterator[Any]:
     path = Path(path)
     if not path.is_file():
         raise RunFileError(f"{path}: no such file")
+    check_seal(path)
     try:
         with h5py.File(path, "r") as file:
-            _check_format(file, path, expected_format)
+            if expected_format is not None:
+                _check_format(file, path, expected_format)
             yield file
     except RunFileError:
         raise
-    except Exception as error:  # a damaged file can fail anywhere, with whatever its broken bytes lead to
-        raise RunFileError(f"{path}: cannot be read, the file is damaged or not HDF5 ({error})") from error
+    except Exception as error:  # whole, but made by something else: can fail anywhere, with anything
+        raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
 
 
 def _check_format(file: Any, path: Path, expected: str) -> None:
@@ -53,7 +56,7 @@ def _check_format(file: Any, path: Path, expected: str) -> None:
 def read_run(path: Path | str) -> Run:
     """Return the run in a file, partial or complete.
 
-    Both hashes are computed again and compared, so a file whose bytes have changed is never taken for a run.
+    The seal is checked first and the content hash last, so a file that was changed is never taken for a run.
 
     Raises
     ------
@@ -61,22 +64,15 @@ def read_run(path: Path | str) -> Run:
         If the file is absent, damaged or not a run.
     """
     with opened(path) as file:
-        check_texts(file, path)
         run = Run(**_texts(file, path), **_head(file), **_arrays(file, path))
         if content_hash(run) != file.attrs["content_hash"]:
             raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
         return run
 
 
-def check_texts(file: Any, path: Path | str) -> None:
-    """Raise RunFileError if a text of the file is not what was written."""
-    if text_hash(texts_of(file)) != file.attrs["text_hash"]:
-        raise RunFileError(f"{path}: the texts differ from their hash, the file is damaged")
-
-
 def read_provenance(path: Path | str) -> dict[str, str]:
     """Return where a run or a table comes from, as texts by name."""
-    with opened(path, expected_format=_format_of(path)) as file:
+    with opened(path, expected_format=None) as file:
         return {name: read_values(file["provenance"], name, str(path)) for name in file["provenance"]}
 
 
@@ -84,16 +80,6 @@ def read_head(path: Path | str) -> dict[str, Any]:
     """Return a run file's attributes: title, status, run_key, content_hash, dt. Reads no array."""
     with opened(path) as file:
         return dict(file.attrs)
-
-
-def _format_of(path: Path | str) -> str:
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return str(file.attrs.get("format", FORMAT))
-    except OSError:
-        return FORMAT
 
 
 def _texts(file: Any, path: Path | str) -> dict[str, Any]:

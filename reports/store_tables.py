@@ -8,6 +8,7 @@ rows unless it repeats values.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +18,17 @@ import numpy as np
 
 from iapb.errors import ArgumentError, RunFileError
 from reports.provenance import collect_provenance
-from reports.store_datasets import mark_plottable, read_values, texts_of, write_quantity, write_scale, write_text
-from reports.store_files import written_aside
-from reports.store_keys import add_array, text_hash
+from reports.store_datasets import (
+    mark_plottable,
+    new_file,
+    read_values,
+    write_quantity,
+    write_scale,
+    write_text,
+)
+from reports.store_keys import add_array
 from reports.store_layout import FORMAT_VERSION
-from reports.store_read import check_texts, opened
+from reports.store_read import opened
 
 TABLE_FORMAT = "iapb table"
 ROW = "row"
@@ -76,14 +83,11 @@ def write_tables(
     ArgumentError
         If the columns of a table differ in length, or two things have one name.
     """
-    import h5py
-
     path = Path(path)
     _check_names("tables", [table.name for table in tables])
     for table in tables:
         _check_columns(table)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with written_aside(path, replace=True) as aside, h5py.File(aside, "w") as file:
+    with new_file(path, replace=True) as file:
         file.attrs.update(
             {"NX_class": "NXroot", "default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
         )
@@ -92,7 +96,6 @@ def write_tables(
         for name, text in (collect_provenance() if provenance is None else provenance).items():
             write_text(file.require_group("provenance"), name, text)
         file.attrs["content_hash"] = tables_hash(tables)
-        file.attrs["text_hash"] = text_hash(texts_of(file))
     return path
 
 
@@ -115,7 +118,6 @@ def read_table(path: Path | str, name: str | None = None) -> Table:
 def read_tables(path: Path | str) -> dict[str, Table]:
     """Return all tables of a file by name, the one to show first at the start; raises as `read_table`."""
     with opened(path, TABLE_FORMAT) as file:
-        check_texts(file, path)
         names = sorted(set(file) - {"provenance"}, key=lambda name: name != file.attrs["default"])
         tables = {name: _read(file[name], str(path)) for name in names}
         if tables_hash(list(tables.values())) != file.attrs["content_hash"]:
@@ -125,8 +127,6 @@ def read_tables(path: Path | str) -> dict[str, Table]:
 
 def tables_hash(tables: Sequence[Table]) -> str:
     """Return sha256 of all columns of all tables, in the order of the tables' names."""
-    import hashlib
-
     digest = hashlib.sha256()
     for table in sorted(tables, key=lambda table: table.name):
         for column in table.columns:

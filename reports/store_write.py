@@ -11,9 +11,8 @@ import numpy as np
 
 from iapb.run import Run
 from reports.provenance import collect_provenance
-from reports.store_datasets import mark_plottable, texts_of, write_quantity, write_scale, write_text
-from reports.store_files import written_aside
-from reports.store_keys import content_hash, plain, text_hash
+from reports.store_datasets import mark_plottable, new_file, write_quantity, write_scale, write_text
+from reports.store_keys import content_hash, plain
 from reports.store_layout import (
     FORMAT,
     FORMAT_VERSION,
@@ -48,11 +47,8 @@ def write_run(
     replace
         Whether a file at `path` is replaced. Otherwise an existing file stays as it is.
     """
-    import h5py
-
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with written_aside(path, replace=replace) as aside, h5py.File(aside, "w") as file:
+    with new_file(path, replace=replace) as file:
         _write_head(file, run, key)
         for group, name, attribute in TEXTS:
             value = getattr(run, attribute)
@@ -65,7 +61,6 @@ def write_run(
         file.create_group("provenance", track_order=True)
         for name, text in (collect_provenance() if provenance is None else provenance).items():
             write_text(file["provenance"], name, text)
-        file.attrs["text_hash"] = text_hash(texts_of(file))
     return path
 
 

@@ -1,0 +1,178 @@
+"""The store: what is there is not computed again, what is finished is not overwritten, what is killed is readable."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError, RunFileError
+from iapb.run import Run
+from reports.store import Checkpoint, RunStore, read_run, run_key
+from reports.store_index import INDEX_NAME
+from reports.store_keys import content_hash
+
+MakeRun = Callable[..., Run]
+INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB", "settings": {"restitution": np.float64(0.0)}}
+
+
+class Counter:
+    """A computation that counts its calls."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.calls = run, 0
+
+    def __call__(self, checkpoint: Checkpoint) -> Run:
+        self.calls += 1
+        return self.run
+
+
+def test_a_run_that_exists_is_not_computed_again(tmp_path: Path, make_run: MakeRun) -> None:
+    compute = Counter(make_run())
+    first = RunStore(tmp_path).get_or_run(INPUTS, compute, label="peg corner/IAPB")
+    again = RunStore(tmp_path).get_or_run(INPUTS, compute, label="any other label")
+    assert compute.calls == 1 and content_hash(first) == content_hash(again)
+    assert len(list(tmp_path.glob("*.h5"))) == 1 and INPUTS in RunStore(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"law": "PB"}, {"scene": {"name": "peg", "rate": 1000}}, {"settings": {"restitution": 5e-324}}, {"extra": None}],
+)
+def test_any_input_changes_the_key(change: dict[str, object]) -> None:
+    assert run_key({**INPUTS, **change}) != run_key(INPUTS)
+
+
+def test_the_key_forgets_order_and_number_type_but_not_the_code() -> None:
+    reordered = {"settings": {"restitution": 0.0}, "law": "IAPB", "scene": {"rate": 512, "name": "peg"}}
+    assert run_key(reordered) == run_key(INPUTS)
+    assert run_key(INPUTS, code="mine 1") != run_key(INPUTS, code="mine 2")
+
+
+def test_an_input_that_has_no_text_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="inputs"):
+        run_key({"law": object()})
+
+
+def test_a_finished_run_is_never_overwritten(tmp_path: Path, make_run: MakeRun) -> None:
+    store = RunStore(tmp_path)
+    path = store.put(INPUTS, make_run(seed=1))
+    before = path.read_bytes()
+    assert store.put(INPUTS, make_run(seed=2)) == path
+    assert path.read_bytes() == before
+
+
+def test_a_damaged_run_is_reported_and_left_where_it_is(tmp_path: Path, make_run: MakeRun) -> None:
+    store = RunStore(tmp_path)
+    path = store.put(INPUTS, make_run())
+    path.write_bytes(path.read_bytes()[:5000])
+    compute = Counter(make_run())
+    with pytest.raises(RunFileError, match=path.name):
+        store.get_or_run(INPUTS, compute)
+    assert compute.calls == 0 and path.stat().st_size == 5000
+
+
+def test_an_interrupted_run_is_kept_as_partial_and_finished_later(tmp_path: Path, make_run: MakeRun) -> None:
+    store = RunStore(tmp_path)
+    interrupted = Counter(make_run(steps=10, complete=False))
+    assert not store.get_or_run(INPUTS, interrupted).complete
+    (partial,) = store.partial_runs()
+    assert read_run(partial).steps == 10 and INPUTS not in store
+    with pytest.raises(ArgumentError, match="complete"):
+        store.put(INPUTS, interrupted.run)
+    assert store.get_or_run(INPUTS, Counter(make_run())).complete
+    assert store.partial_runs() == () and INPUTS in store
+
+
+def test_an_exception_keeps_the_last_checkpoint(tmp_path: Path, make_run: MakeRun) -> None:
+    def compute(checkpoint: Checkpoint) -> Run:
+        checkpoint(make_run(steps=12, complete=False), force=True)
+        raise KeyboardInterrupt
+
+    store = RunStore(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        store.get_or_run(INPUTS, compute)
+    assert read_run(store.partial_path_of(INPUTS)).steps == 12
+
+
+def test_checkpoints_wait_for_their_time(tmp_path: Path, make_run: MakeRun) -> None:
+    run = make_run(complete=False)
+    patient, eager = Checkpoint(tmp_path / "a.partial"), Checkpoint(tmp_path / "b.partial", pause=0.0)
+    assert not patient.due and not patient(run)
+    assert eager(run) and not eager(run)  # the second waits for a multiple of what the first took
+
+
+KILLED_WRITER = """
+import sys
+sys.path.insert(0, sys.argv[2])
+import pickle
+from reports.store import Checkpoint
+runs = pickle.load(open(sys.argv[3], "rb"))
+from pathlib import Path
+checkpoint = Checkpoint(Path(sys.argv[1]), key="k")
+number = 0
+while True:
+    checkpoint(runs[number % len(runs)], force=True)
+    if number == 0:
+        print("ready", flush=True)
+    number += 1
+"""
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.011, 0.023, 0.037, 0.051])
+def test_a_killed_writer_leaves_its_last_checkpoint(tmp_path: Path, make_run: MakeRun, delay: float) -> None:
+    import pickle
+    import time
+
+    runs = [make_run(steps=steps, seed=steps, complete=False) for steps in (50, 100, 150)]
+    (tmp_path / "runs.pickle").write_bytes(pickle.dumps(runs))
+    target = tmp_path / "run.h5.partial"
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED_WRITER, str(target), str(root), str(tmp_path / "runs.pickle")],
+        stdout=subprocess.PIPE,
+    )
+    assert process.stdout is not None and process.stdout.readline() == b"ready\n"
+    time.sleep(delay)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait(30) == -signal.SIGKILL
+    process.stdout.close()
+    found = read_run(target)
+    assert not found.complete and content_hash(found) in {content_hash(run) for run in runs}
+
+
+def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Path) -> None:
+    old, young = tmp_path / ".a.h5.1.writing", tmp_path / ".b.h5.2.writing"
+    for path in (old, young):
+        path.write_text("x")
+    os.utime(old, (0, 0))
+    RunStore(tmp_path)
+    assert not old.exists() and young.exists()
+
+
+def test_the_index_tells_the_truth(tmp_path: Path, make_run: MakeRun) -> None:
+    store = RunStore(tmp_path)
+    for world in ("IAPB", "PB"):
+        store.put({"world": world}, make_run(world=world), label=world)
+    assert [entry.title for entry in store.entries()] == ["peg · IAPB", "peg · PB"]
+    assert store.entries()[0].content_hash == content_hash(make_run())
+    (tmp_path / store.entries()[0].file).unlink()
+    assert [entry.title for entry in store.entries()] == ["peg · PB"]
+    (tmp_path / INDEX_NAME).write_text('{"cut off')
+    assert [entry.title for entry in store.entries()] == ["peg · PB"]
+
+
+def test_the_same_inputs_give_the_same_content(tmp_path: Path, make_run: MakeRun) -> None:
+    slower = dataclasses.replace(make_run(), chunk_seconds=np.array([9.0]))
+    first, second = RunStore(tmp_path / "a"), RunStore(tmp_path / "b")
+    first.put(INPUTS, make_run())
+    second.put(INPUTS, slower)
+    assert first.entries()[0].content_hash == second.entries()[0].content_hash
+    assert first.entries()[0].run_key == second.entries()[0].run_key
