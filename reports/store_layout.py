@@ -50,7 +50,7 @@ TRAJECTORY = (
     Quantity("q", ("time", "coordinate"), POSITION, "generalized configuration"),
     Quantity("v", ("time", "velocity"), VELOCITY, "generalized velocity"),
     Quantity("device_q", ("time", "device_coordinate"), POSITION, "configuration of the device"),
-    Quantity("device_v", ("time", "device_coordinate"), VELOCITY, "velocity of the device"),
+    Quantity("device_v", ("time", "device_velocity"), VELOCITY, "velocity of the device"),
 )
 
 STEPS = (
@@ -60,7 +60,7 @@ STEPS = (
     Quantity("friction_force", ("step", "velocity"), FORCE, "friction forces"),
     Quantity("impulse", ("step", "velocity"), IMPULSE, "generalized collision impulse of the step"),
     Quantity("environment_force", ("step", "velocity"), FORCE, "contact forces + impulse / dt (26)"),
-    Quantity("device_force", ("step", "device_coordinate"), FORCE, "what the device's actuators apply"),
+    Quantity("device_force", ("step", "device_velocity"), FORCE, "what the device's actuators apply"),
     Quantity("state", ("step",), "1", "contact state of the tool's group"),
 )
 
@@ -132,32 +132,29 @@ def energy_dimension(run: Run, name: str) -> str:
     return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
 
 
-def column_units(unit: dict[str, str], coordinates: tuple[str, ...]) -> str:
-    """Return the unit of a generalized quantity: one, or one per column where the columns differ."""
-    units = [unit.get(coordinate, "1") for coordinate in coordinates]
-    return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
-
-
 def unit_of(quantity: Quantity, run: Run) -> str:
-    """Return the unit of `quantity` in `run`."""
+    """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
     if isinstance(quantity.unit, str):
         return quantity.unit
-    start, stop = run.tool_dofs
-    units = run.coordinate_units
-    return column_units(quantity.unit, units[start:stop] if "device_coordinate" in quantity.dimensions else units)
+    if run.q.shape[1] != run.v.shape[1]:  # quaternions and the like: no column of v has its coordinate
+        return " or ".join(dict.fromkeys(quantity.unit.values()))
+    start, stop = run.tool_dofs if quantity.dimensions[1].startswith("device") else (0, run.v.shape[1])
+    units = [quantity.unit.get(unit, "1") for unit in run.coordinate_units[start:stop]]
+    return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
 
 
 def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] | tuple[str, ...], str]:
     """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
+    if dimension == "time":
+        return np.asarray(run.time, np.float64), "s"
     start, stop = run.tool_dofs
     labels = {
         "axis": ("x", "y", "z"),
         "coordinate": run.coordinate_names,
         "velocity": run.coordinate_names,
         "device_coordinate": run.coordinate_names[start:stop],
+        "device_velocity": run.coordinate_names[start:stop],
     }.get(dimension, ())
     if labels and len(labels) == length:
         return labels, "1"
-    if dimension == "time":
-        return np.asarray(run.time, np.float64), "s"
     return np.arange(length, dtype=np.int64), "1"
