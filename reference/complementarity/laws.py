@@ -1,0 +1,152 @@
+"""Impact laws by name: what each states, where it comes from, under which hypotheses it is consistent.
+
+All act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`), E = diag(restitution), and return
+v⁺ and the impulses. The equality laws share no algorithm with the engine: they solve A x = target by singular
+values (lstsq), where the engine orthogonalises rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.errors import ArgumentError, SolverError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solvers import solve
+
+Floats = NDArray[np.float64]
+
+# A solve of a law's LCP whose residual is above this share of the velocity scale is an error, not an outcome.
+LAW_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a law makes of an impact.
+
+    velocity : (d,) v⁺; impulse : (n,) p [N s]; residual : largest recomputed residual of the problems solved
+    """
+
+    velocity: Floats
+    impulse: Floats
+    residual: float = 0.0
+
+
+@dataclass(frozen=True)
+class Law:
+    """An impact law: statement, source, hypotheses, and whether it never gains energy under them."""
+
+    name: str
+    statement: str
+    source: str
+    hypotheses: str
+    never_gains_energy: bool
+    apply: Callable[..., Outcome]
+
+
+def newton_lcp(problem: ImpactProblem, solver: str = "daqp") -> Outcome:
+    """0 <= p ⟂ gamma_plus + E gamma_minus >= 0."""
+    impulse, residual = _solved(problem, solver)
+    return Outcome(problem.velocity_plus(impulse), impulse, residual)
+
+
+def poisson(problem: ImpactProblem, solver: str = "daqp") -> Outcome:
+    """Compression 0 <= p_c ⟂ gamma_c >= 0, then expansion 0 <= p_e − E p_c ⟂ gamma_plus >= 0; p = p_c + p_e."""
+    compression = replace(problem, restitution=np.zeros(problem.contacts))
+    p_c, first = _solved(compression, solver)
+    returned = problem.restitution * p_c
+    bounced = replace(compression, gamma_minus=problem.gamma_plus(p_c + returned))
+    extra, second = _solved(bounced, solver)
+    impulse = p_c + returned + extra
+    return Outcome(problem.velocity_plus(impulse), impulse, max(first, second))
+
+
+def newton_equality(problem: ImpactProblem) -> Outcome:
+    """gamma_plus = −E gamma_minus on every row, p of either sign and of least norm (the paper's (20)-(21)).
+
+    Raises
+    ------
+    SolverError
+        where redundant rows with different e contradict one another: no velocity meets all of them
+    """
+    change, impulse, residual = _equality(problem)
+    if residual > LAW_TOLERANCE:
+        raise SolverError(f"contradicting equalities on redundant contacts: residual {residual:.1e}")
+    return Outcome(_known(problem.velocity) + change, impulse, residual)
+
+
+def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
+    """Rows of (13)-(14): nᵀJ_a and nᵀJ_b apart (each (c, d)), where (12) has their difference; zero rows left out."""
+    stacked = np.vstack([np.asarray(jacobian_a, np.float64), np.asarray(jacobian_b, np.float64)])
+    return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
+
+
+def _solved(problem: ImpactProblem, solver: str) -> tuple[Floats, float]:
+    solution = solve(problem, solver)
+    if not solution.solved(LAW_TOLERANCE):
+        raise SolverError(f"{solver} left a residual of {solution.residuals.worst:.1e}: {solution.note}")
+    return solution.answer(), solution.residuals.worst
+
+
+def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
+    """Δv, p and residual of the least change of velocity, in the kinetic metric, that meets all equalities."""
+    mass = _known(problem.mass_matrix)
+    rows, cholesky = problem.factor, np.linalg.cholesky(mass)
+    target = -problem.offset
+    if not len(rows):
+        return np.zeros(len(mass)), np.zeros(0), 0.0
+    length = np.linalg.norm(rows, axis=1)
+    unit = np.where(length > 0.0, length, 1.0)[:, None]
+    change = np.linalg.lstsq(rows / unit, target / unit[:, 0])[0]
+    impulse = np.linalg.lstsq(rows.T, change)[0]
+    scale = np.abs(target).max() or 1.0
+    residual = float(np.abs(rows @ change - target).max() / scale)
+    return np.linalg.solve(cholesky.T, change), impulse, residual
+
+
+def _known(mechanics: Floats | None) -> Floats:
+    if mechanics is None:
+        raise ArgumentError("problem", "without mechanics", "a problem made by ImpactProblem.from_impact")
+    return mechanics
+
+
+LAWS: dict[str, Law] = {
+    law.name: law
+    for law in (
+        Law(
+            "newton_lcp",
+            "0 <= p ⟂ gamma_plus + E gamma_minus >= 0",
+            "Moreau 1988; Glocker and Pfeiffer 1995",
+            "equal e, or all given contacts approach (gamma_minus <= 0)",
+            True,
+            newton_lcp,
+        ),
+        Law(
+            "poisson",
+            "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
+            "Glocker and Pfeiffer 1995; Anitescu and Potra 1997",
+            "any E in [0, 1], any gamma_minus",
+            True,
+            poisson,
+        ),
+        Law(
+            "newton_equality",
+            "gamma_plus = -E gamma_minus, p of either sign",
+            "Constantinescu, Salcudean, Croft 2005, (15)-(21)",
+            "one e for all contacts",
+            True,
+            newton_equality,
+        ),
+        Law(
+            "per_body_equality",
+            "newton_equality on the rows of each body apart (`per_body_rows`)",
+            "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
+            "one e for all contacts; momentum is not conserved at self-collisions",
+            True,
+            newton_equality,
+        ),
+    )
+}

@@ -1,0 +1,119 @@
+"""Impact laws against one another and against what is known of them."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.errors import SolverError
+from reference.complementarity import ImpactProblem
+from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
+from reference.complementarity.laws import LAWS, newton_equality, newton_lcp, per_body_rows, poisson
+from reference.energy_gain import bulk_energy_gain
+from reference.exact import exact_impact
+
+BAR = np.diag([1.0, 1.0 / 12.0])  # a bar struck at x = 0.5 and 0.4 (design of the counterexample)
+BAR_ROWS = np.array([[1.0, 0.5], [1.0, 0.4]])
+
+
+def random_problem(seed: int, contacts: int, e: object) -> ImpactProblem:
+    """An impact whose contacts all approach: v is drawn, then rows are turned against it."""
+    rng = np.random.default_rng(seed)
+    d = int(rng.integers(1, 7))
+    root, v = rng.normal(size=(d, d)), rng.normal(size=d)
+    rows = rng.normal(size=(contacts, d))
+    rows *= -np.sign(rows @ v)[:, None]
+    return ImpactProblem.from_impact(root @ root.T + 0.1 * np.eye(d), rows, v, e)
+
+
+def gain(problem: ImpactProblem, v_plus: np.ndarray) -> float:
+    return float(bulk_energy_gain(problem.mass_matrix, problem.velocity, v_plus)[0][0])
+
+
+@given(st.integers(0, 100_000), st.floats(0.0, 1.0))
+def test_one_contact_all_laws_agree(seed: int, e: float) -> None:
+    """C05: for one approaching contact the equality and both complementarity laws are the same law."""
+    problem = random_problem(seed, 1, e)
+    truth = exact_impact(problem.mass_matrix, problem.contact_jacobian, problem.velocity, Fraction(e))
+    kinetic = np.linalg.cholesky(problem.mass_matrix).T
+    size = np.linalg.norm(kinetic @ problem.velocity)
+    for law in (newton_equality, newton_lcp, poisson):
+        v_plus = law(problem).velocity
+        assert np.linalg.norm(kinetic @ (v_plus - truth.rounded_velocity)) <= 1e-12 * size
+        assert law(problem).impulse[0] >= 0.0
+
+
+@given(st.integers(0, 100_000), st.floats(0.0, 1.0))
+def test_equality_with_nonnegative_impulse_is_the_complementarity_solution(seed: int, e: float) -> None:
+    """The wider class of agreement: if *some* p >= 0 gives the equality's motion, Newton's LCP gives it too."""
+    problem = random_problem(seed, 1 + seed % 5, e)
+    equality = newton_equality(problem) if np.linalg.matrix_rank(problem.factor) == problem.size else None
+    if (
+        equality is None
+        or adhesion(problem.contact_jacobian, equality.impulse, problem.mass_matrix) == ADHESIVE
+    ):
+        return
+    assert np.abs(newton_lcp(problem).velocity - equality.velocity).max() <= 1e-8 * np.linalg.cond(
+        problem.factor
+    )
+
+
+@given(st.integers(0, 100_000))
+def test_sound_laws_never_gain_energy_with_unequal_restitution(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    contacts = int(rng.integers(1, 6))
+    problem = random_problem(seed, contacts, rng.uniform(size=contacts))
+    for law in (poisson, newton_lcp):
+        try:
+            outcome = law(problem)
+        except SolverError:
+            assert law is newton_lcp  # its velocities can be infeasible; Poisson always has a solution
+            continue
+        assert gain(problem, outcome.velocity) <= 1e-11
+
+
+def test_unequal_equalities_on_the_bar_gain_energy_and_sound_laws_do_not() -> None:
+    """The known counterexample: 0.5 J becomes 12.167 J by equalities with e = (1, 0)."""
+    problem = ImpactProblem.from_impact(BAR, BAR_ROWS, [-1.0, 0.0], [1.0, 0.0])
+    wrong = newton_equality(problem).velocity
+    assert 0.5 * wrong @ BAR @ wrong == pytest.approx(73.0 / 6.0, rel=1e-12)
+    for law in (newton_lcp, poisson):
+        assert gain(problem, law(problem).velocity) <= 0.0
+
+
+def test_contradicting_equalities_are_an_error() -> None:
+    problem = ImpactProblem.from_impact(np.eye(1), [[1.0], [1.0]], [-1.0], [1.0, 0.0])
+    with pytest.raises(SolverError, match="contradicting"):
+        newton_equality(problem)
+    assert poisson(problem).velocity[0] >= 0.0
+
+
+def test_per_body_rows_break_momentum_where_relative_rows_keep_it() -> None:
+    """Erratum 3: a ball hitting an equal one at rest bounces back as from a wall."""
+    a, b, v = np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), [-1.0, 0.0]
+    apart = newton_equality(ImpactProblem.from_impact(np.eye(2), per_body_rows(a, b), v, 1.0)).velocity
+    relative = newton_equality(ImpactProblem.from_impact(np.eye(2), a - b, v, 1.0)).velocity
+    assert apart == pytest.approx([1.0, 0.0])
+    assert relative == pytest.approx([0.0, -1.0])
+
+
+def test_adhesion_is_told_from_an_artefact() -> None:
+    """Two rows and their sum: the least-norm impulse of one may be negative though another choice is not."""
+    rows = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    given = np.array([3.0, 0.1])  # close to the first row: least norm pulls at the third
+    least_norm = np.linalg.lstsq(rows.T, given)[0]
+    assert least_norm.min() < 0.0
+    assert adhesion(rows, least_norm, np.eye(2)) == ARTEFACT
+    found = nonnegative_impulse(rows, given, np.eye(2))
+    assert found.exists and np.abs(rows.T @ found.impulse - given).max() <= 1e-14
+    assert adhesion(rows, [1.0, 0.0, 2.0], np.eye(2)) == NONE
+    assert adhesion(rows[:2], [1.0, -0.5], np.eye(2)) == ADHESIVE
+
+
+def test_every_law_says_what_it_is() -> None:
+    for name, law in LAWS.items():
+        assert law.name == name and law.statement and law.source and law.hypotheses
