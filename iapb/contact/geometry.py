@@ -34,7 +34,7 @@ class Shapes(NamedTuple):
     body: Integers  # (n,) body that carries the shape, -1 = the static world
     radius: Floats  # (n,) [m] of a circle, else 0
     first: Integers  # (n,) row of `vertices` where the shape begins
-    count: Integers  # (n,) its rows: 2 for a half-plane, 1 for a circle, >= 3 for a polygon
+    count: Integers  # type: ignore[assignment]  # (n,) rows: half-plane 2, circle 1, polygon >= 3
     vertices: Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
 
 

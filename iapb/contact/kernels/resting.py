@@ -41,17 +41,23 @@ def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction,
     stiffness K [N/m], damping B [N s/m], friction μ, friction_velocity v_threshold [m/s]
     """
     for i in range(count):
-        contacts.normal_force[i] = 0.0
-        contacts.friction_force[i] = 0.0
-        if contacts.gap[i] > 0.0:
-            continue
-        force = normal_force(contacts.gap[i], contacts.normal_velocity[i], stiffness, damping, clamped)
-        contacts.normal_force[i] = force
-        x, n = load(contacts.point, i), load(contacts.normal, i)
-        add_body_row(m, w, contacts.body_a[i], x, n, force, penalty)
-        add_body_row(m, w, contacts.body_b[i], x, n, -force, penalty)
-        if friction != 0.0:
-            add_friction(m, w, contacts, i, friction, friction_velocity, drag)
+        resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag)
+
+
+@njit(cache=True)
+def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
+    """The same for contact i alone."""
+    contacts.normal_force[i] = 0.0
+    contacts.friction_force[i] = 0.0
+    if contacts.gap[i] > 0.0:
+        return
+    force = normal_force(contacts.gap[i], contacts.normal_velocity[i], stiffness, damping, clamped)
+    contacts.normal_force[i] = force
+    x, n = load(contacts.point, i), load(contacts.normal, i)
+    add_body_row(m, w, contacts.body_a[i], x, n, force, penalty)
+    add_body_row(m, w, contacts.body_b[i], x, n, -force, penalty)
+    if friction != 0.0:
+        add_friction(m, w, contacts, i, friction, friction_velocity, drag)
 
 
 @njit(cache=True)
