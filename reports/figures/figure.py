@@ -1,0 +1,85 @@
+"""Figure: one drawing of the report as plain values, and Recipe: what a figure needs and who draws it.
+
+A figure is a few SVG panels (they wrap on a narrow screen), a legend, a caption that says what to see, and the
+numbers behind it. Nothing here knows about matplotlib or about the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers under a figure: `columns` are headings with their unit, `rows` hold text or numbers.
+
+    A number is printed with `digits` significant digits; None is printed as a dash: "does not apply".
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    digits: int = 4
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One SVG drawing; `label` is its heading, `alt` what a person who cannot see it is told."""
+
+    svg: str
+    alt: str
+    label: str = ""
+    wide: bool = False  # take the whole width of the page
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawn figure. `number` is the paper's ("Figure 7"), empty for a figure that is ours."""
+
+    key: str
+    number: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    numbers: Numbers | None = None
+    legend: tuple[tuple[str, str], ...] = ()  # (text, name of a style in reports.figures.style)
+    inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a figure is made: `draw` gets the inputs named in `needs`, by name, and returns the Figure.
+
+    Without all of `needs` the figure is not drawn, and the page says so: never a picture of half the evidence.
+    """
+
+    key: str
+    number: str
+    title: str
+    needs: tuple[str, ...]
+    draw: Callable[[Mapping[str, Any]], Figure]
+    section: str = "figures"
+
+    def missing(self, inputs: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return the names in `needs` for which there is no input."""
+        return tuple(name for name in self.needs if inputs.get(name) is None)
+
+
+@dataclass(frozen=True)
+class NotComputed:
+    """Stands where a figure would be: what it would have shown, and which inputs are missing."""
+
+    key: str
+    number: str
+    title: str
+    missing: tuple[str, ...] = field(default=())
+
+
+def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:
+    """Draw one figure from what there is, or say what is missing."""
+    missing = recipe.missing(inputs)
+    if missing:
+        return NotComputed(recipe.key, recipe.number, recipe.title, missing)
+    return recipe.draw({name: inputs[name] for name in recipe.needs})

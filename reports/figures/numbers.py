@@ -1,0 +1,47 @@
+"""How a number is printed: a true minus sign, superscript powers of ten, the same digits down a column."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PLAIN_FROM, _PLAIN_TO = 1e-3, 1e5  # outside of this range a power of ten reads better than zeros
+
+
+def format_number(value: float, digits: int = 4) -> str:
+    """Return `value` with `digits` significant digits, as text for people (not for parsing)."""
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else ("∞" if value > 0 else f"{MINUS}∞")
+    if value == 0.0:
+        return "0"
+    if _PLAIN_FROM <= abs(value) < _PLAIN_TO:
+        decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+        return f"{value:.{decimals}f}".replace("-", MINUS)
+    mantissa, exponent = f"{value:.{max(digits - 1, 0)}e}".split("e")
+    if float(mantissa) == int(float(mantissa)):
+        mantissa = str(int(float(mantissa)))
+    return f"{mantissa.replace('-', MINUS)} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+
+
+def format_cell(value: Any, digits: int = 4) -> str:
+    """Return a table cell: None is a dash, whole numbers stay whole, text stays as it is."""
+    if value is None:
+        return DASH
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", MINUS)
+    if isinstance(value, float):
+        return format_number(value, digits)
+    return str(value)
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a cell is aligned to the right: numbers, and the dash that stands for one."""
+    return value is None or (hasattr(value, "__float__") and not isinstance(value, bool | str))

@@ -1,0 +1,59 @@
+"""From a matplotlib figure to an SVG string that repeats byte for byte and can stand inside a page.
+
+No date, no metadata, salted identifiers that are unique in the page, coordinates to 0.01 pt, colours as the
+page's variables (with the colour itself as fallback), text as text.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+from reports.figures.style import VARIABLES
+
+_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_IDENTIFIER = re.compile(r'\sid="([^"]+)"')
+_FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
+_HEX = re.compile("|".join(VARIABLES))
+
+
+def to_svg(drawing: Any, key: str) -> str:
+    """Return the figure as one `<svg>` element; `key` makes its identifiers unique in the page."""
+    buffer = io.StringIO()
+    drawing.savefig(buffer, format="svg", bbox_inches=None,
+                    metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg"):]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.S)
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.S)
+    text = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", text, flags=re.S)  # would leak into the page
+    text = _NUMBER.sub(lambda match: f"{float(match.group()):.2f}".rstrip("0").rstrip("."), text)
+    return _themed(_fitted(_own_identifiers(text, key))).strip()
+
+
+def _fitted(text: str) -> str:
+    """Drop the fixed size: the page decides, the viewBox keeps the proportions."""
+    head, rest = text.split(">", 1)
+    width = re.search(r'\swidth="([\d.]+)pt"', head)
+    natural = round(float(width.group(1)) * 4 / 3) if width else 400
+    head = re.sub(r'\s(width|height|version|xmlns:xlink)="[^"]*"', "", head)
+    head += f' xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {natural * 1.3:.0f}px"'
+    return f"{head}>{rest}"
+
+
+def _own_identifiers(text: str, key: str) -> str:
+    """Keep only the identifiers that something refers to, prefixed by the figure's key."""
+    referred = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+
+    def renamed(match: re.Match[str]) -> str:
+        return f' id="{key}-{match.group(1)}"' if match.group(1) in referred else ""
+
+    text = _IDENTIFIER.sub(renamed, text)
+    return re.sub(r'(url\(#|href="#)', rf"\g<1>{key}-", text)
+
+
+def _themed(text: str) -> str:
+    """Let the page choose colours and font."""
+    text = _FONT.sub("var(--sans, sans-serif)", text)
+    return _HEX.sub(lambda match: f"var(--{VARIABLES[match.group()]}, {match.group()})", text)

@@ -1,0 +1,59 @@
+"""Put records and figures into the templates: one self-contained page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from reports.figures import RECIPES
+from reports.figures.figure import Figure, NotComputed, Recipe, draw
+from reports.figures.numbers import format_cell, format_number, is_number
+from reports.pages.formulas import formula, prose
+from reports.pages.legend import swatch
+from reports.pages.records import OUTCOMES, Claim, Evidence, Verdict
+from reports.pages.sections import SECTIONS
+
+# The mark that goes with each outcome: shape as well as colour.
+OUTCOME_MARKS = dict(zip(OUTCOMES, ("✓", "≈", "✕", "○", "…"), strict=True))
+OUTCOME_CLASSES = dict(zip(OUTCOMES, ("good", "limited", "bad", "open", "absent"), strict=True))
+
+
+def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
+    """Return the report as one HTML document."""
+    drawn = [(recipe.section, draw(recipe, evidence.inputs)) for recipe in recipes]
+    figures: dict[str, list[Figure | NotComputed]] = {}
+    for section, figure in drawn:
+        figures.setdefault(section, []).append(figure)
+    page = _environment().get_template("page.html.j2")
+    return page.render(
+        evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
+        counts=count_outcomes(evidence.claims), outcomes=OUTCOMES,
+    )
+
+
+def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
+    """Return how many records have each outcome, those that occur only."""
+    counts = {outcome: sum(record.outcome == outcome for record in claims) for outcome in OUTCOMES}
+    return {outcome: count for outcome, count in counts.items() if count}
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("reports.pages", "templates"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )
+    environment.filters.update(
+        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
+        mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
+    )
+    environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
+    return environment
+
+
+def _labelled(panel: Any) -> Markup:
+    """Return a panel's SVG as an image with its description."""
+    label = Markup.escape(panel.alt)
+    return Markup(panel.svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))

@@ -1,0 +1,150 @@
+"""What the report is built from: plain records. Every field of Evidence may be empty; an empty one is printed
+as "not computed in this run", never as a number.
+
+Whoever computes something turns it into one of these; the pages know nothing else. Formulas are LaTeX without
+dollar signs. `outcome` is one of OUTCOMES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from reports.figures.figure import Figure, Numbers
+
+REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = (
+    "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
+)
+OUTCOMES = (REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One sentence of the first page; `link` is the id of the section that proves it."""
+
+    topic: str
+    outcome: str
+    sentence: str
+    link: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One line of the ledger. `headline` is the telling number in a few words, `fails` where it does not hold."""
+
+    id: str
+    statement: str
+    place: str
+    outcome: str
+    headline: str
+    quantity: str = ""
+    conditions: str = ""  # the range over which it was computed
+    tolerance: str = ""
+    fails: str = ""
+    numbers: Numbers | None = None
+    figure: Figure | None = None
+    inputs: tuple[str, ...] = ()  # names of runs and tables
+
+
+@dataclass(frozen=True)
+class ProofStep:
+    """One step: a formula (may be empty) and why it follows."""
+
+    formula: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A theorem, lemma or erratum that a machine checked, with the wrong twin that it refused."""
+
+    key: str
+    title: str
+    place: str
+    statement: str
+    assumptions: tuple[str, ...]
+    steps: tuple[ProofStep, ...]
+    verified: bool
+    certificate: str
+    twin: str = ""
+    twin_refused: bool | None = None
+    counterexample: str = ""
+
+
+@dataclass(frozen=True)
+class Property:
+    """A law tried on random and on nasty inputs, and the planted fault that it must catch."""
+
+    law: str
+    cases: int
+    worst: str
+    bound: str
+    holds: bool
+    fault: str = ""
+    fault_caught: bool | None = None
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """A quantity of the engine against somebody else's."""
+
+    quantity: str
+    against: str
+    cases: int
+    worst: float
+    tolerance: float
+    agrees: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A named problem with an exact answer; `results` has one (method, error, energy gain, outcome) per method."""
+
+    name: str
+    source: str
+    expects: str
+    results: tuple[tuple[str, float | None, float | None, str], ...]
+
+
+@dataclass(frozen=True)
+class SceneEffect:
+    """One effect of a scene: on or off, why, what it costs and what leaving it out would change."""
+
+    name: str
+    active: bool
+    reason: str
+    cost: str = ""
+    consequence: str = ""
+
+
+@dataclass(frozen=True)
+class StoredFile:
+    """One line of the manifest: a run or table file, what it holds, and the command that makes it again."""
+
+    name: str
+    file: str
+    key: str
+    content_hash: str
+    command: str
+    size: int | None = None  # bytes
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything the report may show. `inputs` holds runs and tables by the names that the figures ask for."""
+
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+    scenes: Mapping[str, Any] = field(default_factory=dict)  # scene name -> resolved scene (plain dictionary)
+    verdicts: tuple[Verdict, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    proofs: tuple[Proof, ...] = ()
+    properties: tuple[Property, ...] = ()
+    cross_checks: tuple[CrossCheck, ...] = ()
+    hard_cases: tuple[HardCase, ...] = ()
+    accuracy: Numbers | None = None  # the table beside the work-precision figure
+    effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    manifest: tuple[StoredFile, ...] = ()
+    figure_command: str = "iapb reproduce --figure {key}"
