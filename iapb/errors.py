@@ -38,7 +38,7 @@ class RangeError(IapbError, OverflowError):
 class Mistake:
     """One mistake of a scene file: where it stands, what it says, what was expected.
 
-    Lines and columns count from 1; `path` is the field's path, such as ``bodies[0].mass``.
+    Lines and columns count from 1; 0 where the value was not read from the file. `path` is the field's path, such as ``bodies[0].mass``.
     """
 
     file: str
@@ -49,7 +49,8 @@ class Mistake:
     expected: str
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}: {self.path} = {self.value}: expected {self.expected}"
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        return f"{place}: {self.path} = {self.value}: expected {self.expected}"
 
 
 class SceneError(IapbError, ValueError):

@@ -1,0 +1,122 @@
+"""What all parts of a scene share: finite bounded numbers, names, and errors that name the known fields."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+LARGEST_NUMBER = 1e9  # SI units; products of four such numbers stay far inside double precision
+SMALLEST_POSITIVE = (
+    1e-12  # what must be positive is divided by; its inverse square still is an ordinary number
+)
+
+_FINITE = {"strict": True, "allow_inf_nan": False}
+Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE)]
+Positive = Annotated[float, Field(ge=SMALLEST_POSITIVE, le=LARGEST_NUMBER, **_FINITE)]
+NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST_NUMBER, **_FINITE)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0, **_FINITE)]
+Vector2 = tuple[Number, Number]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
+Text = Annotated[str, Field(max_length=2000, strict=True)]
+
+
+OURS, MISSING = "scene", "scene_missing"  # types of our errors: their message is what was expected
+
+
+def expectation(expected: str, kind: str = OURS) -> PydanticCustomError:
+    """Return the error of a field that breaks a rule of ours; its message is what was expected."""
+    return PydanticCustomError(kind, "{expected}", {"expected": expected})
+
+
+def located(where: tuple[str | int, ...], value: Any, expected: str, kind: str = OURS) -> InitErrorDetails:
+    """Return one mistake at a path, for a check that looks at several fields at once."""
+    return InitErrorDetails(type=expectation(expected, kind), loc=where, input=value)
+
+
+class Part(BaseModel):
+    """A mapping of the scene file: immutable, no field but those declared."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+    @classmethod
+    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+        """Return the mistakes that only show when several parts are seen together."""
+        return []
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _all_at_once(cls, given: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
+        """Report field mistakes and those across fields together; an unknown field hears the known ones."""
+        mistakes: list[InitErrorDetails] = []
+        try:
+            part = validate(given)
+        except ValidationError as failure:
+            mistakes = [
+                cls._readable(error)
+                for error in failure.errors(include_url=False)
+                if not _follows_from_others(error)
+            ]
+        mistakes += cls.across_fields(given)
+        if mistakes:
+            raise ValidationError.from_exception_data(cls.__name__, mistakes)
+        return part
+
+    @classmethod
+    def _readable(cls, error: Any) -> InitErrorDetails:
+        """Turn pydantic's error into one of ours, whose message says what was expected."""
+        where, kind, value, expected = error["loc"], error["type"], error["input"], error["msg"]
+        if kind not in (OURS, MISSING):
+            expected = expected_of(error)
+        if kind == "extra_forbidden" and len(where) == 1:
+            expected = _known_fields(str(where[0]), tuple(cls.model_fields))
+        if kind == "missing":
+            field = cls.model_fields.get(str(where[0])) if len(where) == 1 else None
+            expected = f"this field: {field.description}" if field else "one item more in this list"
+        if kind == "union_tag_not_found":
+            where, kind = (*where, "kind"), MISSING
+        if kind == "union_tag_invalid":
+            where, value = (*where, "kind"), value["kind"]
+        return located(where, value, expected, MISSING if kind in ("missing", MISSING) else OURS)
+
+
+def _known_fields(wrong: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(wrong, known, n=1)
+    guess = f" (did you mean {near[0]}?)" if near else ""
+    return f"one of the known fields{guess}: {', '.join(known)}"
+
+
+_EXPECTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "finite_number": "a finite number",
+    "greater_than_equal": "a number >= {ge}",
+    "less_than_equal": "a number <= {le}",
+    "string_pattern_mismatch": "a name: a letter or _, then up to 63 letters, digits, _ or -",
+    "string_too_long": "a text of at most {max_length} characters",
+    "literal_error": "one of {expected}",
+    "tuple_type": "a list",
+    "too_short": "at least {min_length} items",
+    "too_long": "at most {max_length} items",
+    "model_type": "a mapping of fields",
+    "model_attributes_type": "a mapping of fields",
+    "dict_type": "a mapping of fields",
+    "union_tag_not_found": "this field: which shape it is",
+    "union_tag_invalid": "one of {expected_tags}",
+}
+
+
+def expected_of(error: Any) -> str:
+    """Return what was expected, in the words of a scene's author."""
+    template = _EXPECTED.get(error["type"])
+    return template.format(**error.get("ctx", {})) if template else error["msg"]
+
+
+def _follows_from_others(error: Any) -> bool:
+    """Return whether a list is called too short only because its wrong items were left out."""
+    given = error["input"]
+    return error["type"] == "too_short" and len(given) >= error["ctx"]["min_length"]
