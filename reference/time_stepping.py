@@ -121,8 +121,14 @@ def rigid_step(
     """
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization)
     v_free = velocity + dt * np.linalg.solve(mass_matrix, force)
-    impulse = np.zeros(len(gap))
-    kept = np.isfinite(bound)
+    return nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
+
+
+def nearest_velocity(
+    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
+) -> RigidStep:
+    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf leaves a row out."""
+    impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
     if (offset >= 0.0).all():  # nothing is touched: the common step of free motion
         return RigidStep(v_free, impulse, 0.0)
@@ -130,8 +136,7 @@ def rigid_step(
     rows = np.linalg.solve(cholesky, contact_jacobian[kept].T).T
     scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
     impulse[kept], residual = _solve_step(rows, offset, scale)
-    v_plus = v_free + np.linalg.solve(cholesky.T, rows.T @ impulse[kept])
-    return RigidStep(v_plus, impulse, residual)
+    return RigidStep(v_free + np.linalg.solve(cholesky.T, rows.T @ impulse[kept]), impulse, residual)
 
 
 def velocity_bounds(

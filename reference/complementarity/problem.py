@@ -18,9 +18,13 @@ from iapb.errors import ArgumentError, SolverError
 
 Floats = NDArray[np.float64]
 
-# Rounding of n products keeps W symmetric, and its eigenvalues above zero, to n·eps; files printed with
-# 12 digits (the bowl problems) to 1e-11. Above this the matrix itself is asymmetric or indefinite.
+# Rounding of n products keeps W symmetric to n·eps, files printed with 12 digits to 1e-11; above this the
+# matrix itself is asymmetric.
 SYMMETRY_TOLERANCE = 1e-9
+
+# W made in single precision, or by subtraction, has eigenvalues down to -1e-7 of the largest. Up to here the
+# nearest semidefinite W is solved instead; the solution is still judged by the W that was given.
+INDEFINITE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -198,7 +202,7 @@ def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:
 def _eigen_factor(delassus: Floats) -> Floats:
     eigenvalues, vectors = np.linalg.eigh(0.5 * (delassus + delassus.T))
     largest = np.abs(eigenvalues).max(initial=0.0)
-    if eigenvalues.min(initial=0.0) < -SYMMETRY_TOLERANCE * largest:
+    if eigenvalues.min(initial=0.0) < -INDEFINITE_TOLERANCE * largest:
         ratio = eigenvalues.min() / largest
         raise SolverError(f"refused: W is indefinite (relative eigenvalue {ratio:.1e}), not convex")
     return vectors * np.sqrt(np.clip(eigenvalues, 0.0, None))

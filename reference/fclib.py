@@ -1,0 +1,165 @@
+"""FCLIB: the HDF5 format of the FrictionalContactLibrary, read and written (normal component first).
+
+fclib_local : u = W r + q;  fclib_global : M v = H r + f, u = Hᵀ v + w. Both with friction mu per contact, and
+a solution (r, u, v) that counts as absent when it is all zeros, as in files that were never solved.
+Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D frictional contact problems (2014).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from reference.complementarity.problem import ImpactProblem
+from reference.datasets import DatasetError, StoredProblem
+
+Floats = NDArray[np.float64]
+
+_COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
+
+
+def read_fclib(path: Path | str) -> StoredProblem:
+    """Read a local or global FCLIB problem as an ImpactProblem with friction.
+
+    A global problem is condensed: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f; its mechanics comes along (J = Hᵀ).
+    """
+    path, h5py = Path(path), _h5py()
+    try:
+        with h5py.File(path, "r") as file:
+            kinds = [name for name in ("fclib_local", "fclib_global") if name in file]
+            if not kinds:
+                raise DatasetError(path, "is HDF5 but holds neither fclib_local nor fclib_global")
+            group = file[kinds[0]]
+            reader = _read_local if kinds[0] == "fclib_local" else _read_global
+            problem = reader(path, group)
+            remark = " ".join(_string(group, "info/title").split())
+            return StoredProblem(problem, _stored_impulse(file, problem.size), remark, kinds[0])
+    except (OSError, KeyError, RuntimeError) as error:
+        raise DatasetError(path, f"cannot be read: {error}") from error
+    except IapbError as error:
+        if isinstance(error, DatasetError):
+            raise
+        raise DatasetError(path, str(error)) from error
+
+
+def write_fclib(
+    path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None
+) -> None:
+    """Write a problem (and its solution) as fclib_local; W is stored in full as compressed rows.
+
+    A frictionless problem is written with two zero tangential components per contact and mu = 0. A restitution
+    is written into q, which FCLIB's law needs; reading back gives the same complementarity problem with e = 0.
+    """
+    h5py = _h5py()
+    w, q, r, size = _three_components(problem, impulse)
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fclib_local")
+        _write_rows(group.create_group("W"), w)
+        group["vectors/q"], group["vectors/mu"] = q, problem.friction_or_zero
+        group["spacedim"] = np.array([size], np.int32)
+        group["info/title"] = np.bytes_(title or problem.name or "iapb")
+        if r is not None:
+            file["solution/r"], file["solution/u"] = r, w @ r + q
+
+
+def _h5py() -> Any:
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingDependencyError("h5py", "FCLIB files", "pip install h5py") from error
+    return h5py
+
+
+def _read_local(path: Path, group: Any) -> ImpactProblem:
+    q, mu = _vector(group, "vectors/q"), _vector(group, "vectors/mu")
+    w = _matrix(path, group["W"], "W")
+    size = _spacedim(path, group, len(mu), len(q))
+    return ImpactProblem.from_delassus(w, q, 0.0, mu, contact_size=size, name=path.name)
+
+
+def _read_global(path: Path, group: Any) -> ImpactProblem:
+    mass, h = _matrix(path, group["M"], "M"), _matrix(path, group["H"], "H")
+    f, w, mu = (_vector(group, f"vectors/{name}") for name in ("f", "w", "mu"))
+    if mass.shape != (len(f), len(f)) or h.shape != (len(f), len(w)):
+        raise DatasetError(path, f"shapes M {mass.shape}, H {h.shape}, f {f.shape}, w {w.shape} do not fit")
+    size, free = _spacedim(path, group, len(mu), len(w)), np.linalg.solve(mass, f)
+    problem = ImpactProblem.from_impact(mass, h.T, free, 0.0, mu, contact_size=size, name=path.name)
+    if not w.any():
+        return problem
+    shifted = problem.gamma_minus + w  # the constant w has no velocity of its own: keep W and q only
+    return ImpactProblem.from_delassus(problem.delassus, shifted, 0.0, mu, contact_size=size, name=path.name)
+
+
+def _spacedim(path: Path, group: Any, contacts: int, components: int) -> int:
+    size = int(np.asarray(group["spacedim"]).ravel()[0])
+    if size not in (2, 3) or contacts * size != components:
+        raise DatasetError(
+            path, f"spacedim {size}, {contacts} contacts and {components} components do not fit"
+        )
+    return size
+
+
+def _vector(group: Any, name: str) -> Floats:
+    return np.asarray(group[name], np.float64).ravel()
+
+
+def _string(group: Any, name: str) -> str:
+    return bytes(group[name][()]).decode("utf-8", "replace").rstrip("\0") if name in group else ""
+
+
+def _matrix(path: Path, group: Any, name: str) -> Floats:
+    """Return a CXSparse matrix as a dense array."""
+    from scipy import sparse
+
+    m, n, nz = (int(np.asarray(group[key]).ravel()[0]) for key in ("m", "n", "nz"))
+    i, p, x = (np.asarray(group[key]).ravel() for key in ("i", "p", "x"))
+    try:
+        if nz in (_ROWS, _COLUMNS):
+            compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
+            compressed.check_format(full_check=True)  # an index out of range would write outside the array
+            return compressed.toarray()
+        return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).toarray()
+    except (ValueError, IndexError) as error:
+        raise DatasetError(path, f"matrix {name} is damaged: {error}") from error
+
+
+def _stored_impulse(file: Any, size: int) -> Floats | None:
+    if "solution/r" not in file:
+        return None
+    r = _vector(file, "solution/r")
+    return r if r.any() and len(r) == size else None  # all zeros: a placeholder, never a reference
+
+
+def _three_components(
+    problem: ImpactProblem, impulse: Floats | None
+) -> tuple[Floats, Floats, Floats | None, int]:
+    """W, q, r and components per contact in FCLIB's layout, which knows 2 or 3 components only."""
+    if problem.relaxed:
+        raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
+    if problem.contact_size > 1:
+        return problem.delassus, problem.offset, impulse, problem.contact_size
+    n = problem.size
+    w, q = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
+    w[::3, ::3], q[::3] = problem.delassus, problem.offset
+    if impulse is None:
+        return w, q, None, 3
+    r = np.zeros(3 * n)
+    r[::3] = impulse
+    return w, q, r, 3
+
+
+def _write_rows(group: Any, matrix: Floats) -> None:
+    from scipy import sparse
+
+    rows = sparse.csr_matrix(matrix)
+    for name, number in (("m", rows.shape[0]), ("n", rows.shape[1]), ("nz", _ROWS), ("nzmax", rows.nnz)):
+        group[name] = np.array([number], np.int32)
+    group["i"], group["p"], group["x"] = (
+        rows.indices.astype(np.int32),
+        rows.indptr.astype(np.int32),
+        rows.data,
+    )

@@ -1,0 +1,147 @@
+"""Problem files: read as written, written as read, and damaged ones named."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from reference.complementarity import ImpactProblem, Solution, solve
+from reference.datasets import DatasetError, problem_files, read_problem
+from reference.fclib import write_fclib
+
+PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
+shared = pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")
+
+# Known solutions from the sources that the files name.
+KNOWN = {
+    "lcp_CPS_2.dat": [0.0, 1.0, 3.0],
+    "lcp_deudeu.dat": [4.0 / 3.0, 7.0 / 3.0],
+    "lcp_Pang_isolated_sol.dat": [1.0, 0.0, 0.0],
+}
+
+
+@shared
+@pytest.mark.parametrize("name", KNOWN)
+def test_siconos_files_are_read_by_columns(name: str) -> None:
+    """The solution of the book solves the matrix read by columns, and not its transpose."""
+    problem = read_problem(PROBLEMS / "lcp" / name).problem
+    solution = np.array(KNOWN[name])
+    assert Solution(problem, solution).solved(1e-14)
+    transposed = ImpactProblem.from_delassus(problem.delassus.T, problem.gamma_minus)
+    assert problem.asymmetry == 0.0 or not Solution(transposed, solution).solved(1e-3)
+
+
+@shared
+def test_every_file_is_read_or_refused_by_name() -> None:
+    files = problem_files(PROBLEMS)
+    assert {path.suffix for path in files} == {".gz", ".dat", ".txt", ".hdf5"}
+    refused = []
+    for path in files:
+        try:
+            stored = read_problem(path)
+        except DatasetError as error:
+            refused.append((path.name, str(error)))
+            continue
+        assert stored.problem.name == path.name and stored.format
+    assert [name for name, _ in refused] == ["mlcpTest001.txt"] and "BILATERAL" in refused[0][1]
+
+
+@shared
+@pytest.mark.parametrize("name", ["mlcpTest006.txt", "mlcpTest007.txt"])
+def test_stored_multipliers_are_judged_and_agree_by_velocities(name: str) -> None:
+    stored = read_problem(PROBLEMS / "mlcp" / name)
+    assert Solution(stored.problem, stored.stored_impulse).solved(1e-12)
+    ours = solve(stored.problem, "daqp")
+    assert ours.gamma_plus == pytest.approx(stored.problem.gamma_plus(stored.stored_impulse), abs=1e-12)
+
+
+@shared
+@pytest.mark.parametrize("name", ["bowl.21.dynamics.lcp.gz", "bowl.5.dynamics.lcp.gz"])
+def test_hyperstatic_bowls_agree_by_velocities_not_impulses(name: str) -> None:
+    problem = read_problem(PROBLEMS / "lcp" / name).problem
+    scale = np.abs(problem.gamma_minus).max()
+    lemke, daqp = solve(problem, "lemke"), solve(problem, "daqp")
+    assert lemke.solved(1e-9) and daqp.solved(1e-9)
+    assert np.abs(lemke.gamma_plus - daqp.gamma_plus).max() <= 1e-8 * scale
+
+
+@shared
+def test_placeholder_solutions_of_fclib_are_no_solutions() -> None:
+    stored = read_problem(PROBLEMS / "fclib" / "Box_Stacks-i0122-82-5.hdf5")
+    assert stored.stored_impulse is None
+    assert (stored.problem.contacts, stored.problem.contact_size) == (82, 3)
+    w = stored.problem.delassus
+    assert np.linalg.eigvalsh(w).min() >= -1e-12 * np.abs(w).max()
+
+
+@pytest.mark.parametrize("friction", [None, [0.3, 0.5]])
+def test_fclib_round_trip(tmp_path: Path, friction: list[float] | None) -> None:
+    rng = np.random.default_rng(0)
+    components = 2 if friction is None else 6
+    rows = rng.normal(size=(components, 4))
+    problem = ImpactProblem.from_impact(
+        np.eye(4), rows, rng.normal(size=4), 0.5, friction, name="two contacts"
+    )
+    impulse = solve(problem, "daqp").impulse if friction is None else rng.uniform(size=6)
+    write_fclib(tmp_path / "two.hdf5", problem, impulse=impulse)
+    back = read_problem(tmp_path / "two.hdf5")
+    assert back.remark == "two contacts" and back.problem.contacts == 2
+    step = 3 if friction is None else 1
+    assert np.array_equal(back.problem.delassus[::step, ::step], problem.delassus)
+    assert np.array_equal(back.problem.gamma_minus[::step], problem.offset)
+    assert np.array_equal(back.stored_impulse[::step], impulse)
+    assert np.array_equal(back.problem.friction, problem.friction_or_zero)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("cut.lcp", b"2 1 0 0 1 -1", "6 numbers, expected 7"),
+        ("words.lcp", b"2 1 0 zero 1 -1 -1", "number expected"),
+        ("nan.lcp", b"1 nan -1", "not finite"),
+        ("size.lcp", b"2.5 1", "size 2.5"),
+        ("huge.lcp", b"1e9 1", "size 1e\\+09"),
+        ("empty.lcp", b"", "is empty"),
+        ("torn.lcp.gz", gzip.compress(b"1 1 -1")[:-6], "cannot be read"),
+        ("binary.lcp", b"\xff\xfe\x00", "not a text file"),
+        ("sparse.dat", b"2 1 2 2 2 2 1 1", "storage flag 1"),
+        ("sizes.dat", b"2 0 3 3 3 3 1 1", "differ from"),
+        ("head.dat", b"2 0", "header"),
+        ("cut.txt", b"# t\nE = ( 1 )\n", "end mark"),
+        ("other.txt", b"hello\n== END ==\n", "no entry 'E'"),
+        ("foreign.hdf5", b"not hdf5 at all", "cannot be read"),
+        ("picture.png", b"", "unknown kind"),
+    ],
+)
+def test_damaged_and_foreign_files_are_named(tmp_path: Path, name: str, content: bytes, says: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(DatasetError, match=f"{name}.*{says}"):
+        read_problem(path)
+
+
+def test_missing_files_and_folders(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="cannot be read"):
+        read_problem(tmp_path / "absent.lcp")
+    with pytest.raises(ArgumentError, match="existing folder"):
+        problem_files(tmp_path / "absent")
+    (tmp_path / "README.md").write_text("x")
+    assert problem_files(tmp_path) == []
+
+
+def test_a_damaged_fclib_matrix_is_named(tmp_path: Path) -> None:
+    import h5py
+
+    write_fclib(tmp_path / "w.hdf5", ImpactProblem.from_delassus(np.eye(2), [1.0, 1.0]))
+    with h5py.File(tmp_path / "w.hdf5", "r+") as file:
+        file["fclib_local/W/i"][0] = 99
+    with pytest.raises(DatasetError, match="matrix W is damaged"):
+        read_problem(tmp_path / "w.hdf5")
+    with h5py.File(tmp_path / "w.hdf5", "r+") as file:
+        del file["fclib_local/vectors/mu"]
+    with pytest.raises(DatasetError, match="cannot be read"):
+        read_problem(tmp_path / "w.hdf5")

@@ -1,0 +1,185 @@
+"""Trajectories: exact events by hand and by energy; time stepping against them and against another's file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from reference.complementarity import ImpactProblem
+from reference.complementarity.laws import Outcome, poisson
+from reference.event_driven import LinearSystem, event_driven
+from reference.moreau_jean import moreau_jean
+from reference.time_stepping import rigid_step
+
+PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
+
+
+def ball(e: float, mass: float = 1.0) -> LinearSystem:
+    return LinearSystem([[mass]], [-9.81 * mass], [[1.0]], [0.0], e)
+
+
+def row_of_balls(masses: list[float], e: float, wall: float | None = None) -> LinearSystem:
+    """Balls on a line, coordinates left to right, radius absorbed; a wall on the right where given."""
+    n = len(masses)
+    rows = [[-1.0 if j == i else 1.0 if j == i + 1 else 0.0 for j in range(n)] for i in range(n - 1)]
+    starts = [0.0] * (n - 1)
+    if wall is not None:
+        rows, starts = [*rows, [*([0.0] * (n - 1)), -1.0]], [*starts, wall]
+    return LinearSystem(np.diag(masses), np.zeros(n), np.reshape(rows, (-1, n)), starts, e)
+
+
+def energy(system: LinearSystem, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return 0.5 * np.einsum("ti,ij,tj->t", v, system.mass_matrix, v) - q @ system.force
+
+
+def test_ball_bounces_at_the_times_of_the_textbook() -> None:
+    e, height, g = 0.8, 1.0, 9.81
+    exact = event_driven(ball(e), [height], [0.0], 2.0)
+    fall = np.sqrt(2.0 * height / g)
+    expected = fall * np.array([0.0, 1.0, 1.0 + 2.0 * e, 1.0 + 2.0 * e + 2.0 * e**2])
+    assert exact.event_time[:4] == pytest.approx(expected, rel=1e-14)
+    assert exact.v[1, 0] == pytest.approx(e * g * fall, rel=1e-14)
+
+
+def test_accumulating_impacts_are_reported_not_crossed() -> None:
+    """Beyond fall (1 + e)/(1 − e) the ball rests; the trajectory ends before and says where."""
+    exact = event_driven(ball(0.5), [1.0], [0.0], 10.0, most_events=30)
+    limit = np.sqrt(2.0 / 9.81) * 1.5 / 0.5
+    assert exact.end <= limit and exact.end == pytest.approx(limit, rel=1e-6)
+    with pytest.raises(ArgumentError, match="times in"):
+        exact.state([5.0])
+
+
+def test_plastic_block_slides_into_the_corner_and_rests() -> None:
+    """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost momentum."""
+    rows, start = [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0]
+    system = LinearSystem(2.0 * np.eye(2), [1.0, -4.0], rows, start, 0.0)
+    exact = event_driven(system, [0.0, 0.25], [0.0, 0.0], 5.0)
+    assert exact.event_time == pytest.approx([0.0, 0.5, 2.0], rel=1e-14)
+    assert exact.impulse[1] == pytest.approx([2.0, 0.0]) and exact.impulse[2] == pytest.approx([0.0, 2.0])
+    q, v = exact.state([5.0])
+    assert q[0] == pytest.approx([1.0, 0.0], abs=1e-14) and np.abs(v).max() <= 1e-14
+
+
+def test_a_resting_contact_opens_when_the_force_lifts_it() -> None:
+    system = LinearSystem([[1.0]], [1.0], [[1.0]], [0.0], 0.0)
+    q, _ = event_driven(system, [0.0], [0.0], 2.0).state([2.0])
+    assert q[0, 0] == pytest.approx(2.0)
+
+
+def test_equal_elastic_balls_exchange_their_velocities() -> None:
+    system = row_of_balls([1.0, 1.0, 1.0], 1.0)
+    exact = event_driven(system, [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
+    assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
+
+
+@pytest.mark.skipif(not (PROBLEMS / "nimble_143.json").exists(), reason="shared problem files are not here")
+def test_two_balls_and_a_wall_keep_their_energy() -> None:
+    case = json.loads((PROBLEMS / "nimble_143.json").read_text())
+    x, v, radius, wall = case["x"], case["v"], case["radius"], case["wall"]
+    system = row_of_balls([1.0, 1.0], case["e"], wall - 3.0 * radius)
+    start = [x[0], x[1] - 2.0 * radius]
+    exact = event_driven(system, start, v, 1.0)
+    q, velocities = exact.state(np.linspace(0.0, 1.0, 101))
+    assert len(exact.event_time) == 4  # ball-ball, wall, ball-ball
+    assert np.abs(energy(system, q, velocities) - 2.0).max() <= 1e-13
+    stepped = moreau_jean(system, start, v, 1e-3, 1000)
+    assert energy(system, stepped.q, stepped.v) == pytest.approx(2.0, rel=1e-12)
+
+
+@pytest.mark.skipif(not (PROBLEMS / "trajectories").exists(), reason="shared problem files are not here")
+def test_moreau_ball_reproduces_the_siconos_reference() -> None:
+    reference = np.loadtxt(PROBLEMS / "trajectories" / "BouncingBallTS.ref", skiprows=1)
+    stepped = moreau_jean(ball(0.9), [1.0], [0.0], 0.005, len(reference) - 1)
+    ours = np.column_stack([stepped.time, stepped.q, stepped.v, stepped.impulse])
+    assert np.abs(ours - reference[:, :4]).max() <= 1e-12
+    assert np.abs(stepped.impulse[:, 0] - reference[:, 4]).max() <= 1e-12
+
+
+def moreau(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
+    stepped = moreau_jean(system, q, v, dt, steps)
+    return stepped.q, stepped.v
+
+
+def anitescu(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
+    states = [(np.array(q), np.array(v))]
+    for _ in range(steps):
+        at, moving = states[-1]
+        rows = system.rows
+        result = rigid_step(
+            system.mass_matrix,
+            moving,
+            system.force,
+            dt,
+            rows,
+            system.gap(at),
+            rows @ moving,
+            system.restitution,
+        )
+        states.append((at + dt * result.velocity, result.velocity))
+    positions, velocities = zip(*states, strict=True)
+    return np.array(positions), np.array(velocities)
+
+
+SCENES = {
+    "ball, e = 0.8": (ball(0.8), [1.0], [0.0], 1.3),
+    "ball, plastic": (ball(0.0), [1.0], [0.0], 0.8),
+    "block in a corner": (
+        LinearSystem(2.0 * np.eye(2), [1.0, -4.0], [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0], 0.0),
+        [0.0, 0.25], [0.0, 0.0], 3.0,
+    ),
+    "cradle": (row_of_balls([1.0, 2.0, 1.0], 0.6), [0.0, 0.51, 1.23], [1.0, 0.0, -0.3], 2.0),
+}  # fmt: skip
+
+
+COARSE, FINE = (
+    (97, 130, 200, 231, 310),
+    (1603, 2010, 2777, 3200, 4099),
+)  # odd counts: impacts fall anywhere in a step
+
+
+def error_per_step(scene: str, method: Callable, counts: tuple[int, ...]) -> np.ndarray:  # type: ignore[type-arg]
+    """Largest error divided by the step, over step counts: positions in the sup norm, velocities in L1."""
+    system, q, v, duration = SCENES[scene]
+    exact = event_driven(system, q, v, duration)
+    found = []
+    for n in counts:
+        dt = duration / n
+        stepped_q, stepped_v = method(system, q, v, dt, n)
+        true_q, true_v = exact.state(np.minimum(dt * np.arange(n + 1), exact.end))
+        found.append([np.abs(stepped_q - true_q).max() / dt, np.abs(stepped_v - true_v).sum(axis=0).max()])
+    return np.max(found, axis=0)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("method", [moreau, anitescu])
+def test_time_stepping_converges_at_first_order(scene: str, method: Callable) -> None:  # type: ignore[type-arg]
+    """The worst error divided by the step stays the same from some 200 to some 3000 steps (a factor 16)."""
+    coarse, fine = (error_per_step(scene, method, counts) for counts in (COARSE, FINE))
+    assert (fine <= 1.5 * coarse + 1e-9).all(), (coarse, fine)
+
+
+def test_the_order_check_sees_a_wrong_law() -> None:
+    """A law with the wrong restitution has an error that the step does not shrink."""
+
+    def wrong(system, q, v, dt, steps):  # type: ignore[no-untyped-def]
+        return moreau(LinearSystem(*(getattr(system, x) for x in ("mass_matrix", "force", "rows", "start")), 0.7),
+                      q, v, dt, steps)  # fmt: skip
+
+    coarse, fine = (error_per_step("ball, e = 0.8", wrong, counts) for counts in (COARSE, FINE))
+    assert (fine > 5.0 * coarse).all()
+
+
+def test_the_law_of_the_impacts_is_the_callers() -> None:
+    def plastic(problem: ImpactProblem) -> Outcome:
+        return poisson(replace(problem, restitution=np.zeros(problem.contacts)))
+
+    system = row_of_balls([1.0, 1.0], 1.0)
+    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0).v[-1] == pytest.approx([0.0, 1.0])
+    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx([0.5, 0.5])
