@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,65 +34,51 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
     return np.array(q, np.float64), np.array(v, np.float64)
 
 
-def shapes_of(scene: Scene, mechanism: Mechanism | None = None) -> Shapes:
+def shapes_of(scene: Scene) -> Shapes:
     """Return the scene's shapes: those of the bodies in order, then the walls.
 
     A shape of a body that nothing moves (fixed to the world through and through) is static, like a wall.
-    The mechanism is not needed; it may be given as the other functions take it.
     """
     described = [_described(shape, _Frame.of(scene, owner)) for owner, shape in _owned_shapes(scene)]
     return make_shapes(described)
 
 
-def pairs_of(
-    scene: Scene, mechanism: Mechanism | None = None, shapes: Shapes | None = None
-) -> NDArray[np.int32]:
-    """Return the candidate pairs (k, 2) of shapes, the first of a moving body.
+def pairs_of(scene: Scene, shapes: Shapes) -> NDArray[np.int32]:
+    """Return the candidate pairs (k, 2) among the scene's shapes (`shapes_of`), the first of a moving body.
 
     Bodies of one tree are paired only where ``contact.self_collisions`` asks for it, and never when they are
     rigidly connected or neighbours across one joint: these touch by construction.
     """
     owners = [owner for owner, _ in _owned_shapes(scene)]
-    parts, roots = _rigid_parts(scene), _roots(scene)
-    pairs = candidate_pairs(shapes_of(scene) if shapes is None else shapes)
-    kept = [pair for pair in pairs if _may_touch(scene, parts, roots, owners[pair[0]], owners[pair[1]])]
+    links = _Links(scene)
+    kept = [pair for pair in candidate_pairs(shapes) if links.may_touch(owners[pair[0]], owners[pair[1]])]
     return np.array(kept, np.int32).reshape(-1, 2)
 
 
-def _may_touch(scene: Scene, parts: Sequence[int], roots: Sequence[int], a: int, b: int) -> bool:
-    """Return whether two bodies can touch (indices; -1 = a wall)."""
-    if a < 0 or b < 0 or roots[a] != roots[b]:
-        return True
-    part_a, part_b = parts[a], parts[b]
-    neighbours = part_a == part_b or _part_before(scene, parts, part_a) == part_b
-    neighbours = neighbours or _part_before(scene, parts, part_b) == part_a
-    return scene.contact.self_collisions and not neighbours
+class _Links:
+    """Which bodies hang together: by a weld (one rigid part), across one joint, or in one tree."""
 
+    def __init__(self, scene: Scene) -> None:
+        self.self_collisions = scene.contact.self_collisions
+        index = {body.name: i for i, body in enumerate(scene.bodies)}
+        self.root: list[int] = []  # of each body: the first body of its tree
+        self.part: list[int] = []  # of each body: the first body of its rigid part
+        self.carrier: dict[int, int] = {}  # of each part: the part that its joint sits on, -1 = the world
+        for i, body in enumerate(scene.bodies):
+            parent = -1 if body.parent == WORLD else index[body.parent]
+            welded = body.joint == "fixed" and parent >= 0
+            self.root.append(i if parent < 0 else self.root[parent])
+            self.part.append(self.part[parent] if welded else i)
+            if not welded:
+                self.carrier[i] = -1 if parent < 0 else self.part[parent]
 
-def _part_before(scene: Scene, parts: Sequence[int], part: int) -> int:
-    """Return the rigid part that carries a rigid part's joint; -1 = the world."""
-    parent = scene.bodies[part].parent
-    return -1 if parent == WORLD else parts[_index(scene, parent)]
-
-
-def _rigid_parts(scene: Scene) -> list[int]:
-    """Return for each body the first body of the rigid part that it belongs to."""
-    parts: list[int] = []
-    for i, body in enumerate(scene.bodies):
-        welded = body.joint == "fixed" and body.parent != WORLD
-        parts.append(parts[_index(scene, body.parent)] if welded else i)
-    return parts
-
-
-def _roots(scene: Scene) -> list[int]:
-    roots: list[int] = []
-    for i, body in enumerate(scene.bodies):
-        roots.append(i if body.parent == WORLD else roots[_index(scene, body.parent)])
-    return roots
-
-
-def _index(scene: Scene, name: str) -> int:
-    return next(i for i, body in enumerate(scene.bodies) if body.name == name)
+    def may_touch(self, a: int, b: int) -> bool:
+        """Return whether two bodies can touch (indices; -1 = a wall)."""
+        if a < 0 or b < 0 or self.root[a] != self.root[b]:
+            return True
+        part_a, part_b = self.part[a], self.part[b]
+        adjoining = part_a == part_b or self.carrier[part_a] == part_b or self.carrier[part_b] == part_a
+        return self.self_collisions and not adjoining
 
 
 def _owned_shapes(scene: Scene) -> list[tuple[int, Any]]:
@@ -134,13 +119,14 @@ class _Frame(NamedTuple):
         """Return the frame of a body's shapes; that of the world for walls and for bodies that nothing moves."""
         rotation, shift = np.eye(2), np.zeros(2)
         link = owner
+        index = {body.name: i for i, body in enumerate(scene.bodies)} if owner >= 0 else {}
         while link >= 0:
             body = scene.bodies[link]
             if body.joint != "fixed":
                 return cls(owner, np.eye(2), np.zeros(2))
             turn = _rotation(body.angle)
             rotation, shift = turn @ rotation, turn @ shift + np.array(body.origin)
-            link = -1 if body.parent == WORLD else _index(scene, body.parent)
+            link = -1 if body.parent == WORLD else index[body.parent]
         return cls(-1, rotation, shift)
 
 
