@@ -1,0 +1,1 @@
+"""The hand's side (paper V-C, VI): rendering of impulses, couplings between device and tool, the device."""

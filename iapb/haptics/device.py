@@ -1,0 +1,139 @@
+"""The haptic device: the protocol a real one keeps, and a simulated one (paper section VI: pure inertia).
+
+Coordinates are those of the hand-held tool, to which the device is kinematically equal. The compiled loop
+simulates its device in `iapb.haptics.kernels`; the class here is the same device for loops written in Python
+and for laws of one's own, with a constant mass matrix.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.contact.contacts import finite_vector
+from iapb.errors import ArgumentError
+
+Floats = NDArray[np.float64]
+
+
+class DeviceReading(NamedTuple):
+    """What the simulation knows of the device, d coordinates."""
+
+    q: Floats  # (d,) [m, rad]
+    v: Floats  # (d,) [m/s, rad/s]
+
+
+class Device(Protocol):
+    """Anything that a hand can hold: it tells where it is and takes a force for one step."""
+
+    def read(self) -> DeviceReading:
+        """Return the last measured position and velocity."""
+        ...
+
+    def apply(self, force: ArrayLike) -> None:
+        """Let the actuators give the generalized force (d,) [N, N m] for one step."""
+        ...
+
+
+class SimulatedDevice:
+    """Pure inertia M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with what real devices add.
+
+    Parameters
+    ----------
+    mass_matrix : (d, d)
+        Symmetric positive definite [kg, kg m²].
+    q, v : (d,)
+        Start; v defaults to rest.
+    dt : float [s]
+        Step length > 0.
+    damping : (d,), optional
+        Physical damping b [N s/m, N m s/rad]; default: none.
+    force_limit : (d,), optional
+        The actuators clip each component to ±limit [N, N m]; default: no limit.
+    delay : int
+        Steps that a reading takes to the simulation, and a force to the actuators.
+    resolution : (d,), optional
+        Smallest step of the position sensors [m, rad], 0 = exact. With sensors the velocity read is the
+        difference of the positions read, over one step: it jumps by resolution / dt.
+
+    Attributes
+    ----------
+    q, v : (d,)
+        True position and velocity.
+    hand_force : (d,)
+        What the hand does to the device [N, N m]; set it at any time.
+    """
+
+    def __init__(
+        self,
+        mass_matrix: ArrayLike,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        *,
+        dt: float,
+        damping: ArrayLike | None = None,
+        force_limit: ArrayLike | None = None,
+        delay: int = 0,
+        resolution: ArrayLike | None = None,
+    ) -> None:
+        mass = np.array(mass_matrix, np.float64)
+        size = len(mass) if mass.ndim else 0
+        self.q = finite_vector("q", q, size).copy()
+        self.v = np.zeros(size) if v is None else finite_vector("v", v, size).copy()
+        self.hand_force = np.zeros(size)
+        self._inverse_mass = _inverse(mass)
+        if not (np.isfinite(dt) and dt > 0.0):
+            raise ArgumentError("dt", dt, "a step length > 0")
+        if delay < 0:
+            raise ArgumentError("delay", delay, "a number of steps >= 0")
+        self._dt = float(dt)
+        self._damping = _per_coordinate("damping", damping, size, 0.0)
+        self._limit = _per_coordinate("force_limit", force_limit, size, np.inf)
+        self._resolution = _per_coordinate("resolution", resolution, size, 0.0)
+        self._readings = deque([DeviceReading(self._sensed(), self.v.copy())] * (delay + 1), delay + 1)
+        self._forces = deque([np.zeros(size)] * delay)
+
+    def read(self) -> DeviceReading:
+        """Return position and velocity as the simulation knows them: quantised and `delay` steps old."""
+        return self._readings[0]
+
+    def apply(self, force: ArrayLike) -> None:
+        """Advance one step under the hand and the actuators, which get `force` clipped and `delay` steps late."""
+        commanded = finite_vector("force", force, len(self.q))
+        self._forces.append(np.clip(commanded, -self._limit, self._limit))
+        total = self.hand_force + self._forces.popleft() - self._damping * self.v
+        before = self._sensed()
+        self.v = self.v + self._dt * (self._inverse_mass @ total)
+        self.q = self.q + self._dt * self.v
+        sensed = self._sensed()
+        velocity = np.where(self._resolution > 0.0, (sensed - before) / self._dt, self.v)
+        self._readings.append(DeviceReading(sensed, velocity))
+
+    def _sensed(self) -> Floats:
+        step = self._resolution
+        return np.where(step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q)
+
+
+def _inverse(mass_matrix: Floats) -> Floats:
+    """Inverse of a mass matrix, or an error that names it."""
+    expected = "a finite symmetric positive definite matrix (d, d)"
+    square = mass_matrix.ndim == 2 and mass_matrix.shape[0] == mass_matrix.shape[1]
+    if not square or not np.all(np.isfinite(mass_matrix)) or not np.array_equal(mass_matrix, mass_matrix.T):
+        raise ArgumentError("mass_matrix", mass_matrix, expected)
+    try:
+        np.linalg.cholesky(mass_matrix)
+    except np.linalg.LinAlgError:
+        raise ArgumentError("mass_matrix", mass_matrix, expected) from None
+    return np.asarray(np.linalg.inv(mass_matrix), np.float64)
+
+
+def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: float) -> Floats:
+    if values is None:
+        return np.full(size, default)
+    vector = np.array(values, np.float64)
+    if vector.shape != (size,) or not np.all(vector >= 0.0):
+        raise ArgumentError(name, values, f"{size} numbers >= 0")
+    return vector
