@@ -1,0 +1,39 @@
+"""Every statement is proved, its twins are refuted, and its printed and MathML forms can be made."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+from iapb.errors import ArgumentError
+from verification.proofs import all_proofs, check
+
+
+@pytest.mark.parametrize("name", all_proofs())
+def test_statement_is_proved(name: str) -> None:
+    record = check(name)
+    assert record.problems == ()
+    assert record.holds
+    assert record.twins, "a statement without a wrong twin shows nothing"
+    assert all(refutation.refuted for refutation in (*record.twins, *record.needed))
+
+
+@pytest.mark.parametrize("name", all_proofs())
+def test_printed_proof_lists_every_hypothesis_and_certificate_line(name: str) -> None:
+    record = check(name)
+    text = record.as_text()
+    for line in (*record.hypotheses, *(row for step in record.steps for row in step.certificate)):
+        assert line.words in text
+        assert line.text in text
+
+
+@pytest.mark.parametrize("name", all_proofs())
+def test_mathml_is_well_formed(name: str) -> None:
+    html = check(name).as_mathml()
+    ElementTree.fromstring(html.replace("&nbsp;", " "))
+    assert "$" not in html
+    assert "\\" not in html.replace('\\"', "")
+
+
+def test_unknown_name_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="theorem_1"):
+        check("theorem_0")

@@ -1,0 +1,52 @@
+"""Proofs that a machine checks: one file per statement, listed in the order in which they are read.
+
+    >>> from verification.proofs import all_proofs, check
+    >>> for name in all_proofs():
+    ...     record = check(name)
+    ...     print(record.name, record.verdict)
+
+A file holds one function `statement()` that returns a `Statement`; adding a proof is one file plus one name below.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from typing import TYPE_CHECKING
+
+from iapb.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from verification.proofs.statement import ProofRecord, Statement
+
+_NAMES = (
+    "theorem_1",
+    "theorem_2",
+)
+
+
+def all_proofs() -> tuple[str, ...]:
+    """Names of all statements, in reading order. Nothing is imported or checked yet."""
+    return _NAMES
+
+
+def load(name: str) -> Statement:
+    """The statement of this name, unchecked."""
+    if name not in _NAMES:
+        raise ArgumentError("name", name, "one of " + ", ".join(_NAMES))
+    module = importlib.import_module(f"verification.proofs.statements.{name}")
+    return module.statement()
+
+
+def check(name: str) -> ProofRecord:
+    """Build and check one statement.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no statement of this name.
+    """
+    from verification.proofs.checking import checked
+
+    started = time.perf_counter()
+    return checked(load(name), started)

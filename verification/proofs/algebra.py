@@ -1,0 +1,181 @@
+"""The free algebra in which operator identities are checked.
+
+An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters (matrices of a *named*
+size such as c x d, never a number), which do not commute; the scalars (e, alpha, ...) do. Two expressions are equal
+only if they have the same terms: no simplifier, no size, no sample takes part. A product whose sizes do not fit is
+refused, and so is a sum of different shapes.
+
+One rule beyond the free algebra: a 1 x 1 product equals its own transpose, so words of that shape are kept in one
+canonical order (`canonical`).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+from iapb.errors import ArgumentError
+
+ANY = "*"  # the size of a multiple of the identity: fits every square shape
+
+
+class Letter(NamedTuple):
+    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it stands transposed."""
+
+    name: str
+    rows: str
+    cols: str
+    flipped: bool = False
+
+    @property
+    def transposed(self) -> Letter:
+        return Letter(self.name, self.cols, self.rows, not self.flipped)
+
+
+Word = tuple[Letter, ...]
+Scalars = tuple[str, ...]  # a commutative monomial: its factors sorted, each as often as it occurs
+Term = tuple[Scalars, Word]
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """Sum of terms of one shape; `terms` maps (scalars, word) to a nonzero rational coefficient."""
+
+    terms: dict[Term, Fraction]
+    rows: str = ANY
+    cols: str = ANY
+
+    def __add__(self, other: Operand) -> Expression:
+        other = expression(other)
+        rows, cols = _common_shape(self, other)
+        total: defaultdict[Term, Fraction] = defaultdict(Fraction)
+        for part in (self.terms, other.terms):
+            for term, coefficient in part.items():
+                total[term] += coefficient
+        return Expression({t: k for t, k in total.items() if k}, rows, cols)
+
+    def __mul__(self, other: Operand) -> Expression:
+        other = expression(other)
+        rows, cols = _product_shape(self, other)
+        total: defaultdict[Term, Fraction] = defaultdict(Fraction)
+        for (scalars, word), k in self.terms.items():
+            for (more_scalars, more_word), factor in other.terms.items():
+                total[tuple(sorted(scalars + more_scalars)), word + more_word] += k * factor
+        return Expression({t: k for t, k in total.items() if k}, rows, cols)
+
+    def __neg__(self) -> Expression:
+        return expression(-1) * self
+
+    def __sub__(self, other: Operand) -> Expression:
+        return self + (-expression(other))
+
+    def __rsub__(self, other: Operand) -> Expression:
+        return expression(other) - self
+
+    def __radd__(self, other: Operand) -> Expression:
+        return self + other
+
+    def __rmul__(self, other: Operand) -> Expression:
+        return expression(other) * self
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression | int | Fraction) and expression(other).terms == self.terms
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self.terms.items()))
+
+    @property
+    def T(self) -> Expression:
+        """Transpose: every word reversed, every letter flipped."""
+        flipped = {(scalars, transposed(word)): k for (scalars, word), k in self.terms.items()}
+        return Expression(flipped, self.cols, self.rows)
+
+    @property
+    def is_scalar(self) -> bool:
+        return self.rows == self.cols == "1"
+
+    @property
+    def letters(self) -> set[Letter]:
+        return {letter for _, word in self.terms for letter in word}
+
+    def canonical(self) -> Expression:
+        """The same value with every 1 x 1 word replaced by the smaller of itself and its transpose."""
+        if not self.is_scalar:
+            return self
+        parts = ({(s, min(w, transposed(w))): k} for (s, w), k in self.terms.items())
+        return sum((Expression(part, "1", "1") for part in parts), Expression({}, "1", "1"))
+
+    def vanishes(self) -> bool:
+        """True if the expression is zero in the free algebra (1 x 1 words up to transposition)."""
+        return not self.canonical().terms
+
+    def ordered(self) -> Iterator[tuple[Term, Fraction]]:
+        """Terms in a fixed order, for printing: short words first, as a reader expects."""
+        return iter(sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1])))
+
+
+Operand = Expression | int | Fraction
+
+
+def expression(value: Operand) -> Expression:
+    """An expression from itself or from a rational number (a multiple of the identity)."""
+    if isinstance(value, Expression):
+        return value
+    if isinstance(value, int | Fraction):
+        return Expression({((), ()): Fraction(value)} if value else {})
+    raise ArgumentError("value", value, "an Expression, an int or a Fraction; floats are not exact")
+
+
+def matrix(name: str, rows: str, cols: str) -> Expression:
+    """A letter of shape rows x cols, both given as names such as "c" and "d"; "1" is the only number."""
+    return word_expression((Letter(name, rows, cols),))
+
+
+def vector(name: str, size: str) -> Expression:
+    """A column of the named size."""
+    return matrix(name, size, "1")
+
+
+def scalar(name: str) -> Expression:
+    """A commuting real unknown."""
+    return Expression({((name,), ()): Fraction(1)})
+
+
+def word_expression(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(1)) -> Expression:
+    """One term; its shape is read off the ends of the word."""
+    rows, cols = (word[0].rows, word[-1].cols) if word else (ANY, ANY)
+    return Expression({(scalars, word): coefficient}, rows, cols)
+
+
+def names_in(value: Expression) -> set[str]:
+    """Names of all letters and scalars that occur."""
+    return {letter.name for letter in value.letters} | {
+        name for scalars, _ in value.terms for name in scalars
+    }
+
+
+def transposed(word: Word) -> Word:
+    """The transpose of a word: reversed, each letter flipped."""
+    return tuple(letter.transposed for letter in reversed(word))
+
+
+def _product_shape(left: Expression, right: Expression) -> tuple[str, str]:
+    if left.cols == ANY:
+        return right.rows, right.cols
+    if right.rows == ANY:
+        return left.rows, left.cols
+    if left.cols != right.rows:
+        shapes = f"{left.rows}x{left.cols} times {right.rows}x{right.cols}"
+        raise ArgumentError("product", shapes, "inner sizes that agree")
+    return left.rows, right.cols
+
+
+def _common_shape(left: Expression, right: Expression) -> tuple[str, str]:
+    shapes = [(part.rows, part.cols) for part in (left, right) if part.rows != ANY]
+    lone_identity = len(shapes) == 1 and shapes[0][0] != shapes[0][1] and left.terms and right.terms
+    if len(set(shapes)) > 1 or lone_identity:
+        raise ArgumentError("sum", f"{left.rows}x{left.cols} + {right.rows}x{right.cols}", "equal shapes")
+    return shapes[0] if shapes else (ANY, ANY)

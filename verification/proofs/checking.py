@@ -1,0 +1,114 @@
+"""Checks a statement: its steps, its witness, the need for each hypothesis, and its wrong twins."""
+
+from __future__ import annotations
+
+import time
+
+from verification.proofs.algebra import names_in
+from verification.proofs.exact import FlintBackend, Instance, SympyBackend, all_hold, completed, holds
+from verification.proofs.notation import case_lines, fact_line, step_claim, step_lines
+from verification.proofs.statement import ProofRecord, Refutation, Statement, StepRecord, Twin, Without
+from verification.proofs.steps import Known, Refused, Step
+
+
+def checked(statement: Statement, started: float | None = None) -> ProofRecord:
+    """Check everything about a statement; the verdict is "proved" only if nothing at all is open.
+
+    `started` (time.perf_counter) lets the caller include the time spent on building the statement.
+    """
+    started = time.perf_counter() if started is None else started
+    known = Known((*statement.given, *statement.definitions))
+    steps = tuple(_checked_step(step, known) for step in statement.steps)
+    needed = tuple(_needed(without, statement) for without in statement.needed)
+    twins = tuple(_twin(twin, statement) for twin in statement.twins)
+    problems = tuple(
+        [f"step refused: {step.refusal}" for step in steps if not step.accepted]
+        + [f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted]
+        + _loose_ends(statement, known)
+    )
+    return ProofRecord(
+        name=statement.name,
+        title=statement.title,
+        source=statement.source,
+        statement=statement.statement,
+        hypotheses=tuple(fact_line(fact) for fact in statement.given),
+        definitions=tuple(fact_line(fact) for fact in statement.definitions),
+        steps=steps,
+        conclusions=tuple(fact_line(fact) for fact in statement.conclusions),
+        needed=needed,
+        twins=twins,
+        remarks=statement.remarks,
+        verdict="not proved" if problems else "proved",
+        problems=problems,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _checked_step(step: Step, known: Known) -> StepRecord:
+    refusal = ""
+    try:
+        step.verify(known)
+    except Refused as error:
+        refusal = str(error)
+    else:
+        if step.claim is not None:
+            known.add(step.claim)
+    return StepRecord(step_claim(step), step.because, step_lines(step), not refusal, refusal)
+
+
+def _needed(without: Without, statement: Statement) -> Refutation:
+    """Without this hypothesis, the others do not carry the theorem: an exact case."""
+    case = completed(without.instance, statement.definitions)
+    names = [fact.name for fact in statement.given]
+    others = [fact for fact in statement.given if fact.name != without.hypothesis]
+    dropped = [fact for fact in statement.given if fact.name == without.hypothesis]
+    false = [fact for fact in statement.conclusions if not holds(fact, case)]
+    refuted = (
+        without.hypothesis in names and all_hold(others, case) and not all_hold(dropped, case) and bool(false)
+    )
+    shown = false[0] if false else statement.conclusions[0]
+    title = f"without '{without.hypothesis}'"
+    return Refutation(title, fact_line(shown), case_lines(case), without.note, refuted)
+
+
+def _twin(twin: Twin, statement: Statement) -> Refutation:
+    """The twin's instance keeps every hypothesis and breaks the twin's claim: on both exact backends."""
+    case = completed(twin.instance, statement.definitions)
+    refuted = all_hold(statement.given, case) and not any(
+        holds(twin.claim, case, backend) for backend in (FlintBackend, SympyBackend)
+    )
+    return Refutation(twin.title, fact_line(twin.claim), case_lines(case), twin.note, refuted)
+
+
+def _loose_ends(statement: Statement, known: Known) -> list[str]:
+    """What would make the theorem say less than it seems: unused, unneeded or contradictory hypotheses."""
+    shown = {without.hypothesis for without in statement.needed}
+    open_ends = [f"hypothesis never used: {f.name}" for f in statement.given if f.name not in known.used]
+    open_ends += [
+        f"hypothesis not shown to be needed: {f.name}" for f in statement.given if f.name not in shown
+    ]
+    names = {fact.name for fact in statement.conclusions}
+    open_ends += [f"conclusion never reached: {name}" for name in statement.concludes if name not in names]
+    open_ends += _circular_definitions(statement)
+    if not statement.twins:
+        open_ends.append("no wrong twin")
+    if statement.given and not _speaks_of_something(statement, statement.witness):
+        open_ends.append("no exact case satisfies the hypotheses and the conclusions")
+    return open_ends
+
+
+def _circular_definitions(statement: Statement) -> list[str]:
+    """A definition may only name something new: its letter stands in no hypothesis and in nothing defined before."""
+    taken = {name for fact in statement.given for value in fact.expressions for name in names_in(value)}
+    found = []
+    for definition in statement.definitions:
+        new = names_in(definition.lhs)
+        if len(definition.lhs.terms) != 1 or len(new) != 1 or new & (taken | names_in(definition.rhs)):
+            found.append(f"not a definition: {definition.name}")
+        taken |= new | names_in(definition.rhs)
+    return found
+
+
+def _speaks_of_something(statement: Statement, witness: Instance | None) -> bool:
+    facts = (*statement.given, *statement.conclusions)
+    return witness is not None and all_hold(facts, completed(witness, statement.definitions))

@@ -1,0 +1,179 @@
+"""Exact values for the letters of a statement: rational matrices, on python-flint and, for a second opinion, on sympy.
+
+An `Instance` gives every letter a rational matrix and every scalar a rational number; `holds` then decides a fact by
+rational arithmetic alone. This is how wrong twins are refuted and how hypotheses are shown to be needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from iapb.errors import ArgumentError
+from verification.proofs.algebra import ANY, Expression
+from verification.proofs.facts import Definite, Entrywise, Equation, Fact, NonNegative, Nonzero
+
+Number = int | str | Fraction
+Rows = Sequence[Sequence[Number]]
+Matrix = tuple[tuple[Fraction, ...], ...]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """Exact values by letter name; a scalar is stored as a plain Fraction."""
+
+    values: Mapping[str, Matrix | Fraction]
+
+    def with_values(self, **changed: Number | Rows) -> Instance:
+        """The same instance with some letters changed."""
+        return Instance({**self.values, **instance(**changed).values})
+
+
+def instance(values: Mapping[str, Number | Rows] | None = None, /, **named: Number | Rows) -> Instance:
+    """Instance from numbers (scalars), lists of numbers (columns) and lists of rows; "1/3" is a third."""
+    return Instance({name: _exact(name, value) for name, value in {**(values or {}), **named}.items()})
+
+
+def _exact(name: str, value: Any) -> Matrix | Fraction:
+    if isinstance(value, int | str | Fraction):
+        return Fraction(value)
+    if isinstance(value, float):
+        raise ArgumentError(name, value, "an exact number (int, Fraction or a string such as '1/3')")
+    rows = [row if isinstance(row, list | tuple) else [row] for row in value]
+    return tuple(tuple(Fraction(entry) for entry in row) for row in rows)
+
+
+class FlintBackend:
+    """Rational matrices of python-flint."""
+
+    name = "python-flint"
+
+    @staticmethod
+    def matrix(rows: Sequence[Sequence[Fraction]]) -> Any:
+        from flint import fmpq, fmpq_mat
+
+        flat = [fmpq(entry.numerator, entry.denominator) for row in rows for entry in row]
+        return fmpq_mat(len(rows), len(rows[0]), flat)
+
+    @staticmethod
+    def number(value: Fraction) -> Any:
+        from flint import fmpq
+
+        return fmpq(value.numerator, value.denominator)
+
+    @staticmethod
+    def rows(value: Any) -> Matrix:
+        return tuple(tuple(Fraction(int(x.p), int(x.q)) for x in row) for row in value.tolist())
+
+
+class SympyBackend:
+    """Rational matrices of sympy."""
+
+    name = "sympy"
+
+    @staticmethod
+    def matrix(rows: Sequence[Sequence[Fraction]]) -> Any:
+        import sympy
+
+        return sympy.Matrix([[SympyBackend.number(entry) for entry in row] for row in rows])
+
+    @staticmethod
+    def number(value: Fraction) -> Any:
+        import sympy
+
+        return sympy.Rational(value.numerator, value.denominator)
+
+    @staticmethod
+    def rows(value: Any) -> Matrix:
+        return tuple(tuple(Fraction(int(x.p), int(x.q)) for x in value.row(i)) for i in range(value.rows))
+
+
+def identity_rows(size: int) -> Matrix:
+    return tuple(tuple(Fraction(int(i == j)) for j in range(size)) for i in range(size))
+
+
+def evaluate(value: Expression, given: Instance, backend: Any = FlintBackend) -> Matrix:
+    """The rational matrix an expression takes on an instance. Commuting scalars alone give a 1 x 1 matrix."""
+    sizes = _sizes(value, given)
+    shape = (1, 1) if value.rows == ANY else (sizes[value.rows], sizes[value.cols])
+    total = backend.matrix([[Fraction(0)] * shape[1]] * shape[0])
+    for (scalars, word), coefficient in value.terms.items():
+        for name in scalars:
+            coefficient *= _value(given, name)
+        product = None
+        for letter in word:
+            rows = _value(given, letter.name)
+            factor = backend.matrix(list(zip(*rows, strict=True)) if letter.flipped else rows)
+            product = factor if product is None else product * factor
+        if product is None:
+            product = backend.matrix(identity_rows(shape[0]))
+        total = total + product * backend.number(coefficient)
+    return backend.rows(total)
+
+
+def completed(given: Instance, definitions: Iterable[Equation]) -> Instance:
+    """Give each defined letter (the left side of its definition) the value of the right side, unless it has one."""
+    values = dict(given.values)
+    for definition in definitions:
+        (((scalars, word), _),) = definition.lhs.terms.items()
+        name = word[0].name if word else scalars[0]
+        if name not in values:
+            value = evaluate(definition.rhs, Instance(values))
+            values[name] = value if word else value[0][0]
+    return Instance(values)
+
+
+def _value(given: Instance, name: str) -> Any:
+    if name not in given.values:
+        raise ArgumentError("instance", sorted(given.values), f"a value for {name}")
+    return given.values[name]
+
+
+def _sizes(value: Expression, given: Instance) -> dict[str, int]:
+    sizes = {"1": 1}
+    for letter in value.letters:
+        rows = _value(given, letter.name)
+        names = (letter.cols, letter.rows) if letter.flipped else (letter.rows, letter.cols)
+        for name, size in zip(names, (len(rows), len(rows[0])), strict=True):
+            if sizes.setdefault(name, size) != size:
+                raise ArgumentError(letter.name, (len(rows), len(rows[0])), f"size {name} = {sizes[name]}")
+    return sizes
+
+
+def holds(fact: Fact, given: Instance, backend: Any = FlintBackend) -> bool:
+    """Decide a fact on an instance, exactly."""
+    match fact:
+        case Equation():
+            return all(entry == 0 for row in evaluate(fact.difference, given, backend) for entry in row)
+        case Entrywise():
+            return all(entry >= 0 for row in evaluate(fact.value, given, backend) for entry in row)
+        case Nonzero():
+            return evaluate(fact.value, given, backend)[0][0] != 0
+        case NonNegative():
+            return signature_allows(evaluate(fact.value, given, backend), strict=False)
+        case Definite():
+            return signature_allows(evaluate(fact.value, given, backend), strict=True)
+
+
+def all_hold(facts: Iterable[Fact], given: Instance) -> bool:
+    return all(holds(fact, given) for fact in facts)
+
+
+def signature_allows(rows: Matrix, *, strict: bool) -> bool:
+    """Is x' A x >= 0 (strict: > 0) for every x other than 0? Exact elimination on the symmetric part of A."""
+    size = len(rows)
+    a = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
+    for k in range(size):
+        if a[k][k] < 0 or (strict and a[k][k] == 0):
+            return False
+        if a[k][k] == 0:
+            if any(a[k][j] for j in range(k, size)):
+                return False
+            continue
+        for i in range(k + 1, size):
+            ratio = a[i][k] / a[k][k]
+            for j in range(k, size):
+                a[i][j] -= ratio * a[k][j]
+    return True

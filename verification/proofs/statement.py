@@ -1,0 +1,124 @@
+"""What a file of proofs states, and what comes out when it is checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from verification.proofs.exact import Instance
+from verification.proofs.facts import Equation, Fact
+from verification.proofs.steps import Step
+
+
+@dataclass(frozen=True)
+class Without:
+    """An exact case where one hypothesis fails, all others hold, and a conclusion is false: it is needed."""
+
+    hypothesis: str
+    instance: Instance
+    note: str
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A nearby statement that is wrong: under the same hypotheses `claim` fails on `instance`."""
+
+    title: str
+    claim: Fact
+    instance: Instance
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A theorem, lemma or erratum with its proof.
+
+    `definitions` give names to expressions (a letter or scalar on the left); they say nothing about the world, so
+    they need no counterexample. `statement` and `remarks` are prose with LaTeX between dollar signs. `concludes`
+    names the steps that are the conclusions; the others are lemmas on the way. `witness` is one exact case in
+    which every hypothesis holds, so that the theorem speaks of something.
+    """
+
+    name: str
+    title: str
+    source: str
+    statement: str
+    given: tuple[Fact, ...] = ()
+    definitions: tuple[Equation, ...] = ()
+    steps: Sequence[Step] = ()
+    concludes: tuple[str, ...] = ()
+    witness: Instance | None = None
+    needed: tuple[Without, ...] = ()
+    twins: tuple[Twin, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def conclusions(self) -> tuple[Fact, ...]:
+        return tuple(s.claim for s in self.steps if s.claim is not None and s.claim.name in self.concludes)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a printed proof: its words and, where there is one, its formula as text and as LaTeX."""
+
+    words: str
+    text: str = ""
+    latex: str = ""
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """A checked step: what is claimed, why, the certificate term by term, and whether it closed."""
+
+    claim: Line
+    because: str
+    certificate: tuple[Line, ...]
+    accepted: bool
+    refusal: str = ""
+
+
+@dataclass(frozen=True)
+class Refutation:
+    """A false statement, the exact case that refutes it, and whether the case does so."""
+
+    title: str
+    claim: Line
+    case: tuple[Line, ...]
+    note: str
+    refuted: bool
+
+
+@dataclass(frozen=True)
+class ProofRecord:
+    """A proof as plain data: everything the command line and the report show."""
+
+    name: str
+    title: str
+    source: str
+    statement: str
+    hypotheses: tuple[Line, ...]
+    definitions: tuple[Line, ...]
+    steps: tuple[StepRecord, ...]
+    conclusions: tuple[Line, ...]
+    needed: tuple[Refutation, ...]
+    twins: tuple[Refutation, ...]
+    remarks: tuple[str, ...]
+    verdict: str
+    problems: tuple[str, ...]
+    seconds: float = field(compare=False)
+
+    @property
+    def holds(self) -> bool:
+        return self.verdict == "proved"
+
+    def as_text(self) -> str:
+        """The whole proof in plain text, to be followed without the code."""
+        from verification.proofs.printing import proof_text
+
+        return proof_text(self)
+
+    def as_mathml(self) -> str:
+        """The whole proof as an HTML fragment with MathML, for the report."""
+        from verification.proofs.mathml import proof_html
+
+        return proof_html(self)

@@ -1,0 +1,1 @@
+"""The statements, one file each; `verification.proofs` lists them in reading order."""

@@ -1,0 +1,224 @@
+"""The only moves a proof may make. Each one is checked by expansion or by exact arithmetic, never by trust.
+
+Identity      claim.lhs - claim.rhs = sum of  left * (equation.lhs - equation.rhs) * right   (cofactor certificate)
+Positivity    claim.value = sum of non-negative terms + cofactors                            (sum of squares)
+Cancelling    N' G N = 0 (or <= 0) with G positive definite, hence N = 0
+Exact         a relation between two rational numbers
+
+A move whose certificate does not close, or that leans on a fact nobody established, raises `Refused`.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from iapb.errors import IapbError
+from verification.proofs.algebra import Expression, expression
+from verification.proofs.facts import Definite, Entrywise, Equation, Fact, NonNegative, Nonzero
+
+RELATIONS = {
+    "=": operator.eq,
+    "≠": operator.ne,
+    "<": operator.lt,
+    "≤": operator.le,
+    ">": operator.gt,
+    "≥": operator.ge,
+}
+
+
+class Refused(IapbError):
+    """A step does not follow from its certificate."""
+
+
+@dataclass(frozen=True)
+class Cofactor:
+    """One term  left * (equation.lhs - equation.rhs) * right  of a certificate: zero by the equation."""
+
+    left: Expression
+    equation: Equation
+    right: Expression
+
+    @property
+    def value(self) -> Expression:
+        return self.left * self.equation.difference * self.right
+
+
+@dataclass(frozen=True)
+class Square:
+    """half' core half, non-negative when the core is (no core: the identity)."""
+
+    half: Expression
+    core: Definite | NonNegative | None = None
+
+    @property
+    def value(self) -> Expression:
+        core = expression(1) if self.core is None else self.core.value
+        return self.half.T * core * self.half
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        return () if self.core is None else (self.core,)
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """left' core right, non-negative when all three are entrywise (no core: the identity)."""
+
+    left: Entrywise
+    right: Entrywise
+    core: Entrywise | None = None
+
+    @property
+    def value(self) -> Expression:
+        core = expression(1) if self.core is None else self.core.value
+        return self.left.value.T * core * self.right.value
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        return (self.left, self.right) + (() if self.core is None else (self.core,))
+
+
+@dataclass(frozen=True)
+class Term:
+    """weight * (product of non-negative scalars) * form; the weight is a positive rational."""
+
+    weight: Fraction | int
+    factors: tuple[NonNegative, ...] = ()
+    form: Square | Pairing | NonNegative | None = None
+
+    @property
+    def value(self) -> Expression:
+        product = expression(self.weight)
+        for factor in self.factors:
+            product = product * factor.value
+        return product if self.form is None else product * self.form.value
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        if isinstance(self.form, NonNegative):
+            return (*self.factors, self.form)
+        return self.factors if self.form is None else self.factors + self.form.facts
+
+
+class Known:
+    """The facts a proof may lean on so far, and which of them it has used."""
+
+    def __init__(self, facts: Iterable[Fact]) -> None:
+        self._facts = list(facts)
+        self.used: set[str] = set()
+
+    def add(self, fact: Fact) -> None:
+        self._facts.append(fact)
+
+    def require(self, wanted: Fact) -> None:
+        """Mark `wanted` as used; refuse it unless it, or its transpose, is established."""
+        for fact in self._facts:
+            if fact == wanted or (isinstance(fact, Equation) and fact.T == wanted):
+                self.used.add(fact.name)
+                return
+        raise Refused(f"the step leans on '{wanted.name}', which nobody established")
+
+
+@dataclass(frozen=True)
+class Identity:
+    """An equation that follows from others by a cofactor certificate."""
+
+    claim: Equation
+    cofactors: tuple[Cofactor, ...] = ()
+    because: str = ""
+
+    def verify(self, known: Known) -> None:
+        """Expand claim - sum of cofactors in the free algebra; anything left over is refused."""
+        for cofactor in self.cofactors:
+            known.require(cofactor.equation)
+        _require_zero(self.claim.name, self.claim.difference, self.cofactors)
+
+
+@dataclass(frozen=True)
+class Positivity:
+    """value >= 0 because it is a sum of terms that are each non-negative (and of cofactors, which are zero)."""
+
+    claim: NonNegative
+    terms: tuple[Term, ...]
+    cofactors: tuple[Cofactor, ...] = ()
+    because: str = ""
+
+    def verify(self, known: Known) -> None:
+        """Check every term's right to be called non-negative, then that they add up to the claim."""
+        remainder = self.claim.value
+        for term in self.terms:
+            if term.weight <= 0:
+                raise Refused(f"'{self.claim.name}': the weight {term.weight} is not positive")
+            if any(factor.value.rows != "*" for factor in term.factors):
+                raise Refused(f"'{self.claim.name}': a factor that is not a commuting scalar")
+            for fact in term.facts:
+                known.require(fact)
+            remainder = remainder - term.value
+        for cofactor in self.cofactors:
+            known.require(cofactor.equation)
+        _require_zero(self.claim.name, remainder, self.cofactors)
+
+
+@dataclass(frozen=True)
+class Cancelling:
+    """N = 0 because N' G N = 0, or -N' G N >= 0, and G is positive definite (no G: the identity)."""
+
+    claim: Equation
+    square: Equation | NonNegative
+    definite: Definite | None = None
+    because: str = "a positive definite form vanishes only at zero"
+
+    def verify(self, known: Known) -> None:
+        known.require(self.square)
+        if self.definite is not None:
+            known.require(self.definite)
+        form = Square(self.claim.difference, self.definite).value
+        value = self.square.difference if isinstance(self.square, Equation) else -self.square.value
+        if not (form - value).vanishes():
+            raise Refused(f"'{self.claim.name}': the square does not match")
+
+
+@dataclass(frozen=True)
+class Dividing:
+    """N = 0 because s N = 0 and the scalar s is not zero."""
+
+    claim: Equation
+    product: Equation
+    divisor: Nonzero
+    because: str = "a non-zero scalar may be divided out"
+
+    def verify(self, known: Known) -> None:
+        known.require(self.product)
+        known.require(self.divisor)
+        if not (self.divisor.value * self.claim.difference - self.product.difference).vanishes():
+            raise Refused(f"'{self.claim.name}': the product does not match")
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A relation between two rationals, computed before it is stated; `says` names what is compared."""
+
+    says: str
+    left: Fraction
+    relation: str
+    right: Fraction
+    claim: None = field(default=None, init=False)
+    because: str = ""
+
+    def verify(self, known: Known) -> None:
+        del known
+        if not RELATIONS[self.relation](self.left, self.right):
+            raise Refused(f"'{self.says}': {self.left} {self.relation} {self.right} is false")
+
+
+Step = Identity | Positivity | Cancelling | Dividing | Exact
+
+
+def _require_zero(name: str, value: Expression, cofactors: Iterable[Cofactor]) -> None:
+    for cofactor in cofactors:
+        value = value - cofactor.value
+    if not value.vanishes():
+        raise Refused(f"'{name}': the certificate leaves {len(value.canonical().terms)} terms")
