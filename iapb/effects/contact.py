@@ -1,0 +1,92 @@
+"""Effects of contact: who can touch, impulses, penalties, friction, and the filters of flickering contacts."""
+
+from __future__ import annotations
+
+from iapb.effects.question import CLUSTERS, FRICTION, IMPULSES, NEWNESS, PENALTY, Effect, Question, number
+
+
+def wall_contacts(question: Question) -> Effect:
+    """Contacts with the static world."""
+    count = question.wall_pairs
+    reason = f"{_pairs(count)} of a moving shape and a static one can touch"
+    reason = reason if count else "no moving shape has a static one to touch"
+    return Effect("wall_contacts", count > 0, reason, "bodies would pass through walls")
+
+
+def body_contacts(question: Question) -> Effect:
+    """Contacts between bodies of different trees."""
+    count = question.body_pairs
+    reason = f"{_pairs(count)} of shapes of separate bodies can touch"
+    reason = reason if count else "no two separate moving bodies have shapes"
+    return Effect("body_contacts", count > 0, reason, "moving bodies would pass through each other")
+
+
+def self_collisions(question: Question) -> Effect:
+    """Contacts between links of one tree."""
+    asked, count = question.scene.contact.self_collisions, question.tree_pairs
+    if not asked:
+        reason = "contact.self_collisions = false"
+    elif count:
+        reason = (
+            f"contact.self_collisions = true, and {_pairs(count)} of links that are not neighbours can touch"
+        )
+    else:
+        reason = "contact.self_collisions = true, but no two links with shapes are more than one joint apart"
+    return Effect("self_collisions", count > 0, reason, "links of one tree would pass through each other")
+
+
+def impulses(question: Question) -> Effect:
+    """Impulses (20)-(21) when a contact is new."""
+    unused = question.unused(IMPULSES)
+    e = question.scene.contact.restitution
+    reason = unused or f"new contacts collide: contact.restitution = {number(e)}"
+    return Effect(
+        "impulses", unused is None, reason, "bodies would be stopped by springs alone and sink in further"
+    )
+
+
+def penalty_stiffness(question: Question) -> Effect:
+    """K of (5)."""
+    value = question.scene.contact.stiffness
+    active, reason = _valued(question, PENALTY, "stiffness", value, "N/m")
+    return Effect("penalty_stiffness", active, reason, "nothing would hold a body that rests on another")
+
+
+def contact_damping(question: Question) -> Effect:
+    """B of (5)."""
+    value = question.scene.contact.damping
+    active, reason = _valued(question, PENALTY, "damping", value, "N s/m")
+    return Effect("contact_damping", active, reason, "resting contacts would swing on their springs")
+
+
+def friction(question: Question) -> Effect:
+    """Modified Coulomb friction (6)."""
+    value = question.scene.contact.friction
+    active, reason = _valued(question, FRICTION, "friction", value, "")
+    return Effect("friction", active, reason, "bodies would slide along each other without loss")
+
+
+def clustering(question: Question) -> Effect:
+    """Contacts close together count as one (section III)."""
+    value = question.scene.contact.cluster_distance
+    active, reason = _valued(question, CLUSTERS, "cluster_distance", value, "m")
+    return Effect("clustering", active, reason, "contacts that a fine mesh repeats would count several times")
+
+
+def coherence(question: Question) -> Effect:
+    """A contact near one of the step before is not new (section III)."""
+    value = question.scene.contact.coherence_distance
+    active, reason = _valued(question, NEWNESS, "coherence_distance", value, "m")
+    return Effect("coherence", active, reason, "contacts that move from facet to facet would collide again")
+
+
+def _valued(question: Question, part: str, field: str, value: float, unit: str) -> tuple[bool, str]:
+    """Decide an effect that is on where its number is not zero and a contact needs it."""
+    unused = question.unused(part)
+    if unused is None and value == 0.0:
+        unused = f"contact.{field} = 0"
+    return unused is None, unused or f"contact.{field} = {number(value)}{' ' + unit if unit else ''}"
+
+
+def _pairs(count: int) -> str:
+    return "1 pair" if count == 1 else f"{count} pairs"
