@@ -45,6 +45,8 @@ SOLVERS: dict[str, SolverEntry] = {
     "cvxpy_clarabel": SolverEntry(_CVXPY, "clarabel", "interior point", "convex", "CLARABEL"),
     "cvxpy_osqp": SolverEntry(_CVXPY, "osqp", "ADMM", "convex", "OSQP"),
     "cvxpy_scs": SolverEntry(_CVXPY, "scs", "ADMM on the conic form", "convex", "SCS"),
+    "nsgs": SolverEntry(f"{_HERE}.block_gauss_seidel", "numba", "block Gauss-Seidel on the cones", "cone"),
+    "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "clarabel", "interior point, fixed point", "cone"),
 }
 
 

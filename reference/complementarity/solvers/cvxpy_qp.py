@@ -7,6 +7,7 @@ Source: Moreau's least-squares form of plastic impacts; Anitescu and Potra, Nonl
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,9 @@ def solve(problem: ImpactProblem, backend: str) -> Answer:
     energy = 0.5 * cp.sum_squares((rows.T / root) @ p) + (problem.offset / speed) @ p
     program = cp.Problem(cp.Minimize(energy))
     try:
-        program.solve(solver=backend, **_OPTIONS[backend])
+        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals judge
+            warnings.simplefilter("ignore", UserWarning)
+            program.solve(solver=backend, **_OPTIONS[backend])
     except cp.error.SolverError as error:
         return Answer(None, f"{backend}: {error}")
     if p.value is None:
