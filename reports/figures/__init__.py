@@ -2,9 +2,31 @@
 
 from __future__ import annotations
 
-from reports.figures import fig03_energy_loss
+from reports.figures import (
+    fig03_energy_loss,
+    fig04_peg_corner,
+    fig05_couplings,
+    fig07_trajectories,
+    fig08_forces,
+    fig09_device_limits,
+    fig10_limited_trajectories,
+    fig11_limited_forces,
+    fig12_device_trajectories,
+    fig13_device_forces,
+    hero_corner,
+)
 from reports.figures.figure import Recipe
 
 RECIPES: tuple[Recipe, ...] = (
+    hero_corner.RECIPE,
+    fig04_peg_corner.RECIPE,
+    fig05_couplings.RECIPE,
     fig03_energy_loss.RECIPE,
+    fig07_trajectories.RECIPE,
+    fig08_forces.RECIPE,
+    fig09_device_limits.RECIPE,
+    fig10_limited_trajectories.RECIPE,
+    fig11_limited_forces.RECIPE,
+    fig12_device_trajectories.RECIPE,
+    fig13_device_forces.RECIPE,
 )

@@ -60,7 +60,7 @@ CYCLE = (
     LineStyle(INK, "X", (1, 1)), LineStyle(MUTED, "*", (4, 1, 1, 1)),
 )
 
-_PARAMETERS: dict[str, Any] = {
+_PARAMETERS: Any = {
     "svg.hashsalt": "iapb", "svg.fonttype": "none", "path.simplify": True, "path.simplify_threshold": 0.15,
     "font.family": ["DejaVu Sans"], "font.size": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.5,
     "ytick.labelsize": 8.5, "axes.titlesize": 9.5, "axes.titleweight": "normal", "axes.titlelocation": "left",

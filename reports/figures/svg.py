@@ -12,6 +12,7 @@ from typing import Any
 
 from reports.figures.style import VARIABLES
 
+LARGEST_ENLARGEMENT = 1.6  # beyond, the lettering would shout
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
 _FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
@@ -38,7 +39,7 @@ def _fitted(text: str) -> str:
     width = re.search(r'\swidth="([\d.]+)pt"', head)
     natural = round(float(width.group(1)) * 4 / 3) if width else 400
     head = re.sub(r'\s(width|height|version|xmlns:xlink)="[^"]*"', "", head)
-    head += f' xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {natural * 1.3:.0f}px"'
+    head += f' xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {natural * LARGEST_ENLARGEMENT:.0f}px"'
     return f"{head}>{rest}"
 
 
