@@ -1,0 +1,159 @@
+"""Couplings of Fig. 5 in the compiled step: action and reaction, dissipation, delay, following."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.contact.kernels.step import advance
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError
+from iapb.haptics.coupling import FourChannel, NoCoupling, UnilateralCoupler
+from iapb.haptics.device import SimulatedDevice
+from iapb.haptics.kernels import couple, drive_device
+from iapb.run import FREE
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from iapb.system import System
+
+FOUR_CHANNEL = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))  # Table I
+UNILATERAL = UnilateralCoupler((1000.0, 1000.0, 2.5), (50.0, 50.0, 0.125))
+SCENE = load_scene(find_scene("peg_corner"))
+FAR = SCENE.with_values({"bodies.peg.position": [1.0, -1.0, 0.08]})  # no wall within reach
+SYSTEMS = {"corner": System(SCENE), "far": System(FAR)}
+
+number = st.floats(-0.1, 0.1)
+triple = st.tuples(number, number, number)
+
+
+def started(system, coupling, law=None, rendering="full"):
+    return system.world_under(law or Penalty()), system.make_state(), system.make_port(coupling, rendering)
+
+
+def step(world, state, port):
+    couple(world, state, port)
+    assert advance(world, state, port.applied) == 0
+    drive_device(world, state, port)
+
+
+@given(triple, triple, triple)
+def test_position_channels_are_equal_and_opposite_and_their_damping_takes_power(offset, tool_v, device_v):
+    world, state, port = started(SYSTEMS["far"], FOUR_CHANNEL)
+    port.device_q[:] += offset
+    state.v[:], port.device_v[:] = tool_v, device_v
+    couple(world, state, port)
+    on_tool = port.coupling_force.copy()
+    rate = np.subtract(device_v, tool_v)
+    spring = np.multiply(FOUR_CHANNEL.stiffness, offset)
+    assert on_tool == pytest.approx(spring + np.multiply(FOUR_CHANNEL.damping, rate), abs=1e-12)
+    drive_device(world, state, port)
+    assert np.array_equal(port.device_force, -on_tool)  # no contact: the device feels the channels alone
+    assert (on_tool - spring) @ tool_v - (on_tool - spring) @ device_v <= 1e-15
+
+
+def pair_energies(damping, steps):
+    """Energy of tool, device and the spring between them [J], no hand, started 2 cm and 0.1 rad apart."""
+    world, state, port = started(System(FAR.with_values({"hand.force": [0, 0, 0]})), FOUR_CHANNEL)
+    port.device_q[:] += [0.02, -0.01, 0.1]
+    port.damping[:] *= damping
+    energies = []
+    for _ in range(steps):
+        stretch, mass = port.device_q - state.q, state.mass_matrix
+        kinetic = state.v @ mass @ state.v + port.device_v @ mass @ port.device_v
+        energies.append(0.5 * (kinetic + np.sum(np.multiply(FOUR_CHANNEL.stiffness, stretch * stretch))))
+        step(world, state, port)
+    return np.array(energies)
+
+
+def test_a_free_pair_loses_energy_in_every_step_until_it_moves_as_one():
+    energies = pair_energies(1.0, 1000)
+    assert np.all(np.diff(energies) < 0.0) and energies[-1] < 0.01 * energies[0]
+
+
+def test_with_its_damping_reversed_the_pair_gains_energy():
+    """The planted fault of the test above."""
+    assert pair_energies(-1.0, 50)[-1] > pair_energies(1.0, 50)[0]
+
+
+@pytest.mark.parametrize("coupling", [FOUR_CHANNEL, UNILATERAL], ids=lambda c: c.name)
+def test_in_free_motion_tool_and_device_go_together(coupling):
+    world, state, port = started(SYSTEMS["far"], coupling)
+    for _ in range(100):
+        step(world, state, port)
+    assert port.device_q == pytest.approx(state.q, abs=1e-12)
+    assert np.all(np.sign(port.device_v[:2]) == [-1.0, 1.0])  # where the hand pushes
+
+
+@pytest.mark.parametrize("delay", [0, 3])
+def test_compiled_device_is_the_simulated_device(delay):
+    """Two programs, one device: forces, delay and sensors agree step by step."""
+    resolution = [1e-5, 1e-5, 1e-4]
+    settings = {"device.delay": delay, "device.position_resolution": resolution, "device.damping": [1.0, 1.0, 0.01]}
+    system = System(FAR.with_values(settings))
+    world, state, port = started(system, FOUR_CHANNEL)
+    twin = SimulatedDevice(
+        port.device_mass, port.device_q, dt=world.dt, damping=[1.0, 1.0, 0.01], delay=delay, resolution=resolution
+    )
+    twin.hand_force = np.array(SCENE.hand.force, float)
+    for _ in range(30):
+        state.q[:] += [1e-4, -2e-4, 1e-3]  # pull at the tool, so that the channels work
+        couple(world, state, port)
+        assert port.measured_q == pytest.approx(twin.read().q, abs=1e-12)
+        assert port.measured_v == pytest.approx(twin.read().v, abs=1e-9)
+        twin.apply(-port.coupling_force)
+        assert advance(world, state, port.applied) == 0
+        drive_device(world, state, port)
+        assert port.device_q == pytest.approx(twin.q, abs=1e-13)
+
+
+def test_the_device_feels_the_environment_through_four_channels_only():
+    for coupling, felt in ((FOUR_CHANNEL, True), (UNILATERAL, False)):
+        world, state, port = started(SYSTEMS["corner"], coupling, ImpulseAugmented())
+        touched = 0
+        for _ in range(400):
+            step(world, state, port)
+            expected = port.environment_force if felt else np.zeros(3)
+            assert port.device_force + port.coupling_force == pytest.approx(expected, abs=1e-12)
+            touched += np.any(port.environment_force != 0.0)
+        assert touched > 10
+
+
+def test_environment_force_is_clipped_at_the_device_but_not_at_the_tool():
+    world, state, port = started(SYSTEMS["corner"], FOUR_CHANNEL, ImpulseAugmented(rendering="saturate"), "saturate")
+    exceeded = 0
+    for _ in range(400):
+        step(world, state, port)
+        at_device = port.device_force + port.coupling_force
+        assert np.all(np.abs(at_device) <= port.force_limit + 1e-9)
+        exceeded += np.any(np.abs(port.environment_force) > port.force_limit)
+    assert exceeded > 0
+
+
+def test_the_coupler_stays_on_while_the_device_is_inside_the_wall():
+    world, state, port = started(SYSTEMS["corner"], UNILATERAL)
+    coupled = 0
+    for _ in range(600):
+        step(world, state, port)
+        if not port.engaged[0]:
+            assert np.array_equal(state.q, port.device_q)
+            floor = SCENE.with_values({"bodies.peg.position": list(map(float, port.device_q))})
+            assert _touching(System(floor)) == 0  # the tool never follows the device into a wall
+        coupled += bool(port.engaged[0])
+        if state.state_of_tree[0] != FREE:
+            assert port.engaged[0]
+    assert coupled > 10
+
+
+def _touching(system):
+    return len(system.contact_rows(system.make_state()).gap)
+
+
+def test_couplings_say_what_they_are():
+    assert FOUR_CHANNEL.settings == {"stiffness": [100.0, 100.0, 0.5], "damping": [70.0, 70.0, 0.375]}
+    assert NoCoupling().settings == {} and len({NoCoupling.name, FourChannel.name, UnilateralCoupler.name}) == 3
+    with pytest.raises(ArgumentError, match="damping"):
+        FourChannel((1.0, 1.0), (1.0,))
+    with pytest.raises(ArgumentError, match="stiffness"):
+        UnilateralCoupler((-1.0,), (1.0,))
