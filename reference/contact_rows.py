@@ -1,6 +1,6 @@
 """Contacts of a system as rows, gaps and velocities, and back into the record of a step.
 
-Rows are built from `Mechanism.point_jacobian`, one contact at a time: nᵀ(J_a − J_b), (11)-(12).
+Rows nᵀ(J_a − J_b), (11)-(12), are built from the frame Jacobians of the bodies.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from iapb.contact.geometry import WORLD, ContactBuffer, make_contact_buffer
 
 Floats = NDArray[np.float64]
 
-# nᵀJ smaller than this share of |J| is rounding of the kinematics, not a lever arm of the contact.
+# nᵀJ smaller than this share of what it is summed from is rounding, not a lever arm of the contact.
 ROW_NOISE = 1e-13
 _GEOMETRY = ("shape_a", "shape_b", "body_a", "body_b", "feature", "point", "normal", "gap")
 
@@ -42,18 +42,29 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     count = (
         detect_contacts(system.shapes, system.pairs, placements, margin, geometry) if len(system.pairs) else 0
     )
-    rows = np.array([_row(system.mechanism, q, geometry, i) for i in range(count)]).reshape(count, len(v))
+    rows = contact_jacobian(system.mechanism, q, placements[1], geometry, count)
     return ContactRows(geometry, rows, geometry.gap[:count].copy(), rows @ v)
 
 
-def _row(mechanism: Any, q: Floats, geometry: ContactBuffer, i: int) -> Floats:
-    """nᵀ(J_a − J_b) of contact i, (d,), exactly zero where it is only rounding."""
-    point, normal = geometry.point[i], geometry.normal[i]
-    jacobian = mechanism.point_jacobian(q, int(geometry.body_a[i]), point)
-    if geometry.body_b[i] != WORLD:
-        jacobian = jacobian - mechanism.point_jacobian(q, int(geometry.body_b[i]), point)
-    row = normal @ jacobian
-    return np.where(np.linalg.norm(row) > ROW_NOISE * np.linalg.norm(jacobian), row, 0.0)
+def contact_jacobian(
+    mechanism: Any, q: Floats, origins: Floats, geometry: ContactBuffer, count: int
+) -> Floats:
+    """Rows nᵀ(J_a − J_b) (c, d), zero where they are only rounding; `origins` (nb, 3) of the bodies.
+
+    With the body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
+    """
+    rows, sizes = np.zeros((count, mechanism.nv)), np.zeros(count)
+    for bodies, sign in ((geometry.body_a[:count], 1.0), (geometry.body_b[:count], -1.0)):
+        for body in {int(b) for b in bodies} - {WORLD}:
+            mine = np.flatnonzero(bodies == body)
+            frame, normals = mechanism.frame_jacobian(q, body), geometry.normal[mine]
+            arms = geometry.point[mine] - origins[body]
+            rows[mine] += sign * (normals @ frame[:3] + np.cross(arms, normals) @ frame[3:])
+            reach = np.linalg.norm(arms, axis=1) + np.linalg.norm(geometry.point[mine], axis=1)
+            sizes[mine] += np.linalg.norm(frame[:3]) + reach * np.linalg.norm(frame[3:])
+    noise = np.linalg.norm(rows, axis=1) <= ROW_NOISE * sizes
+    rows[noise] = 0.0
+    return rows
 
 
 def write_contacts(state: Any, found: ContactRows, impulse: Floats, forced: Floats, dt: float) -> None:

@@ -75,7 +75,7 @@ class RigidConstraints:
         mechanism, q, v = system.mechanism, state.q.copy(), state.v.copy()
         mass = mechanism.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
-        force = applied_force - mechanism.bias(q, v) - mechanism.gravity(q, system.gravity)
+        force = applied_force - _inner_forces(system, q, v)
         e = system.scene.contact.restitution
         step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization)
         blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.impulse > 0.0)
@@ -86,6 +86,16 @@ class RigidConstraints:
         q_plus = mechanism.integrate(q, step.velocity, dt)
         contact_state = _contact_state(found, step.impulse, blows)
         return StepResult(q_plus, step.velocity, pressing, np.zeros_like(v), impulse, contact_state)
+
+
+def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:
+    """B + G (d,), each left out where it is zero for good."""
+    forces = np.zeros_like(v)
+    if system.mechanism.has_velocity_terms:
+        forces += system.mechanism.bias(q, v)
+    if np.any(system.gravity):
+        forces += system.mechanism.gravity(q, system.gravity)
+    return forces
 
 
 def _contact_state(found: ContactRows, impulse: Floats, blows: NDArray[np.bool_]) -> int:

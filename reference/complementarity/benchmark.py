@@ -1,0 +1,115 @@
+"""Solvers on problems: one row per pair, judged by recomputed residuals, and the performance profile of the rows.
+
+Source of the profile: Dolan and Moré, Benchmarking optimization software with performance profiles (2002).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import MissingDependencyError
+from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
+from reference.complementarity.solution import SOLVED_TOLERANCE, Residuals, velocity_scale
+from reference.complementarity.solvers import solve, solver_names
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SolverRow:
+    """One solver on one problem.
+
+    verdict : "solved", "refused", "failed" or "missing" (the solver is not installed)
+    spread : largest difference of contact velocities from the best solution, relative to the velocity scale;
+        NaN where this solver or no solver solved it. Impulses are not compared: they are not unique
+    asymmetry : of the problem's W, beyond rounding, else 0
+    """
+
+    problem: str
+    size: int
+    solver: str
+    verdict: str
+    residuals: Residuals
+    seconds: float
+    spread: float
+    asymmetry: float
+    note: str
+
+
+def run_solvers(
+    problems: Iterable[ImpactProblem],
+    solvers: Sequence[str] | None = None,
+    *,
+    tolerance: float = SOLVED_TOLERANCE,
+    repeats: int = 1,
+    progress: Callable[[str, str], None] | None = None,
+) -> list[SolverRow]:
+    """Solve every problem by every solver that takes its kind (or by `solvers`); the least time of `repeats`."""
+    rows: list[SolverRow] = []
+    for problem in problems:
+        rows += _rows(problem, solvers or solver_names(problem), tolerance, repeats, progress)
+    return rows
+
+
+def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
+    """Per solver, the share of problems solved within each factor (>= 1) of the fastest solver's time.
+
+    Problems that no solver solved count as solved by none.
+    """
+    names, problems = sorted({row.solver for row in rows}), sorted({row.problem for row in rows})
+    times = np.full((len(names), len(problems)), np.inf)
+    for row in rows:
+        if row.verdict == "solved":
+            times[names.index(row.solver), problems.index(row.problem)] = row.seconds
+    best = times.min(axis=0, initial=np.inf)
+    ratios = np.where(np.isfinite(times), times / np.where(np.isfinite(best), best, 1.0), np.inf)
+    return {name: (ratios[i][:, None] <= factors).mean(axis=0) for i, name in enumerate(names)}
+
+
+def _rows(
+    problem: ImpactProblem,
+    solvers: Sequence[str],
+    tolerance: float,
+    repeats: int,
+    progress: Callable[[str, str], None] | None,
+) -> list[SolverRow]:
+    solutions, missing = {}, {}
+    for name in solvers:
+        if progress is not None:
+            progress(problem.name, name)
+        try:
+            solutions[name] = min((solve(problem, name) for _ in range(repeats)), key=lambda s: s.seconds)
+        except MissingDependencyError as error:
+            missing[name] = str(error)
+    best = min(solutions.values(), key=lambda s: s.residuals.worst, default=None)
+    asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
+    rows = []
+    for name, solution in solutions.items():
+        spread = np.nan
+        if best is not None and solution.solved(tolerance):
+            difference = np.abs(solution.gamma_plus - best.gamma_plus).max(initial=0.0)
+            spread = float(difference / velocity_scale(problem))
+        verdict, judged = solution.verdict(tolerance), solution.residuals
+        rows.append(
+            SolverRow(
+                problem.name,
+                problem.size,
+                name,
+                verdict,
+                judged,
+                solution.seconds,
+                spread,
+                asymmetry,
+                solution.note,
+            )
+        )
+    unknown = Residuals()
+    rows += [
+        SolverRow(problem.name, problem.size, name, "missing", unknown, np.nan, np.nan, asymmetry, note)
+        for name, note in missing.items()
+    ]
+    return rows
