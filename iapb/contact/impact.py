@@ -102,14 +102,13 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     else:
         law = "Newton, equality"
     answer = solve(problem, limit, clamped, rank_tolerance)
-    stopped = law.startswith("Newton") and answer.rank == limit < min(problem.coordinates, problem.contacts)
-    return _as_impact(problem, answer, method=method, law=law, status="budget" if stopped else "complete",
-                      rows_used=budget)
+    return _as_impact(problem, answer, method=method, law=law, status="complete" if answer.complete else "budget",
+                      rows_used=None if budget is None else limit)
 
 
 def _method(method: Any) -> tuple[Any, bool]:
     offered = {name: entry for name, entry in METHODS.items() if name != "poisson"}
-    if method not in offered:
+    if not isinstance(method, str) or method not in offered:
         raise ArgumentError("method", method, "one of " + ", ".join(offered))
     return offered[method].solve, offered[method].clamped
 
@@ -120,7 +119,8 @@ def _check_options(method: str, budget: Any, tolerance: Any, problem: ImpactInpu
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
         if method != "factored" or problem.unequal is not None:
             raise ArgumentError("budget", budget, "None: only method 'factored' with equal restitution is anytime")
-    if tolerance is not None and not (np.isscalar(tolerance) and 0.0 < float(tolerance) < 1.0):
+    number = isinstance(tolerance, float | int | np.floating)
+    if tolerance is not None and not (number and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
 
 

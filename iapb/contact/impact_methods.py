@@ -36,6 +36,7 @@ class Whitened(NamedTuple):
     impulses: Floats
     rank: int
     clamp: float
+    complete: bool = True  # False where the budget ended the work with rows left
 
 
 class Method(NamedTuple):
@@ -67,12 +68,41 @@ def _tolerance(problem: ImpactInput, given: float | None) -> float:
 def factored(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
     """(21) through an orthonormal basis of A's row space (design: factored form)."""
     work, d, c = _prepared(problem), problem.coordinates, problem.contacts
-    v_plus, momentum, impulses = np.empty(d), np.empty(d), np.zeros(c)
+    v_plus, momentum, share = np.empty(d), np.empty(d), _tolerance(problem, tolerance)
     rank, clamp = factored_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.restitution, c,
-                                  _tolerance(problem, tolerance), budget, clamped, work, v_plus, momentum)
-    minimum_norm_impulses(work.rows, work.length, c, work.basis, rank, work.change, impulses, work.columns,
-                          np.empty((d, d)), np.empty(d))
-    return Whitened(v_plus, momentum, impulses, rank, clamp)
+                                  share, budget, clamped, work, v_plus, momentum)
+    ended_early = rank == budget < d and bool(np.any(work.size[:c] > share * share))
+    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp, not ended_early)
+
+
+def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
+    """The p of least norm along the *caller's* rows with Aᵀp = Δu, in scaled rows p' = 2^−r p.
+
+    Where row sizes differ, the least norm of p is found first, and what its rounding leaves of Δu is added by the
+    least norm of p', which no difference of sizes harms.
+    """
+    c, size = problem.contacts, _row_size(problem)
+    impulses = size * _least_norm_of(work, work.length[:c] * size, rank, work.change)
+    if np.all(size == 1.0):
+        return impulses
+    left = work.change - (work.rows[:, :c] * work.length[:c]) @ impulses
+    return impulses + _least_norm_of(work, work.length[:c], rank, left)
+
+
+def _row_size(problem: ImpactInput) -> Floats:
+    """2^−r (c,), largest 1: the caller's rows are these multiples of the scaled ones, up to one common factor."""
+    present = np.any(problem.contact_jacobian != 0.0, axis=1)
+    least = np.min(problem.row_exponent, where=present, initial=np.iinfo(np.int64).max)
+    exponent = np.where(present, least - problem.row_exponent, 0)
+    return np.ldexp(1.0, np.maximum(exponent, -1000).astype(np.int32))  # below 2^-1000 a row is as good as absent
+
+
+def _least_norm_of(work: ImpactWork, length: Floats, rank: int, change: Floats) -> Floats:
+    d, c = len(change), len(length)
+    impulses = np.zeros(c)
+    minimum_norm_impulses(work.rows, length, c, work.basis, rank, change, impulses, work.columns, np.empty((d, d)),
+                          np.empty(d))
+    return impulses
 
 
 def _from_impulses(problem: ImpactInput, impulses: Floats, rank: int, clamped: bool) -> Whitened:
@@ -85,22 +115,23 @@ def _from_impulses(problem: ImpactInput, impulses: Floats, rank: int, clamped: b
     return Whitened(v_plus, momentum, clamp * impulses, rank, clamp)
 
 
-def _delassus(problem: ImpactInput) -> tuple[Floats, Floats]:
-    """W = J M⁻¹ Jᵀ and γ⁻ = J v⁻."""
-    J = problem.contact_jacobian
+def _delassus(problem: ImpactInput, size: float | Floats = 1.0) -> tuple[Floats, Floats]:
+    """W = J M⁻¹ Jᵀ and γ⁻ = J v⁻, of the scaled rows times `size`."""
+    J = problem.contact_jacobian * np.reshape(size, (-1, 1))
     return J @ np.linalg.solve(problem.mass_matrix, J.T), J @ problem.velocity
 
 
 def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(20)-(21) to the letter: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse."""
+    """(20)-(21) to the letter: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size."""
     if problem.contacts == 0:
         return factored(problem, 0, clamped, tolerance)
-    W, gamma = _delassus(problem)
+    size = _row_size(problem)
+    W, gamma = _delassus(problem, size)
     cutoff = PINV_CUTOFF if tolerance is None else tolerance
     singular_values = np.linalg.svd(W, compute_uv=False)
     rank = int(np.sum(singular_values > cutoff * singular_values[0]))
     impulses = -(1.0 + problem.restitution) * (np.linalg.pinv(W, rcond=cutoff) @ gamma)
-    return _from_impulses(problem, impulses, rank, clamped)
+    return _from_impulses(problem, size * impulses, rank, clamped)
 
 
 def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
@@ -114,7 +145,7 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
     if smallest <= problem.contacts * np.finfo(float).eps * 8:
         raise ArgumentError("contact_jacobian", problem.contact_jacobian.shape,
                             "independent rows for method 'gram_cholesky'; use 'factored' for dependent ones")
-    factor = np.linalg.cholesky(0.5 * (W + W.T))
+    factor = np.linalg.cholesky(0.5 * (W + W.T))  # of rows of like size: definite, as the test above shows
     half = np.linalg.solve(factor, gamma)
     impulses = -(1.0 + problem.restitution) * np.linalg.solve(factor.T, half)
     return _from_impulses(problem, impulses, problem.contacts, clamped)
@@ -135,15 +166,13 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
     """(21) with the projector from the truncated singular value decomposition of unit-scaled A."""
     work, d, c = _prepared(problem), problem.coordinates, problem.contacts
     rows = _whitened_rows(problem, work)
-    v_plus, momentum, impulses = np.empty(d), np.empty(d), np.zeros(c)
+    v_plus, momentum = np.empty(d), np.empty(d)
     _, singular_values, right = np.linalg.svd(rows, full_matrices=False)
     rank = int(np.sum(singular_values > _tolerance(problem, tolerance)))
     work.basis[:rank] = right[:rank]
     work.change[:] = -(1.0 + problem.restitution) * (right[:rank].T @ (right[:rank] @ work.u))
     clamp = apply_change(problem.mass_matrix, problem.lower, problem.velocity, clamped, work, v_plus, momentum)
-    minimum_norm_impulses(work.rows, work.length, c, work.basis, rank, work.change, impulses, work.columns,
-                          np.empty((d, d)), np.empty(d))
-    return Whitened(v_plus, momentum, impulses, rank, clamp)
+    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp)
 
 
 def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:

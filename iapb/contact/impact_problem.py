@@ -74,19 +74,25 @@ def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: A
     v = _finite("velocity", velocity, 1)
     if v.shape != (d,):
         raise ArgumentError("velocity", v.shape, f"shape ({d},), one entry per row of mass_matrix")
-    J = _finite("contact_jacobian", contact_jacobian, 2) if np.size(contact_jacobian) else np.zeros((0, d))
+    J = np.zeros((0, d)) if _is_empty_list(contact_jacobian) else _finite("contact_jacobian", contact_jacobian, 2)
     if J.shape[1] != d:
         raise ArgumentError("contact_jacobian", J.shape, f"shape (contacts, {d})")
     e, unequal = _checked_restitution(restitution, len(J))
     return _scaled(M, J, v, e, unequal)
 
 
+def _is_empty_list(rows: ArrayLike) -> bool:
+    """[] has no second dimension to check."""
+    return isinstance(rows, list | tuple) and len(rows) == 0
+
+
 def _finite(name: str, value: Any, dimensions: int) -> Floats:
     try:
-        array = np.array(value, dtype=np.float64)
+        given = np.asarray(value)
+        array = np.array(given, dtype=np.float64) if given.dtype.kind != "c" else None
     except (TypeError, ValueError):
-        raise ArgumentError(name, value, "an array of real numbers") from None
-    if np.iscomplexobj(value):
+        array = None
+    if array is None:
         raise ArgumentError(name, value, "an array of real numbers")
     if array.ndim != dimensions:
         raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
@@ -136,6 +142,9 @@ def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -
         raise ArgumentError(f"mass_matrix[{k}, {k}]", float(diagonal[k]), "a positive diagonal entry")
     s = -(_exponents(diagonal) // 2)
     scaled_mass = _ldexp(M, s[:, None] + s[None, :])
+    if not np.all(np.abs(scaled_mass) <= 2.0):  # |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds for every positive definite matrix
+        i, j = np.unravel_index(int(np.argmax(np.abs(scaled_mass))), M.shape)
+        raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]), "a positive definite matrix")
     if np.max(np.abs(scaled_mass - scaled_mass.T), initial=0.0) > _SYMMETRY_TOLERANCE:
         i, j = np.unravel_index(int(np.argmax(np.abs(scaled_mass - scaled_mass.T))), M.shape)
         raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]),

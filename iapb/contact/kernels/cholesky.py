@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from iapb.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def cholesky(mass_matrix, lower):
     """Write L with M = L Lᵀ into `lower`; return 0, or k + 1 if the k-th pivot is not positive."""
     d = mass_matrix.shape[0]
@@ -28,7 +28,7 @@ def cholesky(mass_matrix, lower):
     return 0
 
 
-@njit(cache=True)
+@kernel
 def to_whitened(lower, v, u):
     """Whitened velocity u = Lᵀ v, so that KE = ½|u|²."""
     d = v.shape[0]
@@ -39,7 +39,7 @@ def to_whitened(lower, v, u):
         u[k] = total
 
 
-@njit(cache=True)
+@kernel
 def from_whitened(lower, u, v):
     """Solve Lᵀ v = u (back substitution)."""
     d = u.shape[0]
@@ -50,7 +50,7 @@ def from_whitened(lower, u, v):
         v[k] = total / lower[k, k]
 
 
-@njit(cache=True)
+@kernel
 def to_momentum(lower, u, momentum):
     """Generalized momentum L u."""
     d = u.shape[0]
@@ -61,7 +61,7 @@ def to_momentum(lower, u, momentum):
         momentum[k] = total
 
 
-@njit(cache=True)
+@kernel
 def whiten_columns(lower, columns, count):
     """Solve L X = columns in place for the first `count` columns: rows of J become columns of Aᵀ = L⁻¹ Jᵀ.
 
@@ -80,7 +80,7 @@ def whiten_columns(lower, columns, count):
             columns[k, i] *= inverse
 
 
-@njit(cache=True)
+@kernel
 def solve_mass(lower, force, acceleration):
     """Solve M a = f through both triangles; `force` may be the same array as `acceleration`."""
     d = force.shape[0]

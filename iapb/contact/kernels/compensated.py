@@ -6,12 +6,12 @@ leaves the range of doubles; callers scale first (`iapb.contact.impact`).
 
 from __future__ import annotations
 
-from numba import njit
+from iapb.compiled import kernel
 
 _SPLITTER = 134217729.0  # 2^27 + 1: halves a 53-bit significand (Dekker)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def two_sum(a, b):
     """a + b = s + r exactly (Knuth)."""
     s = a + b
@@ -19,7 +19,7 @@ def two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def two_product(a, b):
     """a b = p + r exactly (Dekker)."""
     p = a * b
@@ -32,7 +32,7 @@ def two_product(a, b):
     return p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo
 
 
-@njit(cache=True, inline="always")
+@kernel
 def add_product(hi, lo, a_hi, a_lo, b):
     """(hi, lo) + (a_hi, a_lo) · b."""
     p, r = two_product(a_hi, b)
@@ -43,7 +43,7 @@ def add_product(hi, lo, a_hi, a_lo, b):
     return total, t - (total - s)
 
 
-@njit(cache=True)
+@kernel
 def quadratic_forms(mass_matrix, v, change):
     """Return vᵀ M Δv and Δvᵀ M Δv, each evaluated in double-double and rounded once."""
     d = v.shape[0]
@@ -57,7 +57,7 @@ def quadratic_forms(mass_matrix, v, change):
     return cross_hi + cross_lo, square_hi + square_lo
 
 
-@njit(cache=True)
+@kernel
 def kinetic_energies(mass_matrix, v_minus, v_plus):
     """Return ½ v⁻ᵀ M v⁻ and ½ (v⁺ᵀ M v⁺ − v⁻ᵀ M v⁻), both in double-double, rounded once.
 

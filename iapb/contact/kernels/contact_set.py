@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least this: 31.8
@@ -14,7 +13,7 @@ ALIGNED_COSINE = 0.85
 _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def squared_distance(first, i, second, j):
     """Squared distance of the points of two contacts [m²]."""
     total = 0.0
@@ -24,7 +23,7 @@ def squared_distance(first, i, second, j):
     return total
 
 
-@njit(cache=True)
+@kernel
 def same_surface(first, i, second, j, cosine):
     """Is it the same pair of bodies, with aligned normals? (The pair may be listed the other way round.)"""
     aligned = 0.0
@@ -36,7 +35,7 @@ def same_surface(first, i, second, j, cosine):
     return a == second.body_b[j] and b == second.body_a[j] and -aligned >= cosine
 
 
-@njit(cache=True)
+@kernel
 def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     """Collapse contacts of one surface closer than `distance` [m] into the deepest; return how many stay.
 
@@ -63,7 +62,7 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     return kept
 
 
-@njit(cache=True)
+@kernel
 def _close_ranks(contacts, count):
     """Move the kept contacts to the front, geometry only: nothing else is computed before clustering."""
     row = 0
@@ -80,7 +79,7 @@ def _close_ranks(contacts, count):
         row += 1
 
 
-@njit(cache=True)
+@kernel
 def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED_COSINE):
     """Write is_new: temporal coherence through space, or by identity alone where `distance` is 0.
 
@@ -97,7 +96,7 @@ def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED
                 break
 
 
-@njit(cache=True)
+@kernel
 def _is_same(contacts, i, previous, j, distance, cosine):
     if (
         contacts.shape_a[i] == previous.shape_a[j]
@@ -110,7 +109,7 @@ def _is_same(contacts, i, previous, j, distance, cosine):
     return squared_distance(contacts, i, previous, j) <= distance * distance
 
 
-@njit(cache=True)
+@kernel
 def moving_tree(body, tree_of_body, tree_start, tree_stop):
     """Tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
     if body < 0:
@@ -119,7 +118,7 @@ def moving_tree(body, tree_of_body, tree_start, tree_stop):
     return tree if tree_stop[tree] > tree_start[tree] else -1
 
 
-@njit(cache=True)
+@kernel
 def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree):
     """Write group_of_tree: the first tree of the group that contacts between moving trees link it to."""
     for t in range(group_of_tree.shape[0]):
@@ -138,7 +137,7 @@ def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_t
         group_of_tree[t] = group_of_tree[group_of_tree[t]]  # smaller trees are settled already
 
 
-@njit(cache=True)
+@kernel
 def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree):
     """Group of a contact, -1 when nothing at it can move."""
     tree = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
@@ -147,7 +146,7 @@ def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_
     return group_of_tree[tree] if tree >= 0 else -1
 
 
-@njit(cache=True)
+@kernel
 def classify(
     contacts, count, tree_of_body, tree_start, tree_stop, approach_velocity, spreading, group_of_tree, state_of_tree
 ):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from iapb.compiled import kernel
 from iapb.contact.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.contact.kernels.compensated import quadratic_forms
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
@@ -42,7 +42,7 @@ def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
                       np.zeros(long), np.zeros(long), np.zeros(short), np.zeros(short), np.zeros(short))
 
 
-@njit(cache=True)
+@kernel
 def rank_tolerance(lower):
     """Eligibility tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding noise where that is larger."""
     d = lower.shape[0]
@@ -53,7 +53,7 @@ def rank_tolerance(lower):
     return max(RANK_TOLERANCE, _NOISE_FACTOR * d * UNIT_ROUNDOFF * largest / smallest)
 
 
-@njit(cache=True)
+@kernel
 def energy_clamp(mass_matrix, v, change):
     """Largest factor α in [0, 1] for which v + α Δv has no more kinetic energy than v, for M itself.
 
@@ -65,7 +65,7 @@ def energy_clamp(mass_matrix, v, change):
     return min(1.0, -2.0 * cross / square)
 
 
-@njit(cache=True)
+@kernel
 def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
     """Resolve `count` rows, given as columns of `work.columns`, by (21) in factored form.
 
@@ -86,7 +86,7 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
     return rank, clamp
 
 
-@njit(cache=True)
+@kernel
 def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
     """v⁺ = v + α L⁻ᵀ Δu with the clamp's α; generalized impulse α L Δu. Returns α."""
     d = v.shape[0]

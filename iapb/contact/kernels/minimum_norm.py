@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from iapb.compiled import kernel
+
+# A direction of which less than this share is left after orthogonalization is rounding: no row can push along it.
+_NOISE = 1e-15
 
 
-@njit(cache=True)
+@kernel
 def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, tall, triangle, target):
     """Write the p of least Euclidean norm with Aᵀ p = Δu, for Δu in the span of the basis.
 
@@ -30,6 +33,9 @@ def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, ta
                 total += rows[k, i] * basis[j, k]
             tall[j, i] = total * length[i]
     for j in range(rank):
+        before = 0.0
+        for i in range(count):
+            before += tall[j, i] * tall[j, i]
         for m in range(j):
             triangle[m, j] = 0.0
         for _ in range(2):  # twice is enough for orthogonality to rounding
@@ -43,16 +49,17 @@ def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, ta
         square = 0.0
         for i in range(count):
             square += tall[j, i] * tall[j, i]
-        triangle[j, j] = math.sqrt(square)
+        reached = square > _NOISE * _NOISE * before
+        triangle[j, j] = math.sqrt(square) if reached else 0.0
         for i in range(count):
-            tall[j, i] /= triangle[j, j]
+            tall[j, i] = tall[j, i] / triangle[j, j] if reached else 0.0
     for j in range(rank):
         total = 0.0
         for k in range(d):
             total += basis[j, k] * change[k]
         for m in range(j):
             total -= triangle[m, j] * target[m]
-        target[j] = total / triangle[j, j]
+        target[j] = total / triangle[j, j] if triangle[j, j] > 0.0 else 0.0
     for i in range(count):
         impulses[i] = 0.0
     for j in range(rank):

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.contact.geometry import CIRCLE, HALF_PLANE
 from iapb.contact.kernels.polygon_pair import polygons
 from iapb.contact.kernels.shape_frames import (
+    placement,
     relative_frame,
     store,
+    to_world,
     turn_to_world,
     vertex_feature,
     world_point,
 )
 
 
-@njit(cache=True)
+@kernel
 def detect(shapes, pairs, R, p, margin, buffer):
     """Write the contacts of all pairs into `buffer`; return how many, or -1 when its capacity is exceeded.
 
@@ -49,27 +50,29 @@ def detect(shapes, pairs, R, p, margin, buffer):
     return count
 
 
-@njit(cache=True)
+@kernel
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     """One contact per vertex of polygon a (or for circle a): gap = (vertex - point)·normal - radius."""
-    plane = shapes.first[b]
-    x0, y0 = world_point(shapes, plane, b, R, p)
-    nx, ny = turn_to_world(shapes.vertices[plane + 1, 0], shapes.vertices[plane + 1, 1], shapes.body[b], R)
+    vertices, plane, first = shapes.vertices, shapes.first[b], shapes.first[a]
+    x0, y0 = to_world(vertices[plane, 0], vertices[plane, 1], shapes.body[b], R, p)
+    nx, ny = turn_to_world(vertices[plane + 1, 0], vertices[plane + 1, 1], shapes.body[b], R)
     radius = shapes.radius[a]
-    first = shapes.first[a]
+    Rxx, Rxy, Ryx, Ryy, px, py = placement(shapes.body[a], R, p)
+    mx, my = Rxx * nx + Ryx * ny, Rxy * nx + Ryy * ny  # the normal in a's frame
+    offset = (px - x0) * nx + (py - y0) * ny - radius
     for i in range(shapes.count[a]):
-        x, y = world_point(shapes, first + i, a, R, p)
-        gap = (x - x0) * nx + (y - y0) * ny - radius
+        x, y = vertices[first + i, 0], vertices[first + i, 1]
+        gap = mx * x + my * y + offset
         if gap <= margin:
             depth = radius + 0.5 * gap  # from the vertex (or centre) back to midway between the surfaces
-            feature = vertex_feature(0, i, 0)
-            count = store(buffer, count, shapes, a, b, feature, x - depth * nx, y - depth * ny, nx, ny, gap)
+            x, y = Rxx * x + Rxy * y + px - depth * nx, Ryx * x + Ryy * y + py - depth * ny
+            count = store(buffer, count, shapes, a, b, vertex_feature(0, i, 0), x, y, nx, ny, gap)
             if count < 0:
                 return -1
     return count
 
 
-@njit(cache=True)
+@kernel
 def circles(shapes, a, b, R, p, margin, buffer, count):
     """Two circles: gap = distance of the centres - both radii, normal along the line of centres.
 
@@ -95,7 +98,7 @@ def circles(shapes, a, b, R, p, margin, buffer, count):
     return store(buffer, count, shapes, a, b, 0, xb + middle * nx, yb + middle * ny, nx, ny, gap)
 
 
-@njit(cache=True)
+@kernel
 def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
     """A circle and a convex polygon: one contact at the polygon's nearest edge or vertex.
 
@@ -115,7 +118,7 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
     return store(buffer, count, shapes, polygon, circle, feature, x, y, -nx, -ny, gap)
 
 
-@njit(cache=True)
+@kernel
 def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
     """Direction (polygon frame) and signed distance from the polygon to a circle's centre, and the feature.
 
@@ -141,7 +144,7 @@ def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
     return _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny)
 
 
-@njit(cache=True)
+@kernel
 def _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny):
     """Decide whether the point (x, y) outside edge `edge` is nearest to the edge or to one of its ends."""
     if best <= 0.0:

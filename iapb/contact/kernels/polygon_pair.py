@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.contact.kernels.shape_frames import relative_frame, store, to_world, turn_to_world, vertex_feature
 
 # The lowest point over the reference edge may lie above the separation s by this share of the size of the
@@ -20,7 +19,7 @@ from iapb.contact.kernels.shape_frames import relative_frame, store, to_world, t
 ROUNDING_SHARE = 1e-12
 
 
-@njit(cache=True)
+@kernel
 def polygons(shapes, a, b, R, p, margin, buffer, count):
     """Contacts (two at most) of convex polygons a and b; see the module for the method."""
     separation_a, edge_a = best_edge(shapes, a, b, R, p, margin)
@@ -34,7 +33,7 @@ def polygons(shapes, a, b, R, p, margin, buffer, count):
     return _against_reference(shapes, a, b, edge_a, separation_a, False, R, p, margin, buffer, count)
 
 
-@njit(cache=True)
+@kernel
 def best_edge(shapes, onto, other, R, p, margin):
     """Largest separation over the edge normals of `onto`, and its edge; early out above the margin.
 
@@ -58,7 +57,7 @@ def best_edge(shapes, onto, other, R, p, margin):
     return best, edge
 
 
-@njit(cache=True)
+@kernel
 def edge_frame(shapes, first, count, edge):
     """Start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's frame."""
     following = edge + 1 if edge + 1 < count else 0
@@ -68,7 +67,7 @@ def edge_frame(shapes, first, count, edge):
     return ux, uy, ey / length, -ex / length, length
 
 
-@njit(cache=True)
+@kernel
 def opposed_edge(shapes, other, mx, my):
     """Edge of `other` whose outward normal is most opposed to (mx, my), given in its frame."""
     first, count = shapes.first[other], shapes.count[other]
@@ -80,7 +79,7 @@ def opposed_edge(shapes, other, mx, my):
     return edge
 
 
-@njit(cache=True)
+@kernel
 def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
     """Contacts over the reference edge, or between two corners when the polygons are closest there."""
     Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, ref, other, R, p)
@@ -119,7 +118,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
     return count
 
 
-@njit(cache=True)
+@kernel
 def over_edge(shapes, row, Qxx, Qxy, Qyx, Qyy, tx, ty, nx, ny):
     """Coordinates of a vertex over the reference edge: s along it from its start, h along its normal."""
     x, y = shapes.vertices[row, 0], shapes.vertices[row, 1]
@@ -127,13 +126,13 @@ def over_edge(shapes, row, Qxx, Qxy, Qyx, Qyy, tx, ty, nx, ny):
     return -ny * x + nx * y, nx * x + ny * y
 
 
-@njit(cache=True)
+@kernel
 def height_at(s, s0, h0, s1, h1):
     """Height over the point s of the line through (s0, h0) and (s1, h1); h0 if that line is upright."""
     return h0 if s0 == s1 else h0 + (h1 - h0) * (s - s0) / (s1 - s0)
 
 
-@njit(cache=True)
+@kernel
 def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, buffer, count):
     """Store a contact given in the frame of shape `ref`, with its normal pointing out of it."""
     body = shapes.body[ref]
@@ -144,7 +143,7 @@ def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, 
     return store(buffer, count, shapes, ref, other, feature, x, y, -nx, -ny, gap)
 
 
-@njit(cache=True)
+@kernel
 def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
     """One contact between the closest points of two polygons that are apart (both are corners)."""
     distance, vx, vy, wx, wy, feature = closest_points(shapes, ref, other, R, p)
@@ -155,7 +154,7 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
     return _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, distance, R, p, buffer, count)
 
 
-@njit(cache=True)
+@kernel
 def closest_points(shapes, ref, other, R, p):
     """Distance of two separated polygons' corners, the corners v of `ref` and w of `other`, the feature.
 

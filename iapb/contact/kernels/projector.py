@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from iapb.compiled import kernel
+
+# Pivots are taken among residual rows at least this share of the longest one. A short residual carries rounding
+# of ε / ‖r‖ into its direction, and where one direction is left all rows tie, so that rounding would choose.
+_PIVOT_SHARE = 0.1
 
 
-@njit(cache=True)
+@kernel
 def unit_columns(columns, count, length):
     """Scale every column to unit length (zero columns stay) and write the lengths."""
     d = columns.shape[0]
@@ -27,13 +31,17 @@ def unit_columns(columns, count, length):
                 columns[k, i] /= length[i]
 
 
-@njit(cache=True)
+@kernel
 def _most_violating(closing, size, count, eligible_above):
-    """Pivot: the eligible residual row with the largest |rᵢ·u| / ‖rᵢ‖, −1 if none is left."""
+    """Pivot: the residual row with the largest |rᵢ·u| / ‖rᵢ‖ among eligible and not too short ones, −1 if none."""
     best = -1
     best_speed = -1.0
+    longest = 0.0
     for i in range(count):
-        if size[i] > eligible_above:
+        longest = max(longest, size[i])
+    shortest = max(eligible_above, _PIVOT_SHARE * _PIVOT_SHARE * longest)
+    for i in range(count):
+        if size[i] > shortest:
             speed = abs(closing[i]) / math.sqrt(size[i])
             if speed > best_speed:
                 best = i
@@ -41,7 +49,7 @@ def _most_violating(closing, size, count, eligible_above):
     return best
 
 
-@njit(cache=True)
+@kernel
 def _next_direction(columns, pivot, basis, rank):
     """Orthonormalize the pivot's residual row against the basis once more and append it."""
     d = columns.shape[0]
@@ -62,7 +70,7 @@ def _next_direction(columns, pivot, basis, rank):
         q[k] *= inverse
 
 
-@njit(cache=True)
+@kernel
 def _deflate(columns, count, q, along_q, closing, size, overlap):
     """Remove the direction q from every residual row; update rᵢ·u and ‖rᵢ‖²."""
     d = columns.shape[0]
@@ -83,7 +91,7 @@ def _deflate(columns, count, q, along_q, closing, size, overlap):
         closing[i] -= overlap[i] * along_q
 
 
-@njit(cache=True)
+@kernel
 def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size, overlap):
     """Orthonormal basis of A's row space, most violated rows first; return its size.
 
@@ -120,7 +128,7 @@ def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size
     return rank
 
 
-@njit(cache=True)
+@kernel
 def projected_change(basis, rank, u, factor, change):
     """Δu = −factor · Q Qᵀ u, with factor = 1 + e (21)."""
     d = u.shape[0]

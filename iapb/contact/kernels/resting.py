@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.contact.kernels.rows import add_body_row
 from iapb.mechanics.kernels.jacobians import add_point_force
 from iapb.mechanics.kernels.vectors import dot, load, scale
 
 
-@njit(cache=True)
+@kernel
 def normal_force(gap, normal_velocity, stiffness, damping, clamped):
     """(5) F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; `clamped`: never below zero."""
     force = -stiffness * gap
@@ -20,7 +19,7 @@ def normal_force(gap, normal_velocity, stiffness, damping, clamped):
     return 0.0 if clamped and force < 0.0 else force
 
 
-@njit(cache=True)
+@kernel
 def friction_share(normal_force, speed, friction, friction_velocity):
     """(6) F_f / v_t [N s/m]: −μ F_n t above the threshold speed, −(v_t / v_threshold) μ F_n below it.
 
@@ -32,7 +31,7 @@ def friction_share(normal_force, speed, friction, friction_velocity):
     return -friction * normal_force / reach
 
 
-@njit(cache=True)
+@kernel
 def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
     """Add the forces of all contacts with gap <= 0 to `penalty` and `drag` (d,), generalized forces Jᵀ F.
 
@@ -44,7 +43,7 @@ def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction,
         resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag)
 
 
-@njit(cache=True)
+@kernel
 def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
     """The same for contact i alone."""
     contacts.normal_force[i] = 0.0
@@ -60,7 +59,7 @@ def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, fric
         add_friction(m, w, contacts, i, friction, friction_velocity, drag)
 
 
-@njit(cache=True)
+@kernel
 def add_friction(m, w, contacts, i, friction, friction_velocity, drag):
     """Friction (6) of contact i, opposed to the tangential velocity; `drag` (d,) += Jᵀ F_f."""
     x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)

@@ -5,8 +5,7 @@ A row maps generalized velocity to normal velocity [m/s]; positive separates.
 
 from __future__ import annotations
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.jacobians import motion_at
 from iapb.mechanics.kernels.vectors import add, dot, load, scale, subtract
 
@@ -18,7 +17,7 @@ from iapb.mechanics.kernels.vectors import add, dot, load, scale, subtract
 ROW_NOISE = 1e-13
 
 
-@njit(cache=True)
+@kernel
 def row_entry(m, w, k, x, n):
     """Entry n·j of dof k for the world point x and unit normal n, exact zero where it is only rounding.
 
@@ -35,7 +34,7 @@ def row_entry(m, w, k, x, n):
     return 0.0 if entry * entry <= ROW_NOISE * ROW_NOISE * square else entry
 
 
-@njit(cache=True)
+@kernel
 def add_body_row(m, w, body, x, n, factor, out):
     """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
 
@@ -49,7 +48,7 @@ def add_body_row(m, w, body, x, n, factor, out):
         k = m.dof_parent[k]
 
 
-@njit(cache=True)
+@kernel
 def body_row(m, w, body, point, normal, out):
     """(13), (14): nᵀJ_b of one body alone; out (d,)."""
     out[:] = 0.0
@@ -57,7 +56,7 @@ def body_row(m, w, body, point, normal, out):
     add_body_row(m, w, body, x, n, 1.0, out)
 
 
-@njit(cache=True)
+@kernel
 def contact_row(m, w, contacts, i, out):
     """(11), (12): nᵀ(J_a − J_b) of contact i; out (d,)."""
     out[:] = 0.0
@@ -66,14 +65,14 @@ def contact_row(m, w, contacts, i, out):
     add_body_row(m, w, contacts.body_b[i], x, n, -1.0, out)
 
 
-@njit(cache=True)
+@kernel
 def relative_jacobian_rows(m, w, contacts, count, out):
     """out (count, d) <- the rows (11), (12) of the first `count` contacts."""
     for i in range(count):
         contact_row(m, w, contacts, i, out[i])
 
 
-@njit(cache=True)
+@kernel
 def velocity_at(m, w, body, x, v):
     """Velocity J v of the world point x as fixed to the body [m/s]; zero for the static world."""
     total = (0.0, 0.0, 0.0)
@@ -86,7 +85,7 @@ def velocity_at(m, w, body, x, v):
     return total
 
 
-@njit(cache=True)
+@kernel
 def contact_velocities(m, w, v, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each contact."""
     for i in range(count):

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from numba import njit
+from iapb.compiled import kernel
 
 # A feature number is (kind << 40) | (vertex << 20) | edge: vertex i of one shape against edge j of the other.
 # 20 bits hold a million vertices; shapes with more would need a different narrow phase anyway.
 _VERTEX_SHIFT, _KIND_SHIFT = 20, 40
 
 
-@njit(cache=True)
+@kernel
 def vertex_feature(kind, vertex, edge):
     """Feature number. kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners."""
     return (kind << _KIND_SHIFT) | (vertex << _VERTEX_SHIFT) | edge
 
 
-@njit(cache=True)
+@kernel
+def placement(body, R, p):
+    """Planar part of a body's placement: R row by row, then p; body < 0 is the world."""
+    if body < 0:
+        return 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
+    return R[body, 0, 0], R[body, 0, 1], R[body, 1, 0], R[body, 1, 1], p[body, 0], p[body, 1]
+
+
+@kernel
 def to_world(x, y, body, R, p):
     """World coordinates of a point given in a body's frame; body < 0 is the world."""
     if body < 0:
@@ -26,7 +34,7 @@ def to_world(x, y, body, R, p):
     )
 
 
-@njit(cache=True)
+@kernel
 def turn_to_world(x, y, body, R):
     """World components of a direction given in a body's frame."""
     if body < 0:
@@ -34,24 +42,17 @@ def turn_to_world(x, y, body, R):
     return R[body, 0, 0] * x + R[body, 0, 1] * y, R[body, 1, 0] * x + R[body, 1, 1] * y
 
 
-@njit(cache=True)
+@kernel
 def world_point(shapes, row, shape, R, p):
     """World coordinates of row `row` of `shapes.vertices`, which belongs to `shape`."""
     return to_world(shapes.vertices[row, 0], shapes.vertices[row, 1], shapes.body[shape], R, p)
 
 
-@njit(cache=True)
+@kernel
 def relative_frame(shapes, onto, other, R, p):
     """Rotation Q (4 numbers) and translation t of `other` seen from `onto`: x_onto = Q x_other + t."""
-    i, j = shapes.body[onto], shapes.body[other]
-    ixx, ixy, iyx, iyy, ix, iy = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
-    if i >= 0:
-        ixx, ixy, iyx, iyy = R[i, 0, 0], R[i, 0, 1], R[i, 1, 0], R[i, 1, 1]
-        ix, iy = p[i, 0], p[i, 1]
-    jxx, jxy, jyx, jyy, jx, jy = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
-    if j >= 0:
-        jxx, jxy, jyx, jyy = R[j, 0, 0], R[j, 0, 1], R[j, 1, 0], R[j, 1, 1]
-        jx, jy = p[j, 0], p[j, 1]
+    ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
+    jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
     dx, dy = jx - ix, jy - iy
     return (
         ixx * jxx + iyx * jyx,
@@ -63,7 +64,7 @@ def relative_frame(shapes, onto, other, R, p):
     )
 
 
-@njit(cache=True)
+@kernel
 def store(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
     """Write one contact at row `count`; return the next row, or -1 when the buffer is full."""
     if count >= buffer.gap.shape[0]:

@@ -7,8 +7,7 @@ as Pinocchio does.
 
 from math import atan2, cos, sin, sqrt
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.arrays import CONTINUOUS, FIXED, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.vectors import add, cross, dot, scale
 
@@ -17,7 +16,7 @@ from iapb.mechanics.kernels.vectors import add, cross, dot, scale
 SMALL_ANGLE = 1e-4
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def screw_coefficients(angle):
     """Return ((1 - cos t) / t^2, (t - sin t) / t^3) of the angle t."""
     square = angle * angle
@@ -27,7 +26,7 @@ def screw_coefficients(angle):
     return 2.0 * half * half / square, (angle - sin(angle)) / (square * angle)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def turn_vector(x, y, z, s, a):
     """Rotate a by the unit quaternion (x, y, z, s)."""
     axis = (x, y, z)
@@ -35,7 +34,7 @@ def turn_vector(x, y, z, s, a):
     return add(a, add(scale(s, twice), cross(axis, twice)))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def turn_pair(q, i, angle, out):
     """(cos, sin) at i <- turned by the angle, length restored to one."""
     c = q[i] * cos(angle) - q[i + 1] * sin(angle)
@@ -44,7 +43,7 @@ def turn_pair(q, i, angle, out):
     out[i], out[i + 1] = c / length, s / length
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def turn_quaternion(q, i, phi, out):
     """Quaternion at i <- q * exp(phi / 2), phi [rad] a rotation vector in body axes."""
     angle = sqrt(dot(phi, phi))
@@ -58,7 +57,7 @@ def turn_quaternion(q, i, phi, out):
     out[i + 3] = scalar / length
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def integrate_free_flyer(q, i, v, k, dt, out):
     """p += R (1 + A [phi]x + B [phi]x^2) u with u = v_linear dt, phi = v_angular dt; R turns by phi."""
     u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
@@ -71,7 +70,7 @@ def integrate_free_flyer(q, i, v, k, dt, out):
     turn_quaternion(q, i + 3, phi, out)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def integrate_planar_se2(q, i, v, k, dt, out):
     """The same in the plane: q = (x, y, cos, sin), v = (u_x, u_y, omega) in body axes."""
     u, phi = (v[k] * dt, v[k + 1] * dt, 0.0), (0.0, 0.0, v[k + 2] * dt)
@@ -84,7 +83,7 @@ def integrate_planar_se2(q, i, v, k, dt, out):
     turn_pair(q, i + 2, phi[2], out)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def integrate(m, q, v, dt, out):
     """out (nq,) <- q moved for dt with the constant velocity v; out may be q itself."""
     for b in range(m.kind.shape[0]):
@@ -104,7 +103,7 @@ def integrate(m, q, v, dt, out):
                 out[i + j] = q[i + j] + dt * v[k + j]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def quaternion_difference(q0, q1, i):
     """Rotation vector phi in the body axes of q0 with q1 = q0 * exp(phi / 2), |phi| <= pi."""
     a, s = (-q0[i], -q0[i + 1], -q0[i + 2]), q0[i + 3]
@@ -118,7 +117,7 @@ def quaternion_difference(q0, q1, i):
     return scale(factor, vector)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def inverse_screw(path, phi):
     """u with (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path)."""
     angle = sqrt(dot(phi, phi))
@@ -131,7 +130,7 @@ def inverse_screw(path, phi):
     return add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, taking the shortest turns."""
     for b in range(m.kind.shape[0]):

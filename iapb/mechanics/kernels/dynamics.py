@@ -5,8 +5,7 @@ Featherstone, Rigid Body Dynamics Algorithms, 2008, here in world axes. Composit
 composite's own centre of mass, where merging two bodies only adds positive terms.
 """
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2
 from iapb.mechanics.kernels.vectors import (
     accumulate,
@@ -22,20 +21,25 @@ from iapb.mechanics.kernels.vectors import (
 )
 
 
-@njit(cache=True, fastmath=False)
+@kernel
+def turned_inertia(m, w, b, omega):
+    """R I R^T omega of body b alone."""
+    return transform(w.rotation, b, transform(m.inertia, b, transform_back(w.rotation, b, omega)))
+
+
+@kernel
 def start_composite(m, w, b):
     """Composite of b <- body b alone, inertia turned into world axes: R I R^T."""
     w.composite_mass[b] = m.mass[b]
     store(w.composite_center, b, load(w.center, b))
-    for column in range(3):
-        f = w.rotation[b]
-        image = transform(m.inertia, b, (f[column, 0], f[column, 1], f[column, 2]))
-        image = transform(w.rotation, b, image)
-        for row in range(3):
-            w.composite_inertia[b, row, column] = image[row]
+    for r in range(3):
+        row = (w.rotation[b, r, 0], w.rotation[b, r, 1], w.rotation[b, r, 2])
+        image = transform(w.rotation, b, transform(m.inertia, b, row))
+        for s in range(3):
+            w.composite_inertia[b, r, s] = image[s]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def merge_composite(w, into, b):
     """Add the composite of b to another: I = I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2)."""
     m1, m2 = w.composite_mass[into], w.composite_mass[b]
@@ -53,7 +57,7 @@ def merge_composite(w, into, b):
     store(w.composite_center, into, add(c1, scale(share, r)))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def composite_bodies(m, w):
     """For each body: mass, centre and inertia of itself and all it carries."""
     for b in range(m.kind.shape[0]):
@@ -63,7 +67,7 @@ def composite_bodies(m, w):
             merge_composite(w, m.parent[b], b)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def mass_matrix(m, w, out):
     """out (d, d) <- M(q), symmetric; entries between dofs that do not share a chain are zero.
 
@@ -93,7 +97,7 @@ def mass_matrix(m, w, out):
             i = m.dof_parent[i]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def gravity(m, w, g, out):
     """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world axes."""
     for b in range(m.kind.shape[0]):
@@ -102,7 +106,7 @@ def gravity(m, w, g, out):
     project_forces(m, w, out)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def project_forces(m, w, out):
     """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof components."""
     for b in range(m.kind.shape[0] - 1, -1, -1):
@@ -116,7 +120,7 @@ def project_forces(m, w, out):
             accumulate(w.moment, parent, add(n, cross(lever, f)))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def relative_motion(m, w, b, rates):
     """Linear and angular part of the joint's motion for these rates of its dofs, world axes."""
     linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -128,7 +132,7 @@ def relative_motion(m, w, b, rates):
     return linear, angular
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def body_velocities(m, w, v):
     """Angular velocity of each body and velocity of its origin."""
     zero = (0.0, 0.0, 0.0)
@@ -142,7 +146,7 @@ def body_velocities(m, w, v):
         store(w.linear_velocity, b, add(add(origin, cross(omega, r)), linear))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def body_accelerations(m, w, v, dv, g):
     """Acceleration of each body for dv/dt = dv, the world accelerating by -g (so that weight is included).
 
@@ -167,7 +171,7 @@ def body_accelerations(m, w, v, dv, g):
         store(w.linear_acceleration, b, add(a, du))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def inverse_dynamics(m, w, v, dv, g, out):
     """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler."""
     body_velocities(m, w, v)
@@ -184,13 +188,7 @@ def inverse_dynamics(m, w, v, dv, g, out):
     project_forces(m, w, out)
 
 
-@njit(cache=True, fastmath=False)
-def turned_inertia(m, w, b, omega):
-    """R I R^T omega of body b alone."""
-    return transform(w.rotation, b, transform(m.inertia, b, transform_back(w.rotation, b, omega)))
-
-
-@njit(cache=True, fastmath=False)
+@kernel
 def bias(m, w, v, out):
     """out (d,) <- B(q, v): Coriolis and centripetal generalized forces."""
     inverse_dynamics(m, w, v, w.at_rest, (0.0, 0.0, 0.0), out)

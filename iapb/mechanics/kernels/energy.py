@@ -1,19 +1,18 @@
 """Energies and momentum as sums over bodies: no cancellation between large entries of M."""
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.dynamics import body_velocities, turned_inertia
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def center_velocity(w, b):
     """Velocity of body b's centre of mass: v_o + omega x (c - o)."""
     lever = subtract(load(w.center, b), load(w.position, b))
     return add(load(w.linear_velocity, b), cross(load(w.angular_velocity, b), lever))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def kinetic_energy(m, w, v):
     """Return sum of (m |v_c|^2 + omega . I omega) / 2 [J]."""
     body_velocities(m, w, v)
@@ -24,7 +23,7 @@ def kinetic_energy(m, w, v):
     return total
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def potential_energy(m, w, g):
     """Return -sum of m g . c [J], zero with every centre of mass at the world origin."""
     total = 0.0
@@ -33,7 +32,7 @@ def potential_energy(m, w, g):
     return total
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def centroidal_momentum(m, w, v, out):
     """out (6,) <- linear momentum [N s] and angular momentum about the common centre of mass [N m s]."""
     body_velocities(m, w, v)

@@ -4,19 +4,18 @@ Dof k moves point x of every body it carries with velocity a_k (translation) or 
 where o_k is the origin of the body that the dof moves.
 """
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def motion_at(m, w, k, x):
     """Velocity of the point x per unit velocity of dof k."""
     a = load(w.axis, k)
     return cross(a, subtract(x, load(w.position, m.dof_body[k]))) if m.dof_rotates[k] else a
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def point_jacobian(m, w, body, point, out):
     """out (3, d) <- Jacobian of the velocity of the world point, taken as fixed to the body."""
     out[:] = 0.0
@@ -27,7 +26,7 @@ def point_jacobian(m, w, body, point, out):
         k = m.dof_parent[k]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def frame_jacobian(m, w, body, out):
     """out (6, d) <- Jacobian of the body's origin (rows 0 to 2) and angular velocity (3 to 5), world axes."""
     out[:] = 0.0
@@ -40,7 +39,7 @@ def frame_jacobian(m, w, body, out):
         k = m.dof_parent[k]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def add_point_force(m, w, body, point, force, out):
     """out (d,) += J^T force: force [N], world axes, on the body at the world point.
 
@@ -55,7 +54,7 @@ def add_point_force(m, w, body, point, force, out):
         k = m.dof_parent[k]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def point_velocity(m, w, body, point, v, out):
     """out (3,) <- velocity J v of the world point as fixed to the body; zero for body -1."""
     total = (0.0, 0.0, 0.0)

@@ -2,8 +2,7 @@
 
 from math import cos, sin
 
-from numba import njit
-
+from iapb.compiled import kernel
 from iapb.mechanics.kernels.arrays import (
     CONTINUOUS,
     FIXED,
@@ -14,32 +13,37 @@ from iapb.mechanics.kernels.arrays import (
     REVOLUTE,
     SPHERICAL,
 )
-from iapb.mechanics.kernels.vectors import add, columns_times, load, scale, store, transform
+from iapb.mechanics.kernels.vectors import (
+    add,
+    column,
+    load,
+    scale,
+    store,
+    store_columns,
+    transform,
+    turn_frame,
+)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def place_joint_frame(m, w, b):
     """Body b's frame <- its joint frame: R = R_parent R_placement, p = p_parent + R_parent p_placement."""
-    parent = m.parent[b]
-    if parent < 0:
-        w.rotation[b] = m.placement_rotation[b]
-        store(w.position, b, load(m.placement_position, b))
-        return
-    w.rotation[b] = w.rotation[parent]
-    f = m.placement_rotation[b]
-    columns_times(
-        w.rotation, b, (f[0, 0], f[1, 0], f[2, 0]), (f[0, 1], f[1, 1], f[2, 1]), (f[0, 2], f[1, 2], f[2, 2])
-    )
-    offset = transform(w.rotation, parent, load(m.placement_position, b))
-    store(w.position, b, add(load(w.position, parent), offset))
+    parent, offset, fixed = m.parent[b], load(m.placement_position, b), m.placement_rotation
+    x, y, z = column(fixed, b, 0), column(fixed, b, 1), column(fixed, b, 2)
+    if parent >= 0:
+        R = w.rotation
+        x, y, z = transform(R, parent, x), transform(R, parent, y), transform(R, parent, z)
+        offset = add(load(w.position, parent), transform(R, parent, offset))
+    store_columns(w.rotation, b, x, y, z)
+    store(w.position, b, offset)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def turn_about_axis(w, b, a, c, s):
     """Rodrigues: R <- R (c 1 + (1 - c) a a^T + s [a]x), angle with cosine c and sine s."""
     x, y, z = a
     u = 1.0 - c
-    columns_times(
+    turn_frame(
         w.rotation,
         b,
         (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
@@ -48,10 +52,10 @@ def turn_about_axis(w, b, a, c, s):
     )
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def turn_by_quaternion(w, b, x, y, z, s):
     """R <- R R(x, y, z, s), unit quaternion with scalar part s."""
-    columns_times(
+    turn_frame(
         w.rotation,
         b,
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
@@ -60,20 +64,19 @@ def turn_by_quaternion(w, b, x, y, z, s):
     )
 
 
-@njit(cache=True, fastmath=False)
-def store_columns(w, b, first):
-    """Axes of three dofs <- the columns of body b's rotation."""
-    f = w.rotation[b]
+@kernel
+def body_axes_to_dofs(w, b, first):
+    """Axes of three dofs <- the axes of body b."""
     for k in range(3):
-        store(w.axis, first + k, (f[0, k], f[1, k], f[2, k]))
+        store(w.axis, first + k, column(w.rotation, b, k))
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def move_joint(m, q, w, b):
     """Carry body b from its joint frame to its place; write the axes of the joint's dofs."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
-        store_columns(w, b, k)
+        body_axes_to_dofs(w, b, k)
         shift = transform(w.rotation, b, (q[i], q[i + 1], 0.0))
         turn_about_axis(w, b, (0.0, 0.0, 1.0), cos(q[i + 2]), sin(q[i + 2]))
         store(w.position, b, add(load(w.position, b), shift))
@@ -89,21 +92,21 @@ def move_joint(m, q, w, b):
         store(w.position, b, add(load(w.position, b), scale(q[i], load(w.axis, k))))
     elif kind == SPHERICAL:
         turn_by_quaternion(w, b, q[i], q[i + 1], q[i + 2], q[i + 3])
-        store_columns(w, b, k)
+        body_axes_to_dofs(w, b, k)
     elif kind == FREE_FLYER:
         shift = transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))
         turn_by_quaternion(w, b, q[i + 3], q[i + 4], q[i + 5], q[i + 6])
         store(w.position, b, add(load(w.position, b), shift))
-        store_columns(w, b, k)
-        store_columns(w, b, k + 3)
+        body_axes_to_dofs(w, b, k)
+        body_axes_to_dofs(w, b, k + 3)
     elif kind == PLANAR_SE2:
         shift = transform(w.rotation, b, (q[i], q[i + 1], 0.0))
         turn_about_axis(w, b, (0.0, 0.0, 1.0), q[i + 2], q[i + 3])
         store(w.position, b, add(load(w.position, b), shift))
-        store_columns(w, b, k)
+        body_axes_to_dofs(w, b, k)
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def forward_kinematics(m, q, w):
     """Fill rotation, position, center and axis of the workspace w for the configuration q.
 

@@ -2,16 +2,16 @@
 
 # Kernels carry no type hints: numba infers them, and a vector here is (float, float, float).
 
-from numba import njit
+from iapb.compiled import kernel
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def load(rows, i):
     """Row i of an (n, 3) array."""
     return (rows[i, 0], rows[i, 1], rows[i, 2])
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def store(rows, i, a):
     """Write a into row i of an (n, 3) array."""
     rows[i, 0] = a[0]
@@ -19,7 +19,7 @@ def store(rows, i, a):
     rows[i, 2] = a[2]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def accumulate(rows, i, a):
     """Add a to row i of an (n, 3) array."""
     rows[i, 0] += a[0]
@@ -27,63 +27,72 @@ def accumulate(rows, i, a):
     rows[i, 2] += a[2]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def add(a, b):
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def subtract(a, b):
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def scale(s, a):
     """s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def dot(a, b):
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def transform(frames, i, a):
     """frames[i] a: from the axes of frame i to those it is given in."""
-    f = frames[i]
     return (
-        f[0, 0] * a[0] + f[0, 1] * a[1] + f[0, 2] * a[2],
-        f[1, 0] * a[0] + f[1, 1] * a[1] + f[1, 2] * a[2],
-        f[2, 0] * a[0] + f[2, 1] * a[1] + f[2, 2] * a[2],
+        frames[i, 0, 0] * a[0] + frames[i, 0, 1] * a[1] + frames[i, 0, 2] * a[2],
+        frames[i, 1, 0] * a[0] + frames[i, 1, 1] * a[1] + frames[i, 1, 2] * a[2],
+        frames[i, 2, 0] * a[0] + frames[i, 2, 1] * a[1] + frames[i, 2, 2] * a[2],
     )
 
 
-@njit(cache=True, fastmath=False)
+@kernel
 def transform_back(frames, i, a):
     """frames[i]^T a."""
-    f = frames[i]
     return (
-        f[0, 0] * a[0] + f[1, 0] * a[1] + f[2, 0] * a[2],
-        f[0, 1] * a[0] + f[1, 1] * a[1] + f[2, 1] * a[2],
-        f[0, 2] * a[0] + f[1, 2] * a[1] + f[2, 2] * a[2],
+        frames[i, 0, 0] * a[0] + frames[i, 1, 0] * a[1] + frames[i, 2, 0] * a[2],
+        frames[i, 0, 1] * a[0] + frames[i, 1, 1] * a[1] + frames[i, 2, 1] * a[2],
+        frames[i, 0, 2] * a[0] + frames[i, 1, 2] * a[1] + frames[i, 2, 2] * a[2],
     )
 
 
-@njit(cache=True, fastmath=False)
-def columns_times(frames, i, x, y, z):
-    """frames[i] <- frames[i] [x y z], where x, y, z are the columns of a rotation."""
-    x, y, z = transform(frames, i, x), transform(frames, i, y), transform(frames, i, z)
+@kernel
+def column(frames, i, k):
+    """Column k of frames[i]: its k-th axis."""
+    return (frames[i, 0, k], frames[i, 1, k], frames[i, 2, k])
+
+
+@kernel
+def store_columns(frames, i, x, y, z):
+    """frames[i] <- [x y z]."""
     for r in range(3):
         frames[i, r, 0] = x[r]
         frames[i, r, 1] = y[r]
         frames[i, r, 2] = z[r]
+
+
+@kernel
+def turn_frame(frames, i, x, y, z):
+    """frames[i] <- frames[i] [x y z], where x, y, z are the columns of a rotation."""
+    store_columns(frames, i, transform(frames, i, x), transform(frames, i, y), transform(frames, i, z))

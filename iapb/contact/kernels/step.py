@@ -1,0 +1,177 @@
+"""One step of the paper's algorithm, compiled: a function per effect, an `if` each.
+
+`advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration by Δt.
+The Penalty law is the same page with the impulses switched off (e = −1, claim C09).
+"""
+
+from __future__ import annotations
+
+import math
+
+from iapb.compiled import copy_into, kernel
+from iapb.contact.kernels.cholesky import cholesky, solve_mass
+from iapb.contact.kernels.collide import resolve_collisions
+from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.resting import resting_force
+from iapb.contact.kernels.rows import contact_velocities
+from iapb.mechanics.kernels import bias, forward_kinematics, gravity, integrate, mass_matrix
+from iapb.run import COLLIDING, RESTING
+
+OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
+STATUS_TEXT = {
+    NOT_POSITIVE_DEFINITE: "the mass matrix is not positive definite in this configuration",
+    TOO_MANY_CONTACTS: "more contacts at once than the scene's shapes can give: a fault of the engine",
+    NOT_FINITE: "the motion left the range of numbers: the step is too long for this stiffness and mass",
+}
+
+
+@kernel
+def advance(world, state, applied):
+    """Advance (q, v) by one step under the generalized force `applied` (d,); return a status."""
+    clear(state)
+    if not locate(world, state):
+        return NOT_POSITIVE_DEFINITE
+    if world.switches.contacts:
+        if find_contacts(world, state, 0.0) < 0:
+            return TOO_MANY_CONTACTS
+        if world.switches.impulses:
+            resolve_collisions(world, state)
+    return move(world, state, applied)
+
+
+@kernel
+def clear(state):
+    """Forget the forces and impulses of the step before."""
+    state.penalty_force[:] = 0.0
+    state.friction_force[:] = 0.0
+    state.impulse[:] = 0.0
+    state.impacts.count[0] = 0
+
+
+@kernel
+def locate(world, state):
+    """Place all bodies at q; refresh M and its factor where they depend on q. False: M is not definite."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+    if not world.switches.varying_inertia:
+        return True
+    mass_matrix(world.mechanism, state.body, state.mass_matrix)
+    return cholesky(state.mass_matrix, state.lower) == 0
+
+
+@kernel
+def find_contacts(world, state, margin):
+    """Section III: contacts with gap <= margin, filtered, new or old, each group in one of three states."""
+    remember(state)
+    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, margin, state.contacts)
+    if count < 0:
+        return count
+    if world.switches.clustering:
+        count = cluster(state.contacts, count, world.cluster_distance)
+    state.count[0] = count
+    state.contact_impulse[:count] = 0.0
+    contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
+    mark_new(state.contacts, count, state.previous, state.count[1], world.coherence_distance)
+    classify(state.contacts, count, world.tree_of_body, world.tree_start, world.tree_stop, world.approach_velocity,
+             state.spreading, state.group_of_tree, state.state_of_tree)
+    if not world.switches.impulses:
+        for t in range(state.state_of_tree.shape[0]):
+            if state.state_of_tree[t] == COLLIDING:
+                state.state_of_tree[t] = RESTING
+    return count
+
+
+@kernel
+def remember(state):
+    """The contacts of this step become those of the step before: what `mark_new` compares with."""
+    now, before = state.contacts, state.previous
+    for i in range(state.count[0]):
+        before.shape_a[i], before.shape_b[i] = now.shape_a[i], now.shape_b[i]
+        before.body_a[i], before.body_b[i] = now.body_a[i], now.body_b[i]
+        before.feature[i], before.gap[i] = now.feature[i], now.gap[i]
+        for axis in range(3):
+            before.point[i, axis] = now.point[i, axis]
+            before.normal[i, axis] = now.normal[i, axis]
+    state.count[1] = state.count[0]
+
+
+@kernel
+def find_near(world, state, margin):
+    """`find_contacts` for laws written in Python, which look beyond touching; −1: too many."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+    return find_contacts(world, state, margin)
+
+
+@kernel
+def move(world, state, applied):
+    """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
+    copy_into(state.start_q, state.q)
+    copy_into(state.start_v, state.v)
+    state.mean_v[:] = 0.0
+    state.mean_acceleration[:] = 0.0
+    for stage in range(world.stage_weight.shape[0]):
+        if stage > 0 and not go_to_stage(world, state, world.dt * world.stage_fraction[stage]):
+            return NOT_POSITIVE_DEFINITE
+        accelerate(world, state, applied, stage)
+        weight = world.stage_weight[stage]
+        for k in range(state.v.shape[0]):
+            state.mean_v[k] += weight * state.v[k]
+            state.mean_acceleration[k] += weight * state.acceleration[k]
+            state.penalty_force[k] += weight * state.stage_penalty[k]
+            state.friction_force[k] += weight * state.stage_friction[k]
+    finite = True
+    for k in range(state.v.shape[0]):
+        state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
+        finite = finite and math.isfinite(state.v[k])
+    velocity = state.v if world.semi_implicit else state.mean_v
+    integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
+    return OK if finite else NOT_FINITE
+
+
+@kernel
+def go_to_stage(world, state, time):
+    """Follow the last stage's velocity and acceleration for `time` [s] from the start of the step."""
+    integrate(world.mechanism, state.start_q, state.v, time, state.q)
+    for k in range(state.v.shape[0]):
+        state.v[k] = state.start_v[k] + time * state.acceleration[k]
+    return locate(world, state)
+
+
+@kernel
+def accelerate(world, state, applied, stage):
+    """(7): M a = applied + penalty + friction − B − G at the present stage."""
+    rest(world, state, stage)
+    a = state.acceleration
+    for k in range(a.shape[0]):
+        a[k] = applied[k] + state.stage_penalty[k] + state.stage_friction[k]
+    if world.switches.gravity:
+        gravity(world.mechanism, state.body, world.gravity, state.bias)
+        for k in range(a.shape[0]):
+            a[k] -= state.bias[k]
+    if world.switches.velocity_terms:
+        bias(world.mechanism, state.body, state.v, state.bias)
+        for k in range(a.shape[0]):
+            a[k] -= state.bias[k]
+    solve_mass(state.lower, a, a)
+
+
+@kernel
+def rest(world, state, stage):
+    """(4)-(6) at the contacts of every group that is not colliding: there the impulse holds the constraint."""
+    state.stage_penalty[:] = 0.0
+    state.stage_friction[:] = 0.0
+    if not world.switches.contacts:
+        return
+    contacts, count = state.contacts, state.count[0]
+    if stage > 0:
+        contacts = state.stage_contacts
+        count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, contacts)
+        contact_velocities(world.mechanism, state.body, state.v, contacts, count)
+    for i in range(count):
+        contacts.normal_force[i] = 0.0
+        contacts.friction_force[i] = 0.0
+        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
+                                 state.group_of_tree)
+        if group >= 0 and state.state_of_tree[group] != COLLIDING:
+            resting_force(world.mechanism, state.body, contacts, i, world.stiffness, world.damping, world.clamped,
+                          world.friction, world.friction_velocity, state.stage_penalty, state.stage_friction)

@@ -1,0 +1,109 @@
+"""What one step reads (World, constant) and what it writes (State): plain arrays and numbers for the kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.contact.geometry import ContactBuffer, Shapes
+from iapb.contact.kernels.impact import ImpactWork
+from iapb.mechanics.kernels import MechanismArrays, Workspace
+
+
+class Switches(NamedTuple):
+    """Effects that are on. One that is off costs one branch: its code is not entered."""
+
+    gravity: bool
+    varying_inertia: bool
+    velocity_terms: bool
+    impulses: bool
+    clustering: bool
+    impulse_limit: bool
+    spreading: bool
+    contacts: bool
+
+
+class World(NamedTuple):
+    """A scene under one contact law, as the step reads it (n bodies, d velocities, t trees)."""
+
+    mechanism: MechanismArrays
+    shapes: Shapes
+    pairs: np.ndarray  # (k, 2) candidate pairs of shapes
+    tree_of_body: np.ndarray  # (n,) int64
+    tree_start: np.ndarray  # (t,) first dof of each tree
+    tree_stop: np.ndarray  # (t,)
+    switches: Switches
+    dt: float  # [s]
+    gravity: np.ndarray  # (3,) [m/s²]
+    stiffness: float  # K [N/m] (5)
+    damping: float  # B [N s/m] (5)
+    clamped: bool  # F_n >= 0; False: (5) as printed, may pull
+    friction: float  # μ (6)
+    friction_velocity: float  # v_threshold [m/s] (6)
+    restitution: float  # e
+    approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
+    cluster_distance: float  # [m]
+    coherence_distance: float  # [m]
+    per_body_rows: bool  # (13)-(14) instead of (12)
+    impulse_limit: np.ndarray  # (d,) largest |Jᵀp/Δt| the device can render [N, N m], inf = none
+    stage_fraction: np.ndarray  # (s,) where in the step each force evaluation of the integrator stands, first 0
+    stage_weight: np.ndarray  # (s,) its share of the step, sum 1
+    semi_implicit: bool  # the new velocity moves the configuration (one stage only)
+
+
+class State(NamedTuple):
+    """Everything that changes from step to step, and the scratch of the step."""
+
+    q: np.ndarray  # (nq,)
+    v: np.ndarray  # (d,)
+    mass_matrix: np.ndarray  # (d, d)
+    lower: np.ndarray  # (d, d) its Cholesky factor
+    body: Workspace  # placements and mechanics scratch
+    contacts: ContactBuffer  # of this step
+    previous: ContactBuffer  # of the step before
+    stage_contacts: ContactBuffer  # at an inner stage of the integrator
+    count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
+    group_of_tree: np.ndarray  # (t,) int64: first tree of its contact group
+    state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
+    spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
+    penalty_force: np.ndarray  # (d,) [N, N m]
+    friction_force: np.ndarray  # (d,)
+    impulse: np.ndarray  # (d,) generalized impulse of the step [N s, N m s]
+    stage_penalty: np.ndarray  # (d,) the same at one stage of the integrator
+    stage_friction: np.ndarray  # (d,)
+    bias: np.ndarray  # (d,) B or G, scratch
+    acceleration: np.ndarray  # (d,)
+    start_q: np.ndarray  # (nq,) scratch of the integrators
+    start_v: np.ndarray  # (d,) velocity after the impact
+    mean_v: np.ndarray  # (d,)
+    mean_acceleration: np.ndarray  # (d,)
+    contact_impulse: np.ndarray  # (c,) [N s] per contact, minimum norm
+    rows: np.ndarray  # (c,) int64: contact of each row of the impact in hand
+    dofs: np.ndarray  # (d,) int64: coordinates of the group in hand
+    group_mass: np.ndarray  # (d, d)
+    group_lower: np.ndarray  # (d, d)
+    group_v: np.ndarray  # (d,)
+    group_v_plus: np.ndarray  # (d,)
+    group_impulse: np.ndarray  # (d,)
+    row_impulse: np.ndarray  # (rows,)
+    triangle: np.ndarray  # (d, d)
+    target: np.ndarray  # (d,)
+    row: np.ndarray  # (d,) one contact row nᵀJ
+    work: ImpactWork
+    impacts: ImpactLog
+
+
+class ImpactLog(NamedTuple):
+    """The impacts of one step, one row per colliding group."""
+
+    count: np.ndarray  # (1,) int64
+    group: np.ndarray  # (t,) int64
+    rows: np.ndarray  # (t,) int64
+    rank: np.ndarray  # (t,) int64
+    scale: np.ndarray  # (t,)
+    clamp: np.ndarray  # (t,)
+    energy_lost: np.ndarray  # (t,) [J]
+    v_minus: np.ndarray  # (t, d)
+    v_plus: np.ndarray  # (t, d)
+    impulse: np.ndarray  # (t, d) [N s, N m s]

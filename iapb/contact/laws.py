@@ -1,0 +1,140 @@
+"""Contact laws: the whole step from (q, v) to (q, v), as one protocol that engine, references and users share.
+
+The engine brings two: impulses while a contact is new and penalties while it lasts (ImpulseAugmented, the
+paper's), and penalties alone (Penalty: the same page with e = −1, claim C09). `reference.time_stepping` adds rigid
+constraints; any class with `name`, `settings` and `advance` is a law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.kernels.world import State
+from iapb.errors import ArgumentError, IapbError
+
+Floats = NDArray[np.float64]
+
+RENDERINGS = ("full", "saturate", "scale", "spread")
+
+
+class Integrator(NamedTuple):
+    """An explicit integrator as the compiled step reads it: stages, their weights, and its declared order."""
+
+    name: str
+    order: int
+    fraction: tuple[float, ...]  # where in the step each force evaluation stands
+    weight: tuple[float, ...]  # its share of the step
+    semi_implicit: bool = False
+
+
+INTEGRATORS = {
+    method.name: method
+    for method in (
+        Integrator("semi_implicit_euler", 1, (0.0,), (1.0,), semi_implicit=True),
+        Integrator("midpoint", 2, (0.0, 0.5), (0.0, 1.0)),
+        Integrator("runge_kutta_4", 4, (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+    )
+}
+
+
+class StepResult(NamedTuple):
+    """What a law returns for one step (d generalized velocities)."""
+
+    q: Floats  # (nq,) configuration at the end of the step
+    v: Floats  # (d,) generalized velocity at the end of the step [m/s, rad/s]
+    penalty_force: Floats  # (d,) generalized normal contact force over the step [N, N m]
+    friction_force: Floats  # (d,)
+    impulse: Floats  # (d,) generalized collision impulse [N s, N m s], on top of the forces
+    state: int  # FREE, COLLIDING or RESTING: the tool's contact state (see iapb.run)
+
+
+class ContactLaw(Protocol):
+    """A contact law: the whole step.
+
+    A law may also fill ``state.contacts`` (with ``state.count[0]``), for the record. Stateless where possible:
+    what changes lives in `state`.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name that goes into every run."""
+        ...
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings that go into every run: plain numbers and texts."""
+        ...
+
+    def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
+        """Advance (state.q, state.v) by dt [s] under a generalized force (d,) held constant over the step."""
+        ...
+
+
+@dataclass(frozen=True)
+class _EngineLaw:
+    """What the two laws of the engine share: an integrator, and a compiled kernel."""
+
+    integrator: str = "semi_implicit_euler"
+
+    def __post_init__(self) -> None:
+        if self.integrator not in INTEGRATORS:
+            raise ArgumentError("integrator", self.integrator, "one of " + ", ".join(INTEGRATORS))
+
+    def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
+        """One step by the compiled kernel, from Python (see `ContactLaw`)."""
+        from iapb.contact.kernels.step import STATUS_TEXT, advance
+
+        world = system.world_under(self)
+        if dt != world.dt:
+            raise ArgumentError("dt", dt, f"the scene's step {world.dt!r} s: the engine's laws keep a fixed step")
+        status = advance(world, state, applied_force)
+        if status:
+            raise IapbError(STATUS_TEXT[status])
+        tool = int(state.state_of_tree.max(initial=0)) if system.tool_tree < 0 else system.tool_tree
+        contact_state = int(state.state_of_tree[tool]) if system.tool_tree >= 0 else tool
+        return StepResult(state.q, state.v, state.penalty_force, state.friction_force, state.impulse, contact_state)
+
+
+@dataclass(frozen=True)
+class ImpulseAugmented(_EngineLaw):
+    """The paper's law: impulses (20)-(21) when a contact is new, penalty (5) and friction (6) while it lasts.
+
+    Parameters
+    ----------
+    integrator : name in `INTEGRATORS`.
+    rendering : how impulses meet the device's force limits (paper section VI): ``full`` ignores them,
+        ``saturate`` clips at the device, ``scale`` scales tool and device alike, ``spread`` scales and stays in
+        collision until the rest is rendered. Without limits in the scene all four are the same.
+    """
+
+    rendering: str = "full"
+    name = "impulse-augmented penalty"
+    impulses = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rendering not in RENDERINGS:
+            raise ArgumentError("rendering", self.rendering, "one of " + ", ".join(RENDERINGS))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Integrator and rendering."""
+        return {"integrator": self.integrator, "rendering": self.rendering}
+
+
+@dataclass(frozen=True)
+class Penalty(_EngineLaw):
+    """Penalties alone: (5)-(6) at every contact, new or old."""
+
+    name = "penalty"
+    impulses = False
+    rendering = "full"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Integrator."""
+        return {"integrator": self.integrator}

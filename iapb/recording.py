@@ -1,0 +1,167 @@
+"""Recording of a simulation, chunk by chunk: what the loop writes and how it becomes a Run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from iapb.compiled import block, copy_into, kernel
+from iapb.run import ContactTable, ImpactTable
+
+_CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
+_STEPS_PER_CHUNK = 512  # one second of the paper's loop: progress and Ctrl-C answer at least that often
+
+
+class Record(NamedTuple):
+    """Arrays of one chunk of n steps; states are those at the *end* of each step."""
+
+    q: np.ndarray  # (n, nq)
+    v: np.ndarray  # (n, d)
+    device_q: np.ndarray  # (n, nq_t)
+    device_v: np.ndarray  # (n, d_t)
+    hand_force: np.ndarray  # (n, d)
+    coupling_force: np.ndarray  # (n, d)
+    penalty_force: np.ndarray  # (n, d)
+    friction_force: np.ndarray  # (n, d)
+    impulse: np.ndarray  # (n, d)
+    environment_force: np.ndarray  # (n, d)
+    device_force: np.ndarray  # (n, d_t)
+    state: np.ndarray  # (n,) int8
+    contact_count: np.ndarray  # (n,) int64
+    body_a: np.ndarray  # (m,) contacts, m the capacity of the chunk
+    body_b: np.ndarray
+    point: np.ndarray  # (m, 3)
+    normal: np.ndarray  # (m, 3)
+    gap: np.ndarray
+    normal_velocity: np.ndarray
+    normal_force: np.ndarray
+    contact_friction: np.ndarray  # (m, 3)
+    contact_impulse: np.ndarray
+    is_new: np.ndarray
+    impact_step: np.ndarray  # (n t,) impacts, one line per group and step
+    impact_group: np.ndarray
+    impact_rows: np.ndarray
+    impact_rank: np.ndarray
+    impact_scale: np.ndarray
+    impact_clamp: np.ndarray
+    impact_energy: np.ndarray
+    impact_v_minus: np.ndarray  # (n t, d)
+    impact_v_plus: np.ndarray
+    impact_impulse: np.ndarray
+    used: np.ndarray  # (2,) int64: contacts and impacts written so far
+
+
+def chunk_steps(contacts: int, remaining: int) -> int:
+    """Number of steps of the next chunk."""
+    return max(1, min(remaining, _STEPS_PER_CHUNK, _CONTACT_ROWS_PER_CHUNK // max(1, contacts)))
+
+
+def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
+    """Allocate one chunk; `coordinates` = (nq, d, nq_t, d_t)."""
+    nq, d, tool_nq, tool_d = coordinates
+    m, k = steps * contacts, steps * trees
+    floats = {
+        "q": (steps, nq), "v": (steps, d), "device_q": (steps, tool_nq), "device_v": (steps, tool_d),
+        **dict.fromkeys(("hand_force", "coupling_force", "penalty_force", "friction_force", "impulse",
+                         "environment_force"), (steps, d)),
+        "device_force": (steps, tool_d),
+        **dict.fromkeys(("point", "normal", "contact_friction"), (m, 3)),
+        **dict.fromkeys(("gap", "normal_velocity", "normal_force", "contact_impulse"), (m,)),
+        **dict.fromkeys(("impact_scale", "impact_clamp", "impact_energy"), (k,)),
+        **dict.fromkeys(("impact_v_minus", "impact_v_plus", "impact_impulse"), (k, d)),
+    }  # fmt: skip
+    integers = {
+        **dict.fromkeys(("body_a", "body_b"), (m,)), "contact_count": (steps,), "used": (2,),
+        **dict.fromkeys(("impact_step", "impact_group", "impact_rows", "impact_rank"), (k,)),
+    }  # fmt: skip
+    arrays: dict[str, Any] = {name: np.zeros(shape) for name, shape in floats.items()}
+    arrays |= {name: np.zeros(shape, np.int64) for name, shape in integers.items()}
+    arrays |= {"state": np.zeros(steps, np.int8), "is_new": np.zeros(m, np.bool_)}
+    return block(Record(**arrays))
+
+
+@kernel
+def write_step(record, k, step, state, port):
+    """Copy step number `step` into line k of the chunk."""
+    copy_into(record.q[k], state.q)
+    copy_into(record.v[k], state.v)
+    copy_into(record.device_q[k], port.device_q)
+    copy_into(record.device_v[k], port.device_v)
+    copy_into(record.hand_force[k], port.hand_force)
+    copy_into(record.coupling_force[k], port.coupling_force)
+    copy_into(record.penalty_force[k], state.penalty_force)
+    copy_into(record.friction_force[k], state.friction_force)
+    copy_into(record.impulse[k], state.impulse)
+    copy_into(record.environment_force[k], port.environment_force)
+    copy_into(record.device_force[k], port.device_force)
+    record.state[k] = state.state_of_tree[port.tool_tree] if port.tool_tree >= 0 else _busiest(state)
+    _write_contacts(record, k, state)
+    _write_impacts(record, step, state)
+
+
+@kernel
+def _busiest(state):
+    """Without a hand: colliding if any tree collides, else resting if any rests."""
+    found = 0
+    for t in range(state.state_of_tree.shape[0]):
+        if state.state_of_tree[t] == 1 or (state.state_of_tree[t] == 2 and found == 0):
+            found = state.state_of_tree[t]
+    return found
+
+
+@kernel
+def _write_contacts(record, k, state):
+    contacts = state.contacts
+    record.contact_count[k] = state.count[0]
+    for i in range(state.count[0]):
+        m = record.used[0]
+        record.body_a[m], record.body_b[m] = contacts.body_a[i], contacts.body_b[i]
+        copy_into(record.point[m], contacts.point[i])
+        copy_into(record.normal[m], contacts.normal[i])
+        copy_into(record.contact_friction[m], contacts.friction_force[i])
+        record.gap[m], record.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
+        record.normal_force[m] = contacts.normal_force[i]
+        record.contact_impulse[m], record.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
+        record.used[0] = m + 1
+
+
+@kernel
+def _write_impacts(record, step, state):
+    log = state.impacts
+    for i in range(log.count[0]):
+        m = record.used[1]
+        record.impact_step[m], record.impact_group[m] = step, log.group[i]
+        record.impact_rows[m], record.impact_rank[m] = log.rows[i], log.rank[i]
+        record.impact_scale[m], record.impact_clamp[m] = log.scale[i], log.clamp[i]
+        record.impact_energy[m] = log.energy_lost[i]
+        copy_into(record.impact_v_minus[m], log.v_minus[i])
+        copy_into(record.impact_v_plus[m], log.v_plus[i])
+        copy_into(record.impact_impulse[m], log.impulse[i])
+        record.used[1] = m + 1
+
+
+def joined(records: Sequence[Record], steps: Sequence[int], name: str, used: int | None = None) -> np.ndarray:
+    """One array over all chunks; `used` picks the ragged count (0 contacts, 1 impacts), None the steps."""
+    sizes = steps if used is None else [int(record.used[used]) for record in records]
+    return np.concatenate([getattr(record, name)[:size] for record, size in zip(records, sizes, strict=True)])
+
+
+def contact_table(records: Sequence[Record], steps: Sequence[int]) -> ContactTable:
+    """The ragged table of all contacts."""
+    counts = joined(records, steps, "contact_count")
+    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    names = {"impulse": "contact_impulse", "friction_force": "contact_friction"}
+    fields = ("body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
+              "impulse", "is_new")  # fmt: skip
+    columns = {field: joined(records, steps, names.get(field, field), used=0) for field in fields}
+    return ContactTable(offsets=offsets, **columns)
+
+
+def impact_table(records: Sequence[Record], steps: Sequence[int]) -> ImpactTable:
+    """The table of all impacts."""
+    names = {"step": "impact_step", "group": "impact_group", "rows": "impact_rows", "rank": "impact_rank",
+             "scale": "impact_scale", "clamp": "impact_clamp", "energy_lost": "impact_energy",
+             "v_minus": "impact_v_minus", "v_plus": "impact_v_plus", "impulse": "impact_impulse"}  # fmt: skip
+    return ImpactTable(**{field: joined(records, steps, name, used=1) for field, name in names.items()})

@@ -1,0 +1,246 @@
+"""The loop: couple, advance the contact law, drive the device, record. One page, compiled or from Python.
+
+    every step of length Δt:
+        hand and coupling pull at the tool              (VI)   couple
+        contacts → collisions → resting forces → move   (III-V, IV)   the law
+        F_env is rendered, the device moves             (V-C, VI)   drive_device
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.step import STATUS_TEXT, advance
+from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult
+
+from iapb.effects import decide_effects
+from iapb.errors import ArgumentError, IapbError
+from iapb.haptics.coupling import Coupling, NoCoupling
+from iapb.haptics.kernels import couple, drive_device
+from iapb.recording import Record, chunk_steps, contact_table, impact_table, joined, make_record, write_step
+from iapb.run import EffectRow, Run
+from iapb.scene import Scene, load_scene
+from iapb.system import System
+
+Floats = NDArray[np.float64]
+
+
+@kernel
+def compiled_steps(world, state, port, record, first, steps):
+    """Do `steps` steps of an engine law; return (steps done, status)."""
+    for k in range(steps):
+        couple(world, state, port)
+        status = advance(world, state, port.applied)
+        if status:
+            return k, status
+        drive_device(world, state, port)
+        write_step(record, k, first + k, state, port)
+    return steps, 0
+
+
+class Simulation:
+    """A scene under a contact law and a coupling, stepped one step at a time or all at once.
+
+    Parameters
+    ----------
+    scene : Scene, or the path of a scene file.
+    law : contact law; default `ImpulseAugmented()`.
+    coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
+
+    Examples
+    --------
+    >>> simulation = Simulation(load_scene("scenes/peg_corner.yaml"))
+    >>> result = simulation.step(hand_force=[0.1, 0.0, 0.0])
+    """
+
+    def __init__(self, scene: Scene | str | Path, law: ContactLaw | None = None,
+                 coupling: Coupling | None = None) -> None:
+        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        self.law: Any = ImpulseAugmented() if law is None else law
+        self.coupling: Coupling = NoCoupling() if coupling is None else coupling
+        self.system = System(self.scene)
+        self.state = self.system.make_state()
+        self.compiled = isinstance(self.law, ImpulseAugmented | Penalty)
+        self.world = self.system.world_under(self.law if self.compiled else Penalty())
+        self.port = self.system.make_port(self.coupling, getattr(self.law, "rendering", "full"))
+        self.steps_done = 0
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.steps_done * self.system.dt
+
+    def step(self, hand_force: ArrayLike | None = None) -> StepResult:
+        """Do one step and return it.
+
+        Parameters
+        ----------
+        hand_force : (3,) force [N] in the plane and torque [N m], or (6,) force and torque, world axes, from now
+            on; None keeps the last one (at first the scene's).
+
+        Raises
+        ------
+        ArgumentError
+            A force of the wrong shape or not finite, or a hand force in a scene without a hand.
+        IapbError
+            The step cannot be done (see `iapb.contact.kernels.step`).
+        """
+        if hand_force is not None:
+            self._grip(hand_force)
+        couple(self.world, self.state, self.port)
+        result: StepResult = self.law.advance(self.system, self.state, self.port.applied, self.system.dt)
+        if not self.compiled:
+            self._take(result)
+        drive_device(self.world, self.state, self.port)
+        self.steps_done += 1
+        return result
+
+    def _grip(self, hand_force: ArrayLike) -> None:
+        force = np.asarray(hand_force, dtype=np.float64)
+        if self.system.tool_tree < 0:
+            raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
+        if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
+            raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
+        self.port.wrench[:] = 0.0
+        self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
+
+    def _take(self, result: StepResult) -> None:
+        """Copy what a law written in Python returned into the state that the device and the record read."""
+        state = self.state
+        pairs = ((state.q, result.q), (state.v, result.v), (state.penalty_force, result.penalty_force),
+                 (state.friction_force, result.friction_force), (state.impulse, result.impulse))
+        for target, values in pairs:
+            if not np.all(np.isfinite(values)):
+                raise IapbError(f"the law {self.law.name!r} returned a value that is not finite at step "
+                                f"{self.steps_done}")
+            target[:] = values
+        if self.system.tool_tree >= 0:
+            state.state_of_tree[self.system.tool_tree] = result.state
+        else:
+            state.state_of_tree[:] = result.state
+
+    def advance_chunk(self, record: Record, steps: int) -> tuple[int, int]:
+        """Do up to `steps` steps and record them; return (steps done, status)."""
+        if self.compiled:
+            done, status = compiled_steps(self.world, self.state, self.port, record, self.steps_done, steps)
+            self.steps_done += done
+            return done, status
+        for k in range(steps):
+            self.step()
+            write_step(record, k, self.steps_done - 1, self.state, self.port)
+        return steps, 0
+
+
+def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
+             world: str = "", steps: int | None = None,
+             progress: Callable[[int, int], None] | None = None) -> Run:
+    """Simulate a scene under a contact law and a coupling and return the whole record.
+
+    Parameters
+    ----------
+    scene : Scene, or the path of a scene file.
+    law, coupling : see `Simulation`.
+    world : name of the combination for the record, such as ``"IAPB"``; default: law and coupling.
+    steps : number of steps; default: the scene's duration times its rate.
+    progress : called as progress(steps done, steps in all) after every chunk.
+
+    Returns
+    -------
+    Run
+        ``complete`` is False where the loop was interrupted (Ctrl-C) or could not go on; the arrays then end at the
+        last whole chunk or step.
+
+    Raises
+    ------
+    SceneError, ArgumentError
+        The scene or the arguments cannot be used.
+    IapbError
+        The very first step cannot be done.
+    """
+    simulation = Simulation(scene, law, coupling)
+    total = simulation.scene.steps if steps is None else steps
+    recording = _Recording(simulation)
+    status = 0
+    try:
+        while recording.steps < total and status == 0:
+            status = recording.chunk(total)
+            if progress is not None:
+                progress(recording.steps, total)
+    except KeyboardInterrupt:
+        pass
+    if status and recording.steps == 0:
+        raise IapbError(STATUS_TEXT[status])
+    return recording.run(world, complete=recording.steps == total)
+
+
+class _Recording:
+    """The chunks of a simulation in the making."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        port, state = simulation.port, simulation.state
+        device = simulation.coupling.kind != 0
+        self.start = (state.q.copy(), state.v.copy(), port.device_q.copy(), port.device_v.copy())
+        self.device = device
+        self.records: list[Record] = []
+        self.sizes: list[int] = []
+        self.seconds: list[float] = []
+        self.steps = 0
+
+    def chunk(self, total: int) -> int:
+        """Do the next chunk; return its status."""
+        system, port = self.simulation.system, self.simulation.port
+        size = chunk_steps(system.capacity, total - self.steps)
+        coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
+        record = make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs))
+        started = time.perf_counter()
+        done, status = self.simulation.advance_chunk(record, size)
+        self.seconds.append(time.perf_counter() - started)
+        self.records.append(record)
+        self.sizes.append(done)
+        self.steps += done
+        return status
+
+    def run(self, world: str, complete: bool) -> Run:
+        """Everything recorded so far as a Run."""
+        simulation, system = self.simulation, self.simulation.system
+        states = {
+            name: np.concatenate([first[None], joined(self.records, self.sizes, name)])
+            for name, first in zip(("q", "v", "device_q", "device_v"), self.start, strict=True)
+        }
+        forces = {name: joined(self.records, self.sizes, name) for name in (
+            "hand_force", "coupling_force", "penalty_force", "friction_force", "impulse", "environment_force",
+            "device_force", "state")}
+        law, coupling = simulation.law, simulation.coupling
+        run = Run(
+            scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
+            scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
+            law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
+            coupling_settings=dict(coupling.settings), dt=system.dt, complete=complete,
+            coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
+            body_names=system.mechanism.names, tool_dofs=system.tool_dofs,
+            time=np.arange(self.steps + 1) * system.dt, **states, **forces,
+            contacts=contact_table(self.records, self.sizes), impacts=impact_table(self.records, self.sizes),
+            energy={}, effects=_effects(simulation),
+            chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
+            kernel="compiled" if simulation.compiled else "python",
+        )  # fmt: skip
+        return with_energy(run, system)
+
+
+def with_energy(run: Run, system: System) -> Run:
+    """The run with its energy ledger."""
+    raise NotImplementedError
+
+
+def _effects(simulation: Simulation) -> tuple[EffectRow, ...]:
+    found = decide_effects(simulation.scene, simulation.law.name, simulation.coupling.name,
+                           getattr(simulation.law, "rendering", None))
+    return tuple(EffectRow(effect.name, effect.active, effect.reason) for effect in found)

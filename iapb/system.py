@@ -1,0 +1,238 @@
+"""System: a scene turned into the arrays that the compiled step reads and writes."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.compiled import block
+from iapb.contact.geometry import contact_capacity, make_contact_buffer
+from iapb.contact.kernels.cholesky import cholesky
+from iapb.contact.kernels.impact import make_impact_work
+from iapb.contact.kernels.rows import contact_row
+from iapb.contact.kernels.step import find_near
+from iapb.contact.kernels.world import ImpactLog, State, Switches, World
+from iapb.contact.laws import INTEGRATORS, Penalty
+from iapb.errors import ArgumentError, IapbError
+from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
+from iapb.haptics.kernels import Port
+from iapb.mechanics.mechanism import Mechanism
+from iapb.scene import Scene
+from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+
+Floats = NDArray[np.float64]
+
+
+class ContactRows(NamedTuple):
+    """Contacts near the present state, for laws written in Python (c contacts, d velocities)."""
+
+    jacobian: Floats  # (c, d) unit-normal rows (11)-(12)
+    gap: Floats  # (c,) [m] negative = overlap
+    normal_velocity: Floats  # (c,) [m/s] positive separates
+
+
+class System:
+    """A scene as mechanism, shapes and parameters.
+
+    Attributes
+    ----------
+    scene : Scene
+    mechanism : Mechanism
+    tool_tree : int, tree that the hand holds; −1 without a hand
+    tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
+    dt : float [s]
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.mechanism: Mechanism = mechanism_of(scene)
+        self.shapes = shapes_of(scene)
+        self.pairs = pairs_of(scene, self.shapes)
+        self.capacity = contact_capacity(self.shapes, self.pairs)
+        self.dt = 1.0 / scene.rate
+        self.gravity = np.array([*(scene.gravity or (0.0, 0.0)), 0.0])
+        self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
+        self.tool_dofs, self.tool_coordinates = self._tool_ranges()
+        self._worlds: dict[Any, World] = {}
+
+    def _held_body(self) -> int:
+        if self.scene.hand is None:
+            raise ArgumentError("scene", self.scene.name, "a scene with a hand")
+        return self.mechanism.index(self.scene.hand.body)
+
+    def _tool_ranges(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        if self.tool_tree < 0:
+            return (0, 0), (0, 0)
+        bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
+        start = int(self.mechanism.arrays.q_start[bodies[0]])
+        size = sum(self.mechanism.bodies[b].joint.layout.nq for b in bodies)
+        v_start, v_stop = self.mechanism.tree_dofs[self.tool_tree]
+        return (int(v_start), int(v_stop)), (start, start + size)
+
+    def device_mechanism(self) -> Mechanism:
+        """The device: kinematically and inertially the hand-held tree, alone (paper VI)."""
+        bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
+        return Mechanism([self.mechanism.bodies[b] for b in bodies])
+
+    def free_force(self, q: Floats, v: Floats, applied: Floats) -> Floats:
+        """Applied minus Coriolis minus gravity forces: the right-hand side of (7) without contacts (d,)."""
+        force = applied - self.mechanism.gravity(q, self.gravity) if np.any(self.gravity) else applied.copy()
+        return force - self.mechanism.bias(q, v) if self.mechanism.has_velocity_terms else force
+
+    def contact_rows(self, state: State, margin: float = 0.0) -> ContactRows:
+        """Contacts with gap <= margin at the state's (q, v), found anew; also left in ``state.contacts``."""
+        world = self.world_under(Penalty())
+        count = find_near(world, state, margin)
+        if count < 0:
+            raise IapbError(f"scene {self.scene.name}: more than {self.capacity} contacts at once")
+        rows = np.zeros((count, self.mechanism.nv))
+        for i in range(count):
+            contact_row(world.mechanism, state.body, state.contacts, i, rows[i])
+        return ContactRows(rows, state.contacts.gap[:count].copy(), rows @ state.v)
+
+    def world_under(self, law: Any) -> World:
+        """The constant arrays of the step under one of the engine's laws (cached)."""
+        key = (type(law).__name__, law.integrator, law.rendering)
+        if key not in self._worlds:
+            self._worlds[key] = make_world(self, law)
+        return self._worlds[key]
+
+    def make_state(self) -> State:
+        """A fresh state at the scene's start."""
+        return make_state(self)
+
+    def make_port(self, coupling: Coupling, rendering: str = "full") -> Port:
+        """Hand, coupling and device at the scene's start."""
+        return make_port(self, coupling, rendering)
+
+
+def coupling_of(scene: Scene, name: str) -> Coupling:
+    """The coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
+    if name == "none":
+        return NoCoupling()
+    kinds = {"four-channel": (FourChannel, scene.couplings.four_channel),
+             "unilateral": (UnilateralCoupler, scene.couplings.unilateral)}  # fmt: skip
+    if name not in kinds:
+        raise ArgumentError("coupling", name, "one of none, four-channel, unilateral")
+    kind, gains = kinds[name]
+    if gains is None:
+        raise ArgumentError("coupling", name, f"a scene with couplings.{name.replace('-', '_')}; "
+                                              f"{scene.name} gives no gains for it")
+    return kind(tuple(gains.stiffness), tuple(gains.damping))
+
+
+def make_world(system: System, law: Any) -> World:
+    """Collect the parameters of the scene and the switches of its effects under a law."""
+    scene, contact, mechanism = system.scene, system.scene.contact, system.mechanism
+    limit = np.full(mechanism.nv, np.inf)
+    scaled = law.impulses and law.rendering in ("scale", "spread") and _force_limit(scene) is not None
+    if scaled:
+        limit[slice(*system.tool_dofs)] = _force_limit(scene)
+    switches = Switches(
+        gravity=bool(np.any(system.gravity)),
+        varying_inertia=not mechanism.has_constant_mass_matrix,
+        velocity_terms=mechanism.has_velocity_terms,
+        impulses=bool(law.impulses) and contact.restitution > -1.0,
+        clustering=contact.cluster_distance > 0.0,
+        impulse_limit=scaled,
+        spreading=scaled and law.rendering == "spread",
+        contacts=len(system.pairs) > 0,
+    )
+    integrator = INTEGRATORS[law.integrator]
+    ranges = np.array(mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
+    return block(World(
+        mechanism=mechanism.arrays, shapes=system.shapes, pairs=system.pairs,
+        tree_of_body=mechanism.tree_of_body,
+        tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
+        switches=switches, dt=system.dt, gravity=system.gravity,
+        stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
+        friction=float(contact.friction), friction_velocity=float(contact.friction_velocity),
+        restitution=float(contact.restitution), approach_velocity=float(contact.approach_velocity),
+        cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
+        per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
+        stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
+        semi_implicit=integrator.semi_implicit,
+    ))  # fmt: skip
+
+
+def _force_limit(scene: Scene) -> tuple[float, ...] | None:
+    return scene.device.force_limit if scene.device is not None else None
+
+
+def make_state(system: System) -> State:
+    """Allocate everything a step writes and place the scene at its start."""
+    mechanism, capacity = system.mechanism, system.capacity
+    d, nq, trees = mechanism.nv, mechanism.nq, len(mechanism.tree_dofs)
+    rows = 2 * capacity  # per-body rows give two to a contact (13)-(14)
+    q = np.array([x for body in system.scene.bodies for x in body.position], dtype=np.float64)
+    v = np.array([x for body in system.scene.bodies for x in body.velocity], dtype=np.float64)
+    mass = mechanism.mass_matrix(q)
+    lower = np.zeros((d, d))
+    if cholesky(mass, lower):
+        raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
+    log = ImpactLog(np.zeros(1, np.int64), *(np.zeros(trees, np.int64) for _ in range(3)),
+                    *(np.zeros(trees) for _ in range(3)), *(np.zeros((trees, d)) for _ in range(3)))
+    vectors = {name: np.zeros(d) for name in (
+        "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
+        "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
+    squares = {name: np.zeros((d, d)) for name in ("group_mass", "group_lower", "triangle")}
+    return block(State(
+        q=q, v=v, mass_matrix=mass, lower=lower, body=mechanism.workspace(),
+        contacts=make_contact_buffer(capacity), previous=make_contact_buffer(capacity),
+        stage_contacts=make_contact_buffer(capacity), count=np.zeros(2, np.int64),
+        group_of_tree=np.arange(trees, dtype=np.int64), state_of_tree=np.zeros(trees, np.int8),
+        spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq), contact_impulse=np.zeros(rows),
+        rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64), row_impulse=np.zeros(rows),
+        work=make_impact_work(d, rows), impacts=log, **vectors, **squares,
+    ))  # fmt: skip
+
+
+def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Port:
+    """Allocate the hand's side: the device starts where the tool does, with its velocity."""
+    scene, d = system.scene, system.mechanism.nv
+    held = system.tool_tree >= 0
+    if not held and not isinstance(coupling, NoCoupling):
+        raise ArgumentError("coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device")
+    device = system.device_mechanism() if held else system.mechanism
+    (v_start, v_stop), (q_start, q_stop) = system.tool_dofs, system.tool_coordinates
+    size, nq = v_stop - v_start, q_stop - q_start
+    state = make_state(system)
+    q, v = state.q[q_start:q_stop].copy(), state.v[v_start:v_stop].copy()
+    mass = device.mass_matrix(q) if held else np.zeros((0, 0))
+    lower = np.zeros_like(mass)
+    cholesky(mass, lower)
+    body = system._held_body() if held else -1
+    settings = scene.device
+    limit = _force_limit(scene)
+    resolution = settings.position_resolution if settings is not None else None
+    damping = settings.damping if settings is not None else None
+    slots = 1 + (settings.delay if settings is not None else 0)
+    hand = scene.hand
+    wrench = np.zeros(6)
+    point = np.zeros(3)
+    if hand is not None:
+        wrench[0], wrench[1], wrench[5] = hand.force
+        point[:2] = hand.point
+    gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
+    zeros = {name: np.zeros(d) for name in ("hand_force", "coupling_force", "environment_force", "applied")}
+    tool_zeros = {name: np.zeros(size) for name in (
+        "device_hand_force", "device_force", "error", "acceleration", "measured_v")}
+    return block(Port(
+        coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
+        v_stop=v_stop, hand_body=body, device_body=device.index(hand.body) if hand is not None else -1,
+        hand_point=point, wrench=wrench, stiffness=_per_coordinate(gains.get("stiffness"), size),
+        damping=_per_coordinate(gains.get("damping"), size), mechanism=device.arrays, body=device.workspace(),
+        varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
+        device_lower=lower, device_damping=_per_coordinate(damping, size), damped=damping is not None,
+        force_limit=_per_coordinate(limit, size, np.inf), limited=limit is not None and rendering != "full",
+        resolution=_per_coordinate(resolution, nq), quantised=resolution is not None,
+        delayed_force=np.zeros((slots, size)), delayed_q=np.zeros((slots, nq)), delayed_v=np.zeros((slots, size)),
+        sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_), clock=np.zeros(1, np.int64),
+        **zeros, **tool_zeros,
+    ))  # fmt: skip
+
+
+def _per_coordinate(values: Any, size: int, default: float = 0.0) -> Floats:
+    return np.full(size, default) if values is None else np.array(values, dtype=np.float64)
