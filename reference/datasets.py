@@ -21,6 +21,12 @@ Floats = NDArray[np.float64]
 
 _LARGEST_SIZE = 20_000  # a dense W of 3.2 GB; a larger number in a header is damage, not a problem
 
+# Rows that each constraint type of an MLCP file brings: True for a two-sided one.
+_MLCP_ROWS = {
+    **{f"MLCP_BILATERAL_{n}D_CONSTRAINT": (True,) * n for n in (1, 2, 3)},
+    "MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT": (False,),
+}
+
 
 class DatasetError(IapbError, ValueError):
     """A problem file is damaged or of a kind that is not known here."""
@@ -108,19 +114,23 @@ def read_siconos_lcp(path: Path | str) -> StoredProblem:
 def read_mlcp(path: Path | str) -> StoredProblem:
     """Read a labelled MLCP text of OpenSurgSim: constraint types, E, HCHt, friction and stored lambda.
 
-    Only frictionless unilateral constraints make an LCP; others are refused by name.
+    Bilateral constraints of one to three dimensions and frictionless unilateral ones are read, others refused.
     """
     path = Path(path)
     fields, remark = _labelled(path, _text(path))
-    types = set(fields.get("constraint types", "").split())
-    other = sorted(types - {"MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT"})
+    types = fields.get("constraint types", "").split()
+    other = sorted(set(types) - set(_MLCP_ROWS))
     if other:
-        raise DatasetError(path, f"holds constraints that are no LCP: {', '.join(other)}")
+        raise DatasetError(path, f"holds constraints that are not read here: {', '.join(other)}")
+    bilateral = np.array([two_sided for kind in types for two_sided in _MLCP_ROWS[kind]], np.bool_)
     q, multipliers = (_bracketed(path, fields, name) for name in ("E", "lambda"))
     matrix = _bracketed(path, fields, "HCHt")
     _expect(path, len(matrix), len(q) ** 2)
     _expect(path, len(multipliers), len(q))
-    problem = _lcp(path, matrix.reshape(len(q), len(q)), q)
+    _expect(path, len(bilateral), len(q))
+    joints = bilateral if bilateral.any() else None
+    w = matrix.reshape(len(q), len(q))
+    problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=path.name)
     return StoredProblem(problem, multipliers, remark, "MLCP text")
 
 

@@ -39,6 +39,7 @@ class ImpactProblem:
     friction : (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
     contact_size : components per contact, normal first: 1, 2 (planar friction) or 3
     relaxed : True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
+    bilateral : (k,) True where w = 0 holds with p of either sign (joints of an MLCP), or None; no friction then
     mass_matrix, contact_jacobian, velocity : the mechanics (d, d), (n, d), (d,) where they are known
     """
 
@@ -52,6 +53,7 @@ class ImpactProblem:
     mass_matrix: Floats | None = None
     contact_jacobian: Floats | None = None
     velocity: Floats | None = None
+    bilateral: NDArray[np.bool_] | None = None
 
     @classmethod
     def from_impact(
@@ -88,6 +90,7 @@ class ImpactProblem:
         *,
         contact_size: int | None = None,
         relaxed: bool = False,
+        bilateral: ArrayLike | None = None,
         name: str = "",
     ) -> ImpactProblem:
         """Return the problem of W (n, n) and gamma_minus (n,); with e = 0 the LCP (W, gamma_minus)."""
@@ -98,7 +101,17 @@ class ImpactProblem:
         size = contact_size or (1 if friction is None else 3)
         coefficients = _per_contact("restitution", restitution, len(gamma), size)
         mu = None if friction is None else _per_contact("friction", friction, len(gamma), size)
-        return cls(w, gamma, coefficients, mu, size, relaxed, name)
+        joints = None if bilateral is None else np.array(bilateral, dtype=np.bool_)
+        if joints is not None and (joints.shape != gamma.shape or friction is not None):
+            raise ArgumentError(
+                "bilateral", bilateral, f"shape ({len(gamma)},), in a problem without friction"
+            )
+        return cls(w, gamma, coefficients, mu, size, relaxed, name, bilateral=joints)
+
+    @property
+    def two_sided(self) -> NDArray[np.bool_]:
+        """`bilateral` (k,), all False where it is None."""
+        return np.zeros(self.contacts, np.bool_) if self.bilateral is None else self.bilateral
 
     @property
     def size(self) -> int:

@@ -20,7 +20,7 @@ from reference.complementarity.solvers.answer import Answer
 
 @dataclass(frozen=True)
 class SolverEntry:
-    """A solver by name: its module here, its call, the package it needs and what it takes.
+    """A solver by name: its module here, its call, the packages it needs and what it takes.
 
     `takes`: "lcp" any frictionless problem, "convex" only with symmetric semidefinite W, "cone" friction.
     """
@@ -29,6 +29,7 @@ class SolverEntry:
     package: str
     method: str
     takes: str
+    bilateral: bool = False  # takes two-sided rows as well
     option: str = ""  # handed to the module's solve where it serves several solvers
 
 
@@ -36,17 +37,21 @@ _CVXPY = "reference.complementarity.solvers.cvxpy_qp"
 _HERE = "reference.complementarity.solvers"
 
 SOLVERS: dict[str, SolverEntry] = {
-    "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp"),
+    "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp", True),
     "lemke": SolverEntry(f"{_HERE}.lemke", "quantecon", "complementary pivoting (Lemke)", "lcp"),
-    "gauss_seidel": SolverEntry(f"{_HERE}.gauss_seidel", "numba", "projected Gauss-Seidel", "lcp"),
-    "daqp": SolverEntry(f"{_HERE}.daqp_qp", "daqp", "dual active set", "convex"),
-    "quadprog": SolverEntry(f"{_HERE}.quadprog_qp", "quadprog", "Goldfarb-Idnani active set", "convex"),
-    "proxqp": SolverEntry(f"{_HERE}.proxqp_qp", "proxsuite", "proximal augmented Lagrangian", "convex"),
-    "cvxpy_clarabel": SolverEntry(_CVXPY, "clarabel", "interior point", "convex", "CLARABEL"),
-    "cvxpy_osqp": SolverEntry(_CVXPY, "osqp", "ADMM", "convex", "OSQP"),
-    "cvxpy_scs": SolverEntry(_CVXPY, "scs", "ADMM on the conic form", "convex", "SCS"),
+    "gauss_seidel": SolverEntry(f"{_HERE}.gauss_seidel", "numba", "projected Gauss-Seidel", "lcp", True),
+    "daqp": SolverEntry(f"{_HERE}.daqp_qp", "daqp", "dual active set", "convex", True),
+    "quadprog": SolverEntry(
+        f"{_HERE}.quadprog_qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex"
+    ),
+    "proxqp": SolverEntry(
+        f"{_HERE}.proxqp_qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", True
+    ),
+    "cvxpy_clarabel": SolverEntry(_CVXPY, "cvxpy clarabel", "interior point", "convex", True, "CLARABEL"),
+    "cvxpy_osqp": SolverEntry(_CVXPY, "cvxpy osqp", "ADMM", "convex", True, "OSQP"),
+    "cvxpy_scs": SolverEntry(_CVXPY, "cvxpy scs", "ADMM on the conic form", "convex", True, "SCS"),
     "nsgs": SolverEntry(f"{_HERE}.block_gauss_seidel", "numba", "block Gauss-Seidel on the cones", "cone"),
-    "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "clarabel", "interior point, fixed point", "cone"),
+    "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "cvxpy clarabel", "interior point, fixed point", "cone"),
 }
 
 
@@ -93,7 +98,8 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
 
 def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
     try:
-        importlib.import_module(entry.package)
+        for package in entry.package.split():  # here, so that imports do not count as the solver's time
+            importlib.import_module(package)
         return importlib.import_module(entry.module).solve
     except ImportError as error:
         install = f"pip install {entry.package}"
@@ -105,4 +111,6 @@ def _known_without_solver(problem: ImpactProblem, entry: SolverEntry) -> Answer 
     if (entry.takes == "cone") != (problem.friction is not None):
         kind = "frictionless problems only" if entry.takes != "cone" else "problems with friction only"
         return Answer(None, f"refused: takes {kind}", refused=True)
+    if problem.two_sided.any() and not entry.bilateral:
+        return Answer(None, "refused: takes one-sided contacts only", refused=True)
     return Answer(np.zeros(0), "no contacts") if problem.size == 0 else None

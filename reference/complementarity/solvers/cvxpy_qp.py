@@ -31,9 +31,9 @@ def solve(problem: ImpactProblem, backend: str) -> Answer:
 
     rows = problem.factor
     root, speed = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0, velocity_scale(problem)
-    p = cp.Variable(problem.size, nonneg=True)
+    p, one_sided = cp.Variable(problem.size), np.flatnonzero(~problem.two_sided)
     energy = 0.5 * cp.sum_squares((rows.T / root) @ p) + (problem.offset / speed) @ p
-    program = cp.Problem(cp.Minimize(energy))
+    program = cp.Problem(cp.Minimize(energy), [p[one_sided] >= 0.0] if len(one_sided) else [])
     try:
         with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals judge
             warnings.simplefilter("ignore", UserWarning)

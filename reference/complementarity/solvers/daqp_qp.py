@@ -16,7 +16,7 @@ from reference.complementarity.solvers.answer import Answer
 
 Floats = NDArray[np.float64]
 
-_INEQUALITY = 0  # daqp's `sense` of an ordinary inequality
+_INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
 _ACCURACY = 1e-13  # of unit rows and unit velocities: a few hundred roundings
 _INFINITE = 1e30  # daqp's own mark of an absent bound
 
@@ -24,15 +24,15 @@ _INFINITE = 1e30  # daqp's own mark of an absent bound
 def solve(problem: ImpactProblem) -> Answer:
     """Return the impulse as the multipliers of the velocity form."""
     try:
-        return Answer(multipliers(problem.factor, problem.offset), "daqp: optimal")
+        return Answer(multipliers(problem.factor, problem.offset, problem.two_sided), "daqp: optimal")
     except SolverError as error:
         if str(error).startswith("refused"):
             raise
         return Answer(None, str(error))
 
 
-def multipliers(rows: Floats, offset: Floats) -> Floats:
-    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,).
+def multipliers(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | None = None) -> Floats:
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,); `bilateral` rows are equalities.
 
     Raises
     ------
@@ -47,6 +47,8 @@ def multipliers(rows: Floats, offset: Floats) -> Floats:
     scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
     upper, lower = np.full(n, _INFINITE), -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
+    if bilateral is not None:
+        upper[bilateral], sense[bilateral] = lower[bilateral], _EQUALITY
     unit_rows = np.ascontiguousarray(rows / unit[:, None])
     _, _, flag, detail = daqp.solve(
         np.eye(d), np.zeros(d), unit_rows, upper, lower, sense, primal_tol=_ACCURACY, dual_tol=_ACCURACY

@@ -27,12 +27,14 @@ _SINGULAR = 1e-12  # reciprocal condition below which W_aa is taken as singular
 
 def all_solutions(problem: ImpactProblem) -> list[Floats]:
     """Return one solution (n,) per complementary piece that has any, fewest contacts first, no duplicates."""
-    if problem.size > LARGEST_SIZE:
+    if np.count_nonzero(~problem.two_sided) > LARGEST_SIZE:
         raise SolverError(f"refused: {problem.size} contacts, enumeration takes at most {LARGEST_SIZE}")
     found: list[Floats] = []
-    indices = range(problem.size)
-    for active in chain.from_iterable(combinations(indices, k) for k in range(problem.size + 1)):
-        p = _candidate(problem, list(active))
+    joints: list[int] = np.flatnonzero(problem.two_sided).tolist()
+    contacts: list[int] = np.flatnonzero(~problem.two_sided).tolist()
+    subsets = (combinations(contacts, k) for k in range(len(contacts) + 1))
+    for chosen in chain.from_iterable(subsets):
+        p = _candidate(problem, sorted([*joints, *chosen]))
         if p is None or residuals(problem, p).worst > _ACCEPTED:
             continue
         if not any(np.allclose(p, q, rtol=0.0, atol=_SAME * np.abs(q).max()) for q in found):
@@ -65,7 +67,9 @@ def _feasible_point(problem: ImpactProblem, active: list[int]) -> Floats | None:
 
     passive = [i for i in range(problem.size) if i not in active]
     w, b = problem.delassus[:, active], problem.offset
-    result = linprog(np.ones(len(active)), -w[passive], b[passive], w[active], -b[active], method="highs")
+    bounds = [(None if problem.two_sided[i] else 0.0, None) for i in active]
+    cost = np.where(problem.two_sided[active], 0.0, 1.0)
+    result = linprog(cost, -w[passive], b[passive], w[active], -b[active], bounds, method="highs")
     if result.x is None:
         return None
     p = np.zeros(problem.size)

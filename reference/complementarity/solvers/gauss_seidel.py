@@ -20,7 +20,7 @@ _STILL = 1e-14  # a sweep that moves no contact velocity by more than this share
 
 
 @numba.njit(cache=True, fastmath=False)
-def _sweep_until_still(w, b, p, sweeps, still):  # type: ignore[no-untyped-def]
+def _sweep_until_still(w, b, bilateral, p, sweeps, still):  # type: ignore[no-untyped-def]
     """Sweep in place; return the number of sweeps done, or -1 where the limit came first."""
     n = len(b)
     for sweep in range(sweeps):
@@ -31,8 +31,10 @@ def _sweep_until_still(w, b, p, sweeps, still):  # type: ignore[no-untyped-def]
             velocity = b[i]
             for j in range(n):
                 velocity += w[i, j] * p[j]
-            moved = max(-p[i], -velocity / w[i, i])
-            p[i] = max(0.0, p[i] + moved)
+            moved = -velocity / w[i, i]
+            if not bilateral[i]:
+                moved = max(-p[i], moved)
+            p[i] += moved
             largest = max(largest, abs(moved) * w[i, i])
         if largest <= still:
             return sweep + 1
@@ -45,5 +47,7 @@ def solve(problem: ImpactProblem) -> Answer:
         raise SolverError("refused: W has a negative diagonal entry")
     p = np.zeros(problem.size)
     still = _STILL * velocity_scale(problem)
-    done = _sweep_until_still(np.ascontiguousarray(problem.delassus), problem.offset, p, _SWEEPS, still)
+    done = _sweep_until_still(
+        np.ascontiguousarray(problem.delassus), problem.offset, problem.two_sided, p, _SWEEPS, still
+    )
     return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {_SWEEPS} sweeps")

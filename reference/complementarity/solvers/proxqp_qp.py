@@ -20,7 +20,7 @@ def solve(problem: ImpactProblem) -> Answer:
 
     w = problem.factor @ problem.factor.T
     inertia, speed = float(np.abs(w).max(initial=0.0)) or 1.0, velocity_scale(problem)
-    program = Problem(w / inertia, problem.offset / speed, lb=np.zeros(problem.size))
+    program = Problem(w / inertia, problem.offset / speed, lb=np.where(problem.two_sided, -np.inf, 0.0))
     answer = solve_problem(program, solver="proxqp", eps_abs=_ACCURACY, eps_rel=0.0)
     if answer.x is None:
         return Answer(None, "proxqp found no solution")

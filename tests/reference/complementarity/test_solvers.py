@@ -85,6 +85,19 @@ def test_a_problem_without_solution_is_not_solved_by_anyone() -> None:
     assert all(not solve(problem, name).solved() for name in solver_names(problem))
 
 
+def test_two_sided_rows_are_met_by_all_that_take_them() -> None:
+    """A joint and a contact on one mass: the joint holds with a negative impulse, the contact stays open."""
+    rows = np.array([[1.0, 0.0], [0.6, 0.8]])
+    joint = ImpactProblem.from_delassus(rows @ rows.T, rows @ [1.0, 0.5], bilateral=[True, False])
+    taking = [name for name in solver_names(joint) if SOLVERS[name].bilateral]
+    for name in taking:
+        solution = solve(joint, name)
+        assert solution.solved(1e-8), (name, solution.note, solution.residuals)
+        assert solution.answer() == pytest.approx([-1.0, 0.0], abs=1e-7)
+    assert len(taking) >= 4 and solve(joint, "lemke").verdict() == "refused"
+    assert not Solution(joint, np.zeros(2)).solved()
+
+
 def test_zero_contacts() -> None:
     problem = ImpactProblem.from_impact(np.eye(2), np.zeros((0, 2)), [1.0, 2.0], 0.5)
     for name in solver_names(problem):
