@@ -22,6 +22,13 @@ if TYPE_CHECKING:
 _NAMES = (
     "theorem_1",
     "theorem_2",
+    "impulse_of_independent_rows",
+    "dynamically_consistent_inverse",
+    "newton_law_solvable",
+    "one_inverse_invariance",
+    "independent_subset",
+    "step_37",
+    "reverse_order_law",
 )
 
 

@@ -60,14 +60,17 @@ def _needed(without: Without, statement: Statement) -> Refutation:
     """Without this hypothesis, the others do not carry the theorem: an exact case."""
     case = completed(without.instance, statement.definitions)
     names = [fact.name for fact in statement.given]
-    others = [fact for fact in statement.given if fact.name != without.hypothesis]
-    dropped = [fact for fact in statement.given if fact.name == without.hypothesis]
+    others = [fact for fact in statement.given if fact.name not in without.names]
+    dropped = [fact for fact in statement.given if fact.name in without.names]
     false = [fact for fact in statement.conclusions if not holds(fact, case)]
     refuted = (
-        without.hypothesis in names and all_hold(others, case) and not all_hold(dropped, case) and bool(false)
+        set(without.names) <= set(names)
+        and all_hold(others, case)
+        and not all_hold(dropped, case)
+        and bool(false)
     )
     shown = false[0] if false else statement.conclusions[0]
-    title = f"without '{without.hypothesis}'"
+    title = "without " + " and ".join(f"'{name}'" for name in without.names)
     return Refutation(title, fact_line(shown), case_lines(case), without.note, refuted)
 
 
@@ -82,7 +85,7 @@ def _twin(twin: Twin, statement: Statement) -> Refutation:
 
 def _loose_ends(statement: Statement, known: Known) -> list[str]:
     """What would make the theorem say less than it seems: unused, unneeded or contradictory hypotheses."""
-    shown = {without.hypothesis for without in statement.needed}
+    shown = {name for without in statement.needed for name in without.names}
     open_ends = [f"hypothesis never used: {f.name}" for f in statement.given if f.name not in known.used]
     open_ends += [
         f"hypothesis not shown to be needed: {f.name}" for f in statement.given if f.name not in shown
@@ -98,14 +101,15 @@ def _loose_ends(statement: Statement, known: Known) -> list[str]:
 
 
 def _circular_definitions(statement: Statement) -> list[str]:
-    """A definition may only name something new: its letter stands in no hypothesis and in nothing defined before."""
-    taken = {name for fact in statement.given for value in fact.expressions for name in names_in(value)}
+    """A definition names one new letter: it occurs neither in its own right side nor in a definition before it."""
+    taken: set[str] = set()
     found = []
     for definition in statement.definitions:
         new = names_in(definition.lhs)
-        if len(definition.lhs.terms) != 1 or len(new) != 1 or new & (taken | names_in(definition.rhs)):
+        taken |= names_in(definition.rhs)
+        if len(definition.lhs.terms) != 1 or len(new) != 1 or new & taken:
             found.append(f"not a definition: {definition.name}")
-        taken |= new | names_in(definition.rhs)
+        taken |= new
     return found
 
 

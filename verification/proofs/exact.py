@@ -16,7 +16,7 @@ from verification.proofs.algebra import ANY, Expression
 from verification.proofs.facts import Definite, Entrywise, Equation, Fact, NonNegative, Nonzero
 
 Number = int | str | Fraction
-Rows = Sequence[Sequence[Number]]
+Rows = Sequence[Sequence[Number] | Number]
 Matrix = tuple[tuple[Fraction, ...], ...]
 
 
@@ -114,14 +114,12 @@ def evaluate(value: Expression, given: Instance, backend: Any = FlintBackend) ->
 
 
 def completed(given: Instance, definitions: Iterable[Equation]) -> Instance:
-    """Give each defined letter (the left side of its definition) the value of the right side, unless it has one."""
+    """Give each defined letter (the left side of its definition) the value of the right side."""
     values = dict(given.values)
     for definition in definitions:
         (((scalars, word), _),) = definition.lhs.terms.items()
-        name = word[0].name if word else scalars[0]
-        if name not in values:
-            value = evaluate(definition.rhs, Instance(values))
-            values[name] = value if word else value[0][0]
+        value = evaluate(definition.rhs, Instance(values))
+        values[word[0].name if word else scalars[0]] = value if word else value[0][0]
     return Instance(values)
 
 

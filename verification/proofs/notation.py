@@ -33,7 +33,7 @@ def latex(value: Expression) -> str:
 
 
 def _sum(value: Expression, write) -> str:  # type: ignore[no-untyped-def]
-    pieces = []
+    pieces: list[str] = []
     for term, coefficient in value.ordered():
         sign = "−" if coefficient < 0 else "+"
         piece = write(term, abs(coefficient))
@@ -172,11 +172,12 @@ def _term_line(term: SumTerm) -> Line:
         case None:
             return Line(words, number.rstrip(" ·") or "1", maths)
         case Square():
-            outer, core, inner = term.form.half.T, term.form.core, term.form.half
+            outer, inner = term.form.half.T, term.form.half
         case Pairing():
-            outer, core, inner = term.form.left.value.T, term.form.core, term.form.right.value
+            outer, inner = term.form.left.value.T, term.form.right.value
         case _:
             return Line(words, f"{number}({text(term.form.value)})", f"{maths}({latex(term.form.value)})")
+    core = term.form.core
     middle = ("", "") if core is None else (f" ({text(core.value)})", f" ({latex(core.value)})")
     return Line(
         words,

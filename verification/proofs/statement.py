@@ -12,11 +12,18 @@ from verification.proofs.steps import Step
 
 @dataclass(frozen=True)
 class Without:
-    """An exact case where one hypothesis fails, all others hold, and a conclusion is false: it is needed."""
+    """An exact case where one hypothesis fails, all others hold, and a conclusion is false: it is needed.
 
-    hypothesis: str
+    Several names are dropped together where they say one thing (both sides of an inverse).
+    """
+
+    hypothesis: str | tuple[str, ...]
     instance: Instance
-    note: str
+    note: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (self.hypothesis,) if isinstance(self.hypothesis, str) else self.hypothesis
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ Delassus matrix W = J M⁻¹ Jᵀ, v (d) velocity before the impact, e restituti
 
 from __future__ import annotations
 
-from verification.proofs.algebra import expression, matrix, scalar, vector
-from verification.proofs.facts import Definite, NonNegative, equation
+from verification.proofs.algebra import Expression, expression, matrix, scalar, vector
+from verification.proofs.facts import Definite, Equation, NonNegative, equation
 from verification.proofs.rewriting import identity
 from verification.proofs.steps import Cancelling, Cofactor, Identity, Step
 
@@ -50,35 +50,51 @@ MASS_LEMMAS = (INVERSE_SYMMETRIC, INVERSE_FROM_LEFT)
 MASS_RULES = (SYMMETRIC_MASS, INVERSE_SYMMETRIC.claim, INVERSE_MASS, INVERSE_FROM_LEFT.claim)
 
 
-TRANSPOSED_INVERSE = identity(
-    "W Gᵀ W = W, with W = J M⁻¹ Jᵀ",
-    W * G.T * W,
-    W,
-    (INVERSE_SYMMETRIC.claim,),
-    "transpose W G W = W",
-    first=(Cofactor(ONE, GENERALIZED_INVERSE.T, ONE),),
-)
+def row_space_lemmas(inverse: Expression, name: str, given: Equation) -> tuple[Step, ...]:
+    """W G J = J for a {1}-inverse G of W (`given`: W G W = W): what is true on range(W) is true on range(J).
 
-
-def _row_space_lemmas() -> tuple[Step, ...]:
-    """W G J = J for every {1}-inverse G of W: what is true on the range of W is true on the range of J.
-
-    With N = W G J − J: N M⁻¹ Nᵀ = 0 by W G W = W alone, and M is positive definite, so M⁻¹ Nᵀ = 0 and N = 0.
+    With N = W G J − J: N M⁻ᵀ Nᵀ = 0 by W G W = W alone, and M is positive definite, so M⁻¹ Nᵀ = 0 and N = 0.
+    The last step is the lemma; the others lead to it. No symmetry is used.
     """
-    residual = W * G * J - J
+    return _vanishing_residual(W * inverse * J - J, f"W {name} J − J", on_row_space(inverse, name), given)
+
+
+def column_space_lemmas(inverse: Expression, name: str, given: Equation) -> tuple[Step, ...]:
+    """The same from the other side: Jᵀ G W = Jᵀ."""
+    return _vanishing_residual(
+        (J.T * inverse * W - J.T).T, f"(Jᵀ {name} W − Jᵀ)ᵀ", on_column_space(inverse, name), given
+    )
+
+
+def _vanishing_residual(
+    residual: Expression, words: str, lemma: Equation, given: Equation
+) -> tuple[Step, ...]:
+    half = equation(f"M⁻¹ Nᵀ = 0 for N = {words}", MI * residual.T, 0)
     square = identity(
-        "N M⁻¹ Nᵀ = 0 for N = W G J − J",
-        (MI * residual.T).T * M * (MI * residual.T),
+        f"(M⁻¹ Nᵀ)ᵀ M (M⁻¹ Nᵀ) = 0 for N = {words}",
+        half.lhs.T * M * half.lhs,
         0,
-        (*MASS_RULES, GENERALIZED_INVERSE, TRANSPOSED_INVERSE.claim),
-        "expand: every W G W and W Gᵀ W is W, and the four terms cancel",
+        (INVERSE_MASS, given, given.T),
+        "M M⁻¹ = I leaves N M⁻ᵀ Nᵀ; with the {1}-inverse its four terms cancel",
     )
-    half = equation("M⁻¹ Nᵀ = 0", MI * residual.T, 0)
+    zero = half.T if lemma.lhs.rows == "c" else half
+    outer = (ONE, M.T) if lemma.lhs.rows == "c" else (M, ONE)
+    rules = (INVERSE_MASS, INVERSE_MASS.T)
     end = identity(
-        "W G J = J", W * G * J, J, MASS_RULES, "N = (M⁻¹ Nᵀ)ᵀ M", first=(Cofactor(ONE, half.T, M),)
+        lemma.name, lemma.lhs, lemma.rhs, rules, "Nᵀ = M (M⁻¹ Nᵀ)", (Cofactor(outer[0], zero, outer[1]),)
     )
-    return TRANSPOSED_INVERSE, square, Cancelling(half, square.claim, DEFINITE_MASS), end
+    return square, Cancelling(half, square.claim, DEFINITE_MASS), end
 
 
-ROW_SPACE_LEMMAS = _row_space_lemmas()
-ON_ROW_SPACE = equation("W G J = J", W * G * J, J)
+def on_row_space(inverse: Expression, name: str) -> Equation:
+    """The conclusion of `row_space_lemmas`."""
+    return equation(f"W {name} J = J", W * inverse * J, J)
+
+
+def on_column_space(inverse: Expression, name: str) -> Equation:
+    """The conclusion of `column_space_lemmas`."""
+    return equation(f"Jᵀ {name} W = Jᵀ", J.T * inverse * W, J.T)
+
+
+ROW_SPACE_LEMMAS = row_space_lemmas(G, "G", GENERALIZED_INVERSE)
+ON_ROW_SPACE = on_row_space(G, "G")
