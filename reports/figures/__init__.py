@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from reports.figures import (
+    fig01_contact_forces,
+    fig02_two_link_arm,
     fig03_energy_loss,
     fig04_peg_corner,
     fig05_couplings,
@@ -14,12 +16,16 @@ from reports.figures import (
     fig12_device_trajectories,
     fig13_device_forces,
     hero_corner,
+    scenes_gallery,
 )
 from reports.figures.figure import Recipe
 
 RECIPES: tuple[Recipe, ...] = (
     hero_corner.RECIPE,
     fig04_peg_corner.RECIPE,
+    fig01_contact_forces.RECIPE,
+    fig02_two_link_arm.RECIPE,
+    scenes_gallery.RECIPE,
     fig05_couplings.RECIPE,
     fig03_energy_loss.RECIPE,
     fig07_trajectories.RECIPE,

@@ -1,14 +1,15 @@
-"""Figure 4: the peg before the corner, from the scene file; and Figure 1's forces at one instant of a run."""
+"""Figure 4: the peg before the corner, from the scene file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note, scale_bar
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.numbers import MINUS
 from reports.figures.planar import body_outlines, bounds
 from reports.figures.style import MUTED, PANEL, styled
 from reports.figures.svg import to_svg
@@ -58,20 +59,22 @@ def _frame(axes: Any) -> None:
 
 def _numbers(scene: Mapping[str, Any]) -> Numbers:
     body, contact = scene["bodies"][0], scene["contact"]
+    x, y, angle = body["position"]
     rows = (
-        ("peg", "size [mm]", " × ".join(f"{1e3 * side:g}" for side in body["shapes"][0]["size"]), "paper"),
-        ("peg", "mass [kg]", float(body["mass"]), "paper"),
-        ("peg", "inertia [kg m²]", float(body["inertia"]), "paper"),
-        ("peg", "start x, y [mm], θ [rad]", ", ".join(f"{v:g}" for v in (1e3 * body["position"][0],
-                                                      1e3 * body["position"][1], body["position"][2])), "ours"),
-        ("walls", "stiffness [N/m]", float(contact["stiffness"]), "paper"),
-        ("walls", "damping [N s/m]", float(contact["damping"]), "paper"),
-        ("walls", "restitution", float(contact["restitution"]), "paper"),
-        ("walls", "friction", float(contact["friction"]), "ours"),
-        ("hand", "force [N, N, N m]", ", ".join(f"{v:g}" for v in scene["hand"]["force"]), "paper"),
-        ("simulation", "rate [Hz]", float(scene["rate"]), "paper"),
+        ("peg size [mm]", _list(1e3 * side for side in body["shapes"][0]["size"]), "paper"),
+        ("peg mass [kg], inertia [kg m²]", _list((body["mass"], body["inertia"])), "paper"),
+        ("peg starts at x, y [mm], θ [rad]", _list((1e3 * x, 1e3 * y, angle)), "ours"),
+        ("wall stiffness [N/m], damping [N s/m]", _list((contact["stiffness"], contact["damping"])), "paper"),
+        ("restitution", _list([contact["restitution"]]), "paper"),
+        ("friction, its velocity threshold [m/s]", _list((contact["friction"], contact["friction_velocity"])), "ours"),
+        ("hand force [N, N, N m]", _list(scene["hand"]["force"]), "paper"),
+        ("rate [Hz]", _list([scene["rate"]]), "paper"),
     )
-    return Numbers(("what", "quantity", "value", "given by"), rows)
+    return Numbers(("quantity", "value", "given by"), rows)
+
+
+def _list(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values).replace("-", MINUS)
 
 
 RECIPE = Recipe(KEY, NUMBER, TITLE, (SCENE,), draw, section="idea")

@@ -38,7 +38,7 @@ def _picture(runs: Mapping[str, Run]) -> str:
     scene = ideal.scene_resolved
     low, high = _view(ideal)
     with styled() as new_figure:
-        drawing = new_figure(figsize=(HERO[0], HERO[0] * (high - low)[1] / (high - low)[0]))
+        drawing = new_figure(figsize=(HERO, HERO * (high - low)[1] / (high - low)[0]))
         axes = make_canvas(drawing, low, high, turned=True)
         draw_walls(axes, scene, reach=1.0)
         for k in ghost_steps(ideal):

@@ -51,6 +51,9 @@ STYLES: dict[str, LineStyle] = {
     "KE₀": LineStyle(INK, "", (4, 2), 1.2),
     "uniform rods": LineStyle(BLUE, "o", (), 1.8),
     "point masses": LineStyle(VERMILION, "s", (5, 1.6), 1.5, filled=False),
+    # maps of conditions
+    "holds": LineStyle(BLUE, "o", (), 0.0),
+    "fails": LineStyle(VERMILION, "X", (), 0.0),
 }
 
 # series that are ours to number: methods, tolerances, ...
@@ -76,7 +79,7 @@ _PARAMETERS: Any = {
 }
 
 PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a desk, one on a phone
-HERO = (6.4, 5.0)
+HERO = 7.2  # inches, the width of the first picture
 
 
 @contextmanager

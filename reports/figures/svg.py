@@ -12,7 +12,7 @@ from typing import Any
 
 from reports.figures.style import VARIABLES
 
-LARGEST_ENLARGEMENT = 1.6  # beyond, the lettering would shout
+LARGEST_ENLARGEMENT = 1.35  # beyond, the lettering would shout
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
 _FONT = re.compile(r"'DejaVu Sans'[^;\"]*")

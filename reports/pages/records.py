@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.figures.figure import Figure, Numbers
+from verification.proofs.statement import ProofRecord
 
 REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = (
     "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
@@ -45,31 +46,6 @@ class Claim:
     numbers: Numbers | None = None
     figure: Figure | None = None
     inputs: tuple[str, ...] = ()  # names of runs and tables
-
-
-@dataclass(frozen=True)
-class ProofStep:
-    """One step: a formula (may be empty) and why it follows."""
-
-    formula: str
-    because: str
-
-
-@dataclass(frozen=True)
-class Proof:
-    """A theorem, lemma or erratum that a machine checked, with the wrong twin that it refused."""
-
-    key: str
-    title: str
-    place: str
-    statement: str
-    assumptions: tuple[str, ...]
-    steps: tuple[ProofStep, ...]
-    verified: bool
-    certificate: str
-    twin: str = ""
-    twin_refused: bool | None = None
-    counterexample: str = ""
 
 
 @dataclass(frozen=True)
@@ -139,7 +115,7 @@ class Evidence:
     scenes: Mapping[str, Any] = field(default_factory=dict)  # scene name -> resolved scene (plain dictionary)
     verdicts: tuple[Verdict, ...] = ()
     claims: tuple[Claim, ...] = ()
-    proofs: tuple[Proof, ...] = ()
+    proofs: tuple[ProofRecord, ...] = ()
     properties: tuple[Property, ...] = ()
     cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()

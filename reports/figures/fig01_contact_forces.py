@@ -1,0 +1,93 @@
+"""Figure 1: contact and hand forces on a contact group, at two instants of a real run: colliding and resting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from iapb.run import Run
+from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.planar import body_outlines, bounds
+from reports.figures.style import BLUE, FORCE, INK, PANEL, styled
+from reports.figures.svg import to_svg
+
+KEY, NUMBER, TITLE = "fig01", "Figure 1", "What acts on the peg"
+RUN = "corner/IAPB"
+CAPTION = (
+    "The same run at two instants. When a contact is new, all approaching contacts of the group share one collision "
+    "(blue: impulses). While contacts last, springs and dampers at the walls (blue: forces) balance the hand (red). "
+    "In each picture the longest blue arrow sets the scale; the table has the numbers."
+)
+_LONGEST = 0.4  # arrow length, as a share of the peg's longer side
+_MARGIN = 0.35
+
+
+def draw(inputs: Mapping[str, Any]) -> Figure:
+    """Draw the hardest collision and the last resting instant of the run."""
+    run: Run = inputs[RUN]
+    instants = (("(a) colliding: impulses", hardest_collision(run), run.contacts.impulse, "N s"),
+                ("(b) resting: forces", last_contact(run), run.contacts.normal_force, "N"))
+    shown = [(title, step, values, unit) for title, step, values, unit in instants if step is not None]
+    panels = tuple(Panel(_picture(run, step, values, f"{KEY}-{number}"), _words(run, step, values, unit), title)
+                   for number, (title, step, values, unit) in enumerate(shown))
+    rows = tuple((title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
+                  unit) for title, step, values, unit in shown for k in contacts_of(run, step))
+    columns = ("instant", "t [s]", "contact x [mm]", "y [mm]", "along the normal", "unit")
+    return Figure(KEY, NUMBER, TITLE, CAPTION, panels, Numbers(columns, rows), (), (RUN,))
+
+
+def contacts_of(run: Run, step: int) -> range:
+    """Return the rows of the contact table that belong to a step."""
+    return range(int(run.contacts.offsets[step]), int(run.contacts.offsets[step + 1]))
+
+
+def hardest_collision(run: Run) -> int | None:
+    """Return the step with the largest contact impulse, if any."""
+    if not len(run.contacts.impulse) or not run.contacts.impulse.any():
+        return None
+    row = int(np.argmax(np.abs(run.contacts.impulse)))
+    return int(np.searchsorted(run.contacts.offsets, row, side="right") - 1)
+
+
+def last_contact(run: Run) -> int | None:
+    """Return the last step in which something touches, if any."""
+    steps = np.flatnonzero(np.diff(run.contacts.offsets))
+    return int(steps[-1]) if len(steps) else None
+
+
+def _picture(run: Run, step: int, values: np.ndarray, key: str) -> str:
+    scene, q = run.scene_resolved, run.q[step]
+    corners = [outline for _, outline in body_outlines(scene, q)]
+    low, high = bounds(corners, _MARGIN)
+    longest = _LONGEST * max(high - low) / (1 + 2 * _MARGIN)
+    with styled() as new_figure:
+        drawing = new_figure(figsize=(PANEL[0], PANEL[0] * (high - low)[1] / (high - low)[0]))
+        axes = make_canvas(drawing, low, high, turned=True)
+        draw_walls(axes, scene, reach=1.0)
+        draw_bodies(axes, scene, q)
+        _contact_arrows(axes, run, step, values, longest)
+        hand = np.asarray(scene["hand"]["force"][:2])
+        arrow(axes, q[:2], 0.7 * longest * hand / np.hypot(*hand))
+        note(axes, q[:2] + 0.7 * longest * hand / np.hypot(*hand), "hand", (4, -8), ha="left", color=FORCE)
+        return to_svg(drawing, key)
+
+
+def _contact_arrows(axes: Any, run: Run, step: int, values: np.ndarray, longest: float) -> None:
+    rows = contacts_of(run, step)
+    largest = max((abs(values[k]) for k in rows), default=0.0)
+    for k in rows:
+        point = run.contacts.point[k, :2]
+        axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
+        if values[k]:
+            arrow(axes, point, longest * values[k] / largest * run.contacts.normal[k, :2], color=BLUE)
+
+
+def _words(run: Run, step: int, values: np.ndarray, unit: str) -> str:
+    parts = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts_of(run, step))
+    return f"The peg at t = {run.time[step]:.3f} s with its contacts; along their normals: {parts}."
+
+
+RECIPE = Recipe(KEY, NUMBER, TITLE, (RUN,), draw, section="idea")
