@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import kernel
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult
-
 from iapb.effects import decide_effects
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
@@ -219,7 +218,7 @@ class _Recording:
             "hand_force", "coupling_force", "penalty_force", "friction_force", "impulse", "environment_force",
             "device_force", "state")}
         law, coupling = simulation.law, simulation.coupling
-        run = Run(
+        return Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
@@ -232,12 +231,6 @@ class _Recording:
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python",
         )  # fmt: skip
-        return with_energy(run, system)
-
-
-def with_energy(run: Run, system: System) -> Run:
-    """The run with its energy ledger."""
-    raise NotImplementedError
 
 
 def _effects(simulation: Simulation) -> tuple[EffectRow, ...]:

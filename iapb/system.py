@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,9 @@ from iapb.compiled import block
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
-from iapb.contact.kernels.rows import contact_row
-from iapb.contact.kernels.step import find_near
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
-from iapb.contact.laws import INTEGRATORS, Penalty
-from iapb.errors import ArgumentError, IapbError
+from iapb.contact.laws import INTEGRATORS
+from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
 from iapb.mechanics.mechanism import Mechanism
@@ -23,14 +21,6 @@ from iapb.scene import Scene
 from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 
 Floats = NDArray[np.float64]
-
-
-class ContactRows(NamedTuple):
-    """Contacts near the present state, for laws written in Python (c contacts, d velocities)."""
-
-    jacobian: Floats  # (c, d) unit-normal rows (11)-(12)
-    gap: Floats  # (c,) [m] negative = overlap
-    normal_velocity: Floats  # (c,) [m/s] positive separates
 
 
 class System:
@@ -75,22 +65,6 @@ class System:
         """The device: kinematically and inertially the hand-held tree, alone (paper VI)."""
         bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
         return Mechanism([self.mechanism.bodies[b] for b in bodies])
-
-    def free_force(self, q: Floats, v: Floats, applied: Floats) -> Floats:
-        """Applied minus Coriolis minus gravity forces: the right-hand side of (7) without contacts (d,)."""
-        force = applied - self.mechanism.gravity(q, self.gravity) if np.any(self.gravity) else applied.copy()
-        return force - self.mechanism.bias(q, v) if self.mechanism.has_velocity_terms else force
-
-    def contact_rows(self, state: State, margin: float = 0.0) -> ContactRows:
-        """Contacts with gap <= margin at the state's (q, v), found anew; also left in ``state.contacts``."""
-        world = self.world_under(Penalty())
-        count = find_near(world, state, margin)
-        if count < 0:
-            raise IapbError(f"scene {self.scene.name}: more than {self.capacity} contacts at once")
-        rows = np.zeros((count, self.mechanism.nv))
-        for i in range(count):
-            contact_row(world.mechanism, state.body, state.contacts, i, rows[i])
-        return ContactRows(rows, state.contacts.gap[:count].copy(), rows @ state.v)
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""

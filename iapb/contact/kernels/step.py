@@ -33,7 +33,7 @@ def advance(world, state, applied):
     if not locate(world, state):
         return NOT_POSITIVE_DEFINITE
     if world.switches.contacts:
-        if find_contacts(world, state, 0.0) < 0:
+        if find_contacts(world, state) < 0:
             return TOO_MANY_CONTACTS
         if world.switches.impulses:
             resolve_collisions(world, state)
@@ -60,10 +60,10 @@ def locate(world, state):
 
 
 @kernel
-def find_contacts(world, state, margin):
-    """Section III: contacts with gap <= margin, filtered, new or old, each group in one of three states."""
+def find_contacts(world, state):
+    """Section III: touching contacts, filtered, new or old, each group in one of three states."""
     remember(state)
-    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, margin, state.contacts)
+    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.contacts)
     if count < 0:
         return count
     if world.switches.clustering:
@@ -93,13 +93,6 @@ def remember(state):
             before.point[i, axis] = now.point[i, axis]
             before.normal[i, axis] = now.normal[i, axis]
     state.count[1] = state.count[0]
-
-
-@kernel
-def find_near(world, state, margin):
-    """`find_contacts` for laws written in Python, which look beyond touching; −1: too many."""
-    forward_kinematics(world.mechanism, state.q, state.body)
-    return find_contacts(world, state, margin)
 
 
 @kernel
