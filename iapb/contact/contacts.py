@@ -75,7 +75,7 @@ class ContactSet:
     collides: NDArray[np.bool_]
     group_of_tree: NDArray[np.int64]
     state_of_tree: NDArray[np.int8]
-    _buffer: ContactBuffer = field(repr=False)
+    _buffer: Any = field(repr=False)  # a ContactBuffer, laid out for the kernels
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -124,6 +124,7 @@ def find_contacts(
     ArgumentError
         A distance or velocity below zero, q or v of the wrong length or not finite.
     """
+    from iapb.compiled import block
     from iapb.contact.kernels.contact_set import classify, cluster, mark_new
     from iapb.contact.kernels.narrow_phase import detect
     from iapb.contact.kernels.rows import contact_velocities
@@ -136,15 +137,15 @@ def find_contacts(
     )
     q, v = finite_vector("q", q, mechanism.nq), finite_vector("v", v, mechanism.nv)
     chosen = candidate_pairs(shapes) if pairs is None else np.asarray(pairs, np.int32).reshape(-1, 2)
-    buffer = make_contact_buffer(contact_capacity(shapes, chosen))
-    workspace = make_workspace(len(mechanism.names), mechanism.nv)
-    forward_kinematics(mechanism.arrays, q, workspace)
-    count = detect(shapes, chosen, workspace.rotation, workspace.position, float(margin), buffer)
+    buffer: Any = block(make_contact_buffer(contact_capacity(shapes, chosen)))
+    arrays, workspace = block(mechanism.arrays), block(make_workspace(len(mechanism.names), mechanism.nv))
+    forward_kinematics(arrays, q, workspace)
+    count = detect(block(shapes), chosen, workspace.rotation, workspace.position, float(margin), buffer)
     if cluster_distance > 0.0:
         count = cluster(buffer, count, float(cluster_distance))
     before, count_before = (buffer, 0) if previous is None else (previous._buffer, len(previous))
     mark_new(buffer, count, before, count_before, float(coherence_distance))
-    contact_velocities(mechanism.arrays, workspace, v, buffer, count)
+    contact_velocities(arrays, workspace, v, buffer, count)
     start, stop = (np.array(ends, np.int64) for ends in zip(*mechanism.tree_dofs, strict=True))
     group, state = np.zeros(len(start), np.int64), np.zeros(len(start), np.int8)
     spreading = np.zeros(len(start), np.bool_)
@@ -172,13 +173,14 @@ def contact_rows(
         Between two moving bodies: one row nᵀ(J_a − J_b), equation (12); or the paper's own nᵀJ_a and nᵀJ_b,
         (13)-(14), which do not conserve momentum (each body rebounds as from a wall).
     """
+    from iapb.compiled import block
     from iapb.contact.kernels.rows import body_row, contact_row
     from iapb.mechanics.kernels import forward_kinematics, make_workspace
 
     if self_collision_rows not in ("relative", "per_body"):
         raise ArgumentError("self_collision_rows", self_collision_rows, "'relative' or 'per_body'")
-    workspace = make_workspace(len(mechanism.names), mechanism.nv)
-    forward_kinematics(mechanism.arrays, finite_vector("q", q, mechanism.nq), workspace)
+    arrays, workspace = block(mechanism.arrays), block(make_workspace(len(mechanism.names), mechanism.nv))
+    forward_kinematics(arrays, finite_vector("q", q, mechanism.nq), workspace)
     rows, owners = [], []
     for i in range(len(contacts)):
         bodies = (int(contacts.body_a[i]), int(contacts.body_b[i]))
@@ -186,9 +188,9 @@ def contact_rows(
         for body in bodies if separate else bodies[:1]:
             row = np.zeros(mechanism.nv)
             if separate:
-                body_row(mechanism.arrays, workspace, body, contacts.point[i], contacts.normal[i], row)
+                body_row(arrays, workspace, body, contacts.point[i], contacts.normal[i], row)
             else:
-                contact_row(mechanism.arrays, workspace, contacts._buffer, i, row)
+                contact_row(arrays, workspace, contacts._buffer, i, row)
             rows.append(row)
             owners.append(i)
     return np.array(rows).reshape(-1, mechanism.nv), np.array(owners, np.int64)

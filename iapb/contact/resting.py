@@ -61,6 +61,7 @@ def resting_forces(
     ArgumentError
         A constant below zero or not finite, v_threshold = 0 with friction.
     """
+    from iapb.compiled import block
     from iapb.contact.kernels.resting import resting_forces as kernel
     from iapb.mechanics.kernels import forward_kinematics, make_workspace
 
@@ -69,12 +70,12 @@ def resting_forces(
     )
     if friction > 0.0 and friction_velocity == 0.0:
         raise ArgumentError("friction_velocity", friction_velocity, "a speed > 0 where there is friction")
-    workspace = make_workspace(len(mechanism.names), mechanism.nv)
-    forward_kinematics(mechanism.arrays, finite_vector("q", q, mechanism.nq), workspace)
+    arrays, workspace = block(mechanism.arrays), block(make_workspace(len(mechanism.names), mechanism.nv))
+    forward_kinematics(arrays, finite_vector("q", q, mechanism.nq), workspace)
     penalty, drag = np.zeros(mechanism.nv), np.zeros(mechanism.nv)
     buffer, count = contacts._buffer, len(contacts)
     constants = (float(stiffness), float(damping), bool(clamped), float(friction), float(friction_velocity))
-    kernel(mechanism.arrays, workspace, buffer, count, *constants, penalty, drag)
+    kernel(arrays, workspace, buffer, count, *constants, penalty, drag)
     return RestingForces(
         buffer.normal_force[:count].copy(), buffer.friction_force[:count].copy(), penalty, drag
     )

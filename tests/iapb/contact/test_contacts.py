@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iapb.compiled import block
 from iapb.contact.contacts import find_contacts
 from iapb.contact.geometry import Circle, HalfPlane, Polygon, box, make_contact_buffer, make_shapes
 from iapb.contact.kernels import contact_set
@@ -30,7 +31,7 @@ def free_bodies(count):
 
 def written(points, normals, gaps=None, bodies=None):
     """A buffer with contacts as given, on body 0 against the world unless `bodies` says otherwise."""
-    buffer = make_contact_buffer(max(len(points), 1))
+    buffer = block(make_contact_buffer(max(len(points), 1)))
     for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
         buffer.point[i, :2], buffer.normal[i, :2] = point, normal
         buffer.gap[i] = -1e-3 if gaps is None else gaps[i]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from iapb.compiled import block
 from iapb.contact.geometry import (
     Circle,
     HalfPlane,
@@ -38,8 +39,8 @@ def placements(*poses):
 
 def contacts(shapes: Shapes, pairs, poses, margin=0.0):
     """Contacts as a list of (feature, point, normal, gap), in buffer order."""
-    buffer = make_contact_buffer(contact_capacity(shapes, pairs))
-    n = detect(shapes, pairs, *placements(*poses), margin, buffer)
+    buffer = block(make_contact_buffer(contact_capacity(shapes, pairs)))
+    n = detect(block(shapes), pairs, *placements(*poses), margin, buffer)
     return [
         (int(buffer.feature[i]), buffer.point[i].copy(), buffer.normal[i].copy(), float(buffer.gap[i]))
         for i in range(n)
@@ -222,5 +223,5 @@ def test_coincident_centres_give_a_finite_antisymmetric_normal():
 
 def test_a_full_buffer_is_a_status_not_an_overrun():
     shapes = make_shapes([box((1.0, 1.0), body=0), HalfPlane((0.0, 5.0), (0.0, 1.0))])
-    buffer = make_contact_buffer(3)
-    assert detect(shapes, candidate_pairs(shapes), *placements((0, 0, 0)), 0.0, buffer) == -1
+    buffer = block(make_contact_buffer(3))
+    assert detect(block(shapes), candidate_pairs(shapes), *placements((0, 0, 0)), 0.0, buffer) == -1

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iapb.compiled import block
 from iapb.contact.contacts import contact_rows, find_contacts
 from iapb.contact.geometry import Circle, HalfPlane, box, make_contact_buffer, make_shapes
 from iapb.contact.kernels import rows
@@ -70,39 +71,39 @@ def test_an_arm_struck_along_itself_has_an_exact_zero_row(angle, share):
     """Both sides of the tolerance: rounding of the kinematics vanishes, a tilt of 1e-9 rad stays."""
     mechanism = arm()
     q = np.array([angle, 0.0])
-    workspace, row = make_workspace(2, 2), np.zeros(2)
-    forward_kinematics(mechanism.arrays, q, workspace)
+    arrays, workspace, row = block(mechanism.arrays), block(make_workspace(2, 2)), np.zeros(2)
+    forward_kinematics(arrays, q, workspace)
     along = np.array([math.cos(angle), math.sin(angle), 0.0])
     point = workspace.position[1] + share * along
-    rows.body_row(mechanism.arrays, workspace, 1, point, along, row)
+    rows.body_row(arrays, workspace, 1, point, along, row)
     assert np.array_equal(row, [0.0, 0.0])
     tilted = along + 1e-9 * np.array([-along[1], along[0], 0.0])
-    rows.body_row(mechanism.arrays, workspace, 1, point, tilted, row)
+    rows.body_row(arrays, workspace, 1, point, tilted, row)
     assert row == pytest.approx([1e-9 * (1.0 + share), 1e-9 * share], rel=1e-5)
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi, math.pi))
 def test_a_blow_at_the_joint_itself_has_no_lever(angle, direction):
     mechanism = arm()
-    workspace, row = make_workspace(2, 2), np.zeros(2)
-    forward_kinematics(mechanism.arrays, np.array([angle, 0.3]), workspace)
+    arrays, workspace, row = block(mechanism.arrays), block(make_workspace(2, 2)), np.zeros(2)
+    forward_kinematics(arrays, np.array([angle, 0.3]), workspace)
     normal = np.array([math.cos(direction), math.sin(direction), 0.0])
     rounding = 1e-16 * np.array([-normal[1], normal[0], 0.0])
-    rows.body_row(mechanism.arrays, workspace, 0, workspace.position[0] + rounding, normal, row)
+    rows.body_row(arrays, workspace, 0, workspace.position[0] + rounding, normal, row)
     assert np.array_equal(row, [0.0, 0.0])
     beside = workspace.position[0] + 1e-9 * np.array([-normal[1], normal[0], 0.0])
-    rows.body_row(mechanism.arrays, workspace, 0, beside, normal, row)
+    rows.body_row(arrays, workspace, 0, beside, normal, row)
     assert abs(row[0]) == pytest.approx(1e-9, rel=1e-5)
 
 
 def test_a_dof_that_carries_both_bodies_has_an_exact_zero_entry():
     mechanism = arm(3)
-    contact = make_contact_buffer(1)
+    contact = block(make_contact_buffer(1))
     contact.point[0, :2], contact.normal[0, :2] = (0.7, 0.4), (0.6, 0.8)
     contact.body_a[0], contact.body_b[0] = 2, 0
-    workspace, row = make_workspace(3, 3), np.zeros(3)
-    forward_kinematics(mechanism.arrays, np.array([0.3, 0.5, -0.7]), workspace)
-    rows.contact_row(mechanism.arrays, workspace, contact, 0, row)
+    arrays, workspace, row = block(mechanism.arrays), block(make_workspace(3, 3)), np.zeros(3)
+    forward_kinematics(arrays, np.array([0.3, 0.5, -0.7]), workspace)
+    rows.contact_row(arrays, workspace, contact, 0, row)
     assert row[0] == 0.0 and row[1] != 0.0 and row[2] != 0.0
 
 
