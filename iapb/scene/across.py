@@ -26,6 +26,7 @@ def across_parts(given: Any) -> list[InitErrorDetails]:
         *_repeated_names("walls", walls),
         *_parents(bodies),
         *_scattered_trees(bodies),
+        *_nothing_moves(bodies),
         *_too_many_shapes(bodies, walls),
         *_tool(given, bodies),
     ]
@@ -83,6 +84,11 @@ def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
     return [root[_name(body)] for body in bodies]
 
 
+def _nothing_moves(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
+    if bodies and all(_name(body, "joint") == "fixed" for body in bodies):
+        yield located(("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move")
+
+
 def _too_many_shapes(bodies: list[dict[str, Any]], walls: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
     count = len(walls) + sum(len(_mappings(body.get("shapes"))) for body in bodies)
     if count > MAX_SHAPES:
@@ -95,13 +101,16 @@ def _tool(given: dict[str, Any], bodies: list[dict[str, Any]]) -> Iterator[InitE
     hand = given.get("hand")
     if hand is None:
         for field, section in (("device", device), ("couplings", couplings)):
-            if section:
+            if isinstance(section, dict) and any(section.values()):
                 yield located((field,), section, "a hand in the scene: without one no device takes part")
         return
     held = _name(hand, "body") if isinstance(hand, dict) else None
     if held is None:
         return
-    if held not in [_name(body) for body in bodies]:
+    names = [_name(body) for body in bodies]
+    if None in names or not names:
+        return  # an unreadable body may be the one
+    if held not in names:
         yield located(("hand", "body"), held, "the name of a body of this scene")
         return
     coordinates = _tree_coordinates(bodies, held)

@@ -47,11 +47,16 @@ def _set(plain: dict[str, Any], path: Any, value: Any) -> None:
     for i, step in enumerate(steps):
         key = _key(place, step, path)
         if i == len(steps) - 1:
-            place[key] = copy.deepcopy(value)
+            place[key] = _plain(value)
             return
         if isinstance(place, dict) and place.get(key) is None:
             place[key] = {}
         place = place[key]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of the caller's own: a copy, numpy arrays and numbers as plain ones."""
+    return value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
 
 
 def _key(place: Any, step: str, path: str) -> str | int:
@@ -59,7 +64,7 @@ def _key(place: Any, step: str, path: str) -> str | int:
     if isinstance(place, dict):
         return step
     if not isinstance(place, list):
-        raise ArgumentError("values", path, f"a path into the scene; nothing lies below {step!r}'s parent")
+        raise ArgumentError("values", path, f"a path into the scene: {step!r} lies below a value")
     names = [item.get("name") if isinstance(item, dict) else None for item in place]
     if step in names:
         return names.index(step)

@@ -35,10 +35,14 @@ class Scene(Part):
     walls: Annotated[tuple[Wall, ...], Field(max_length=MAX_WALLS)] = Field(
         (), description="the static world"
     )
-    contact: Contact = Field(default_factory=lambda: Contact.model_validate({}), description="how contacts behave")
+    contact: Contact = Field(
+        default_factory=lambda: Contact.model_validate({}), description="how contacts behave"
+    )
     hand: Hand | None = Field(None, description="the hand that holds the tool; default: nobody")
     device: Device | None = Field(None, description="limits of the haptic device; default: an ideal one")
-    couplings: Couplings = Field(default_factory=lambda: Couplings.model_validate({}), description="gains between device and tool")
+    couplings: Couplings = Field(
+        default_factory=lambda: Couplings.model_validate({}), description="gains between device and tool"
+    )
 
     _source_text: str = PrivateAttr("")
 
