@@ -5,6 +5,7 @@ M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.compiled import Block, block
 from iapb.errors import ArgumentError
 from iapb.mechanics import kernels, structure
 from iapb.mechanics.bodies import Body, finite_array, parent_indices, tree_indices
@@ -61,12 +63,18 @@ class Mechanism:
         parents = parent_indices(self.bodies)
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
         self.arrays: MechanismArrays = _collect(self.bodies, parents)
+        self._block: Block = block(self.arrays)
+        self._scratch = threading.local()  # kernels write: each thread needs its own
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
         self.tree_dofs: list[tuple[int, int]] = _tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
         self.has_velocity_terms: bool = structure.has_velocity_terms(self.arrays)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the bodies: a block holds addresses of this process."""
+        return Mechanism, (self.bodies,)
 
     @classmethod
     def from_urdf(cls, path: str | Path, floating_base: bool = False) -> Mechanism:
@@ -109,67 +117,69 @@ class Mechanism:
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt where that makes sense."""
         out = np.empty(self.nq)
-        kernels.integrate(self.arrays, self._configuration(q), self._velocity(v), float(dt), out)
+        kernels.integrate(self._block, self._configuration(q), self._velocity(v), float(dt), out)
         return out
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest turns."""
         out = np.empty(self.nv)
-        kernels.difference(self.arrays, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
+        kernels.difference(self._block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
         return out
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
-        workspace = self.at(q)
-        return workspace.rotation, workspace.position
+        workspace = self._at(q)
+        return workspace.rotation.copy(), workspace.position.copy()
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        return self._filled((self.nv, self.nv), kernels.mass_matrix, self.at(q))
+        return self._filled((self.nv, self.nv), kernels.mass_matrix, self._at(q))
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
-        return self._filled((self.nv,), kernels.bias, self.at(q), self._velocity(v))
+        return self._filled((self.nv,), kernels.bias, self._at(q), self._velocity(v))
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
-        return self._filled((self.nv,), kernels.gravity, self.at(q), _field(g))
+        return self._filled((self.nv,), kernels.gravity, self._at(q), _field(g))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
         rates, change = self._velocity(v), self._velocity(dv, "dv")
-        return self._filled((self.nv,), kernels.inverse_dynamics, self.at(q), rates, change, _field(g))
+        return self._filled((self.nv,), kernels.inverse_dynamics, self._at(q), rates, change, _field(g))
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
         """Return J (3, d): velocity, world axes, of the world point [m] taken as fixed to the body."""
         place = finite_array("point", point, (3,), "m")
-        return self._filled((3, self.nv), kernels.point_jacobian, self.at(q), self.index(body), place)
+        return self._filled((3, self.nv), kernels.point_jacobian, self._at(q), self.index(body), place)
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""
-        return self._filled((6, self.nv), kernels.frame_jacobian, self.at(q), self.index(body))
+        return self._filled((6, self.nv), kernels.frame_jacobian, self._at(q), self.index(body))
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
         """Return the kinetic energy [J]."""
-        return float(kernels.kinetic_energy(self.arrays, self.at(q), self._velocity(v)))
+        return float(kernels.kinetic_energy(self._block, self._at(q), self._velocity(v)))
 
     def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
         """Return -sum m g . c [J] for the field g (3,) [m/s^2]."""
-        return float(kernels.potential_energy(self.arrays, self.at(q), _field(g)))
+        return float(kernels.potential_energy(self._block, self._at(q), _field(g)))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum about the common centre of mass [N m s]."""
-        return self._filled((6,), kernels.centroidal_momentum, self.at(q), self._velocity(v))
+        return self._filled((6,), kernels.centroidal_momentum, self._at(q), self._velocity(v))
 
-    def at(self, q: ArrayLike) -> Workspace:
-        """Return a workspace holding the kinematics of the configuration q."""
-        workspace = self.workspace()
-        kernels.forward_kinematics(self.arrays, self._configuration(q), workspace)
+    def _at(self, q: ArrayLike) -> Block:
+        """This thread's scratch, holding the kinematics of q until the next call."""
+        if not hasattr(self._scratch, "workspace"):
+            self._scratch.workspace = block(self.workspace())
+        workspace: Block = self._scratch.workspace
+        kernels.forward_kinematics(self._block, self._configuration(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
         out = np.zeros(shape)
-        kernel(self.arrays, *given, out)
+        kernel(self._block, *given, out)
         return out
 
     def _velocity(self, v: ArrayLike, argument: str = "v") -> Floats:

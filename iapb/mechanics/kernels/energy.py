@@ -1,7 +1,9 @@
 """Energies and momentum as sums over bodies: no cancellation between large entries of M."""
 
 from iapb.compiled import kernel
+from iapb.mechanics.kernels.configuration import difference
 from iapb.mechanics.kernels.dynamics import body_velocities, turned_inertia
+from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 
@@ -48,3 +50,19 @@ def centroidal_momentum(m, w, v, out):
         angular = add(angular, add(spin, cross(subtract(load(w.center, b), common), momentum)))
     out[0], out[1], out[2] = linear
     out[3], out[4], out[5] = angular
+
+
+@kernel
+def energies_along(m, w, q, v, g, kinetic, potential):
+    """kinetic, potential (n,) [J] <- the energies at the n states of a trajectory q (n, nq), v (n, d)."""
+    for k in range(q.shape[0]):
+        forward_kinematics(m, q[k], w)
+        kinetic[k] = kinetic_energy(m, w, v[k])
+        potential[k] = potential_energy(m, w, g)
+
+
+@kernel
+def displacements_along(m, q, out):
+    """out (n - 1, d) <- the displacement of each step of a trajectory q (n, nq), see `difference`."""
+    for k in range(out.shape[0]):
+        difference(m, q[k], q[k + 1], out[k])

@@ -1,0 +1,152 @@
+"""Energy ledger of a run: where every joule came from and went, and what the integrator made up.
+
+Over step k the configuration moves by the displacement Dq_k = difference(q_k, q_k+1) (q_k+1 - q_k on vector
+coordinates), that is by the velocity actually integrated. The work of a force F_k held over the step is
+F_k . Dq_k: what somebody with a force sensor and a position sensor would measure. The impulse of step k acts
+at q_k on v_k, before the forces. Then, summed over the steps so far,
+
+    kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss + residual.
+
+The residual is energy that the time integration created (> 0) or lost (< 0); over a given time it falls with
+the method's order. One step of semi-implicit Euler, for example, moves by v_k+1 while the kinetic energy changes
+by F . (v_k + v_k+1) / 2 dt (constant M): it loses F . M^-1 F dt^2 / 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.compiled import block
+from iapb.errors import ArgumentError
+from iapb.mechanics.bodies import finite_array
+from iapb.mechanics.kernels.energy import displacements_along, energies_along
+from iapb.mechanics.mechanism import Mechanism
+from iapb.run import Run
+
+Floats = NDArray[np.float64]
+
+FORCES = ("hand", "coupling", "penalty", "friction")
+
+
+def energies(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Return kinetic and potential energy (n,) [J] at n states, q (n, nq) and v (n, d), gravity (3,) [m/s^2]."""
+    kinetic, potential = np.zeros(len(q)), np.zeros(len(q))
+    field = finite_array("gravity", gravity, (3,), "m/s^2")
+    arrays = block(mechanism.arrays), block(mechanism.workspace())
+    energies_along(
+        *arrays, _rows("q", q, mechanism.nq), _rows("v", v, mechanism.nv), field, kinetic, potential
+    )
+    return kinetic, potential
+
+
+def displacements(mechanism: Mechanism, q: Floats) -> Floats:
+    """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations q."""
+    out = np.zeros((max(len(q) - 1, 0), mechanism.nv))
+    displacements_along(block(mechanism.arrays), _rows("q", q, mechanism.nq), out)
+    return out
+
+
+def port_energy(force: Floats, displacement: Floats) -> Floats:
+    """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F . Dq.
+
+    This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d).
+    """
+    return np.cumsum(np.einsum("nd,nd->n", force, displacement))
+
+
+def passivity_deficit(entered: Floats, stored: float = 0.0) -> float:
+    """Return how much more energy [J] came out of a port than had entered or was stored there at first.
+
+    Zero for a passive system, whatever happens at the port.
+    """
+    return max(0.0, -float(np.min(entered, initial=0.0)) - stored)
+
+
+def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -> Floats:
+    """Return the kinetic energy (n,) [J] taken by the generalized impulse (n, d) at q_k, v_k of each step.
+
+    -(v . P + P . M^-1 P / 2), which is exact whatever part of the impulse the clamp or a limit removed.
+    """
+    losses = np.zeros(len(impulse))
+    mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
+    for k in np.flatnonzero(np.any(impulse, axis=1)):
+        matrix = mechanism.mass_matrix(q[k]) if mass_matrix is None else mass_matrix
+        change = np.linalg.solve(matrix, impulse[k])
+        losses[k] = -impulse[k] @ (v[k] + 0.5 * change)
+    return losses
+
+
+def energy_ledger(
+    mechanism: Mechanism,
+    gravity: ArrayLike,
+    q: Floats,
+    v: Floats,
+    forces: Mapping[str, Floats],
+    impulse: Floats,
+) -> dict[str, Floats]:
+    """Return the ledger of n steps.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    gravity : (3,) [m/s^2]
+    q, v : (n + 1, nq), (n + 1, d)
+        States at the beginning of each step and at the end of the last.
+    forces : name -> (n, d) [N, N m]
+        Generalized forces on the mechanism over each step; gravity is not among them.
+    impulse : (n, d) [N s, N m s]
+        Generalized impulse at the beginning of each step.
+
+    Returns
+    -------
+    dict
+        `kinetic`, `potential` (n + 1,) [J]; `<name>_work` of each force, `impact_loss` and
+        `integration_residual` (n,) [J], sums since the start at the end of each step.
+
+    Raises
+    ------
+    ArgumentError
+        Arrays whose shapes do not belong together.
+    """
+    steps = len(q) - 1
+    kinetic, potential = energies(mechanism, gravity, q, v)
+    displacement = displacements(mechanism, q)
+    ledger = {"kinetic": kinetic, "potential": potential}
+    for name, force in (dict(forces) | {"impulse": impulse}).items():
+        if np.shape(force) != (steps, mechanism.nv):
+            raise ArgumentError(f"{name} of shape", np.shape(force), f"({steps}, {mechanism.nv})")
+    for name, force in forces.items():
+        ledger[f"{name}_work"] = port_energy(force, displacement)
+    ledger["impact_loss"] = np.cumsum(impact_losses(mechanism, q, v, impulse))
+    total = kinetic + potential
+    explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
+    ledger["integration_residual"] = total[1:] - total[0] - explained
+    return ledger
+
+
+def energy_of_run(
+    run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None
+) -> dict[str, Floats]:
+    """Return the ledger of a run (see `energy_ledger`), with the device's side where there is one.
+
+    The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
+    energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
+    """
+    forces = {name: getattr(run, f"{name}_force") for name in FORCES}
+    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse)
+    if device is not None and run.device_q.shape[1]:
+        moved = displacements(device, run.device_q)
+        ledger["device_kinetic"], _ = energies(device, gravity, run.device_q, run.device_v)
+        ledger["device_hand_work"] = port_energy(run.hand_force[:, slice(*run.tool_dofs)], moved)
+        ledger["device_actuator_work"] = port_energy(run.device_force, moved)
+    return ledger
+
+
+def _rows(name: str, values: Floats, columns: int) -> Floats:
+    rows = np.ascontiguousarray(values, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise ArgumentError(f"{name} of shape", rows.shape, f"(states, {columns})")
+    return rows

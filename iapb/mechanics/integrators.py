@@ -1,0 +1,90 @@
+"""Time integrators as data: each declares its order, tests measure it.
+
+All are explicit, start a step from (q, v) alone (an impulse may have changed v just before), and evaluate the
+acceleration at given stages: stage i stands `fraction[i]` of the step after its start, on the line that the
+stage before it points along, and carries the weight `weight[i]`. The compiled step reads these numbers;
+`Integrator.step` is the same in Python, for any acceleration.
+
+On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError
+
+Floats = NDArray[np.float64]
+Integrate = Callable[[Floats, Floats, float], Floats]  # q, v, dt [s] -> q
+Acceleration = Callable[[Floats, Floats], Floats]  # q, v -> dv/dt
+
+
+class Integrator(NamedTuple):
+    """An explicit integrator.
+
+    `order`: the error after a given time falls as dt^order. `group_order` is the same for the compiled step,
+    which combines the stages' velocities into one displacement, where rotations do not commute.
+    """
+
+    name: str
+    order: int
+    group_order: int
+    fraction: tuple[float, ...]  # where in the step each evaluation stands
+    weight: tuple[float, ...]  # its share of the step, sum 1
+    semi_implicit: bool = False  # the new velocity moves the configuration
+
+    def step(
+        self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
+    ) -> tuple[Floats, Floats]:
+        """Return (q, v) after one step of dt [s], at the declared order on every configuration space."""
+        if len(self.weight) == 4:
+            return _runge_kutta_4(integrate, acceleration, q, v, dt)
+        rate, change = v, acceleration(q, v)
+        mean_rate, mean_change = self.weight[0] * rate, self.weight[0] * change
+        for fraction, weight in zip(self.fraction[1:], self.weight[1:], strict=True):
+            place = integrate(q, rate, fraction * dt)
+            rate = v + fraction * dt * change
+            change = acceleration(place, rate)
+            mean_rate, mean_change = mean_rate + weight * rate, mean_change + weight * change
+        v_next = v + dt * mean_change
+        return integrate(q, v_next if self.semi_implicit else mean_rate, dt), v_next
+
+
+def _runge_kutta_4(
+    integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
+) -> tuple[Floats, Floats]:
+    """Commutator-free fourth-order method (Celledoni, Marthinsen and Owren, 2003).
+
+    On vector coordinates it is the classical Runge-Kutta method.
+    """
+    v1, a1 = v, acceleration(q, v)
+    q2, v2 = integrate(q, v1, 0.5 * dt), v + 0.5 * dt * a1
+    a2 = acceleration(q2, v2)
+    q3, v3 = integrate(q, v2, 0.5 * dt), v + 0.5 * dt * a2
+    a3 = acceleration(q3, v3)
+    q4, v4 = integrate(q2, v3 - 0.5 * v1, dt), v + dt * a3
+    a4 = acceleration(q4, v4)
+    q_half = integrate(q, (3.0 * v1 + 2.0 * v2 + 2.0 * v3 - v4) / 12.0, dt)
+    q_next = integrate(q_half, (3.0 * v4 + 2.0 * v3 + 2.0 * v2 - v1) / 12.0, dt)
+    return q_next, v + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+
+
+INTEGRATORS: dict[str, Integrator] = {
+    method.name: method
+    for method in (
+        Integrator("semi_implicit_euler", 1, 1, (0.0,), (1.0,), semi_implicit=True),
+        Integrator("midpoint", 2, 2, (0.0, 0.5), (0.0, 1.0)),
+        Integrator("runge_kutta_4", 4, 2, (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+    )
+}
+
+
+def integrator(name: str) -> Integrator:
+    """Return the integrator of that name."""
+    if name not in INTEGRATORS:
+        raise ArgumentError("integrator", name, "one of " + ", ".join(INTEGRATORS))
+    return INTEGRATORS[name]
