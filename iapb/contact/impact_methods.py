@@ -130,8 +130,8 @@ def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float
     cutoff = PINV_CUTOFF if tolerance is None else tolerance
     singular_values = np.linalg.svd(W, compute_uv=False)
     rank = int(np.sum(singular_values > cutoff * singular_values[0]))
-    impulses = -(1.0 + problem.restitution) * (np.linalg.pinv(W, rcond=cutoff) @ gamma)
-    return _from_impulses(problem, size * impulses, rank, clamped)
+    impulses: Floats = -(1.0 + problem.restitution) * size * (np.linalg.pinv(W, rcond=cutoff) @ gamma)
+    return _from_impulses(problem, impulses, rank, clamped)
 
 
 def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
@@ -158,13 +158,13 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
     W, gamma = _delassus(problem)
     share = DAMPING if tolerance is None else tolerance
     regular = W + share * max(float(np.max(np.diag(W))), np.finfo(float).tiny) * np.eye(len(W))
-    impulses = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
+    impulses: Floats = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
     return _from_impulses(problem, impulses, problem.contacts, clamped)
 
 
 def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
     """(21) with the projector from the truncated singular value decomposition of unit-scaled A."""
-    work, d, c = _prepared(problem), problem.coordinates, problem.contacts
+    work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
     v_plus, momentum = np.empty(d), np.empty(d)
     _, singular_values, right = np.linalg.svd(rows, full_matrices=False)

@@ -12,6 +12,7 @@ from iapb.compiled import kernel
 # Pivots are taken among residual rows at least this share of the longest one. A short residual carries rounding
 # of ε / ‖r‖ into its direction, and where one direction is left all rows tie, so that rounding would choose.
 _PIVOT_SHARE = 0.1
+_PASSES = 4  # each pass gains all digits that the one before left; a vector that survives none is rounding
 
 
 @kernel
@@ -51,23 +52,40 @@ def _most_violating(closing, size, count, eligible_above):
 
 @kernel
 def _next_direction(columns, pivot, basis, rank):
-    """Orthonormalize the pivot's residual row against the basis once more and append it."""
+    """Append the pivot's residual row, made orthonormal to the basis; False if nothing but rounding is left of it.
+
+    A pass that shortens the unit vector by less than half left it orthogonal to rounding (Kahan, in Parlett 1980);
+    the residual is nearly orthogonal already, so the first pass almost always is the last.
+    """
     d = columns.shape[0]
     q = basis[rank]
     for k in range(d):
         q[k] = columns[k, pivot]
-    for j in range(rank):  # the residual is nearly orthogonal already: one more pass makes it so to rounding
-        overlap = 0.0
-        for k in range(d):
-            overlap += basis[j, k] * q[k]
-        for k in range(d):
-            q[k] -= overlap * basis[j, k]
+    _normalize(q)
+    for _ in range(_PASSES):
+        for j in range(rank):
+            overlap = 0.0
+            for k in range(d):
+                overlap += basis[j, k] * q[k]
+            for k in range(d):
+                q[k] -= overlap * basis[j, k]
+        left = _normalize(q)
+        if left > 0.5:
+            return True
+    return False
+
+
+@kernel
+def _normalize(q):
+    """Scale q to unit length in place and return the length it had; a zero vector stays."""
     square = 0.0
-    for k in range(d):
+    for k in range(q.shape[0]):
         square += q[k] * q[k]
-    inverse = 1.0 / math.sqrt(square)
-    for k in range(d):
-        q[k] *= inverse
+    length = math.sqrt(square)
+    if length > 0.0:
+        for k in range(q.shape[0]):
+            q[k] /= length
+    return length
 
 
 @kernel
@@ -117,7 +135,9 @@ def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size
         pivot = _most_violating(closing, size, count, tolerance * tolerance)
         if pivot < 0:
             break
-        _next_direction(columns, pivot, basis, rank)
+        if not _next_direction(columns, pivot, basis, rank):
+            size[pivot] = 0.0
+            continue
         q = basis[rank]
         along_q = 0.0
         for k in range(d):

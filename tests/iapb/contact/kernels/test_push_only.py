@@ -1,0 +1,62 @@
+"""Impulses that push only: the optimality conditions themselves, and every subset of contacts as a judge."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.contact.kernels.unilateral import push_only
+
+
+def unit_columns_of(seed: int, d: int, c: int) -> np.ndarray:
+    """Unit rows as columns, half of them copies or combinations of others."""
+    rng = np.random.default_rng(seed)
+    rows = rng.normal(size=(c, d))
+    rows[c // 2 :] = rows[: c - c // 2] * np.where(rng.random(c - c // 2) < 0.5, 1.0, -1.0)[:, None]
+    return np.ascontiguousarray((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
+
+
+@given(seed=st.integers(0, 100_000), d=st.integers(1, 8), c=st.integers(1, 20))
+def test_the_optimality_conditions_hold(seed: int, d: int, c: int) -> None:
+    """0 ≤ p ⟂ A (b + Aᵀp) ≥ 0, each to rounding."""
+    columns = unit_columns_of(seed, d, c)
+    b = np.random.default_rng(seed + 1).normal(size=d)
+    p, residual = np.zeros(c), np.zeros(d)
+    assert push_only(columns, c, b, p, residual)
+    np.testing.assert_allclose(residual, b + columns @ p, atol=1e-12 * (1 + np.abs(p).max()))
+    speeds = columns.T @ residual
+    size = np.linalg.norm(b)
+    assert p.min() >= 0.0
+    assert speeds.min() >= -1e-12 * size * max(1, d)
+    assert np.abs(p * speeds).max() <= 1e-11 * size * (1.0 + np.abs(p).max())
+
+
+def least_of_all_subsets(columns: np.ndarray, b: np.ndarray) -> float:
+    """½|b + Aᵀp|² at the best p ≥ 0, by trying every set of pushing contacts."""
+    c = columns.shape[1]
+    best = 0.5 * b @ b
+    for size in range(1, c + 1):
+        for chosen in combinations(range(c), size):
+            p = np.linalg.lstsq(columns[:, chosen], -b)[0]
+            if (p >= -1e-12).all():
+                best = min(best, 0.5 * np.sum((b + columns[:, chosen] @ p) ** 2))
+    return float(best)
+
+
+@given(seed=st.integers(0, 100_000), d=st.integers(1, 4), c=st.integers(1, 5))
+def test_no_set_of_contacts_does_better(seed: int, d: int, c: int) -> None:
+    columns = unit_columns_of(seed, d, c)
+    b = np.random.default_rng(seed + 1).normal(size=d)
+    p, residual = np.zeros(c), np.zeros(d)
+    assert push_only(columns, c, b, p, residual)
+    assert 0.5 * residual @ residual <= least_of_all_subsets(columns, b) + 1e-12
+
+
+def test_opposed_contacts_hold_a_body_still() -> None:
+    columns = np.array([[1.0, -1.0], [0.0, 0.0]])
+    p, residual = np.zeros(2), np.zeros(2)
+    assert push_only(columns, 2, np.array([-2.0, 3.0]), p, residual)
+    assert np.array_equal(residual, [0.0, 3.0]) and np.array_equal(p, [2.0, 0.0])
