@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 _SHOWN_CHARACTERS = 120  # a value longer than this is cut in messages: a message is read, an array is not
+_LISTED_MISTAKES = 100  # a message lists no more; the error itself carries all
 
 
 def shown(value: Any) -> str:
@@ -38,7 +39,8 @@ class RangeError(IapbError, OverflowError):
 class Mistake:
     """One mistake of a scene file: where it stands, what it says, what was expected.
 
-    Lines and columns count from 1; 0 where the value was not read from the file. `path` is the field's path, such as ``bodies[0].mass``.
+    Lines and columns count from 1; 0 where the value was not read from the file. `path` is the field's path,
+    such as ``bodies[0].mass``.
     """
 
     file: str
@@ -60,7 +62,9 @@ class SceneError(IapbError, ValueError):
         self.mistakes = tuple(mistakes)
         count = len(self.mistakes)
         head = "1 mistake in the scene" if count == 1 else f"{count} mistakes in the scene"
-        super().__init__("\n".join([f"{head}:", *(f"  {mistake}" for mistake in self.mistakes)]))
+        lines = [f"  {mistake}" for mistake in self.mistakes[:_LISTED_MISTAKES]]
+        lines += [f"  and {count - len(lines)} more"] if count > len(lines) else []
+        super().__init__("\n".join([f"{head}:", *lines]))
 
 
 class MissingDependencyError(IapbError, ImportError):

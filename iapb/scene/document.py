@@ -13,7 +13,8 @@ from typing import Any
 
 MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 24  # the deepest legal value, a vertex of a shape of a body, lies at depth 7
-MAX_NODES = 200_000  # after aliases are expanded, so that a small file cannot grow without bound
+MAX_NODES = 100_000  # values and field names, aliases expanded: a small file cannot grow without bound
+MAX_REPEATED = 100  # repeated fields: more is not a slip, and no list to read
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
 _WORDS: dict[str, Any] = {
@@ -38,7 +39,7 @@ class Node:
     value: Any
     line: int
     column: int
-    size: int = 1  # nodes in it, aliases expanded
+    size: int = 1  # values and field names in it, aliases expanded
     children: dict[str | int, Node] = field(default_factory=dict)
     keys: dict[str, tuple[int, int]] = field(default_factory=dict)  # where each key of a mapping stands
 
@@ -135,7 +136,7 @@ class _Builder:
             self.sequence(node, path)
         else:
             self.mapping(node, path)
-        node.size = 1 + sum(child.size for child in node.children.values())
+        node.size = 1 + len(node.keys) + sum(child.size for child in node.children.values())
         if event.anchor is not None:
             self.anchors[event.anchor] = node
         return node
@@ -176,7 +177,10 @@ class _Builder:
             if type(event).__name__ != "ScalarEvent":
                 raise DocumentError(*_place(event), "(not a name)", "the name of a field")
             key, place = event.value, _place(event)
+            self.count += 1
             child = self.node(next(self.events), (*path, key))
+            if len(self.repeated) == MAX_REPEATED:
+                raise DocumentError(*place, f"more than {MAX_REPEATED} repeated fields", "each field once")
             if key in node.children:
                 self.repeated.append(Repeated(*place, (*path, key)))
             else:
