@@ -119,7 +119,9 @@ class _Builder:
         line, column = _place(event)
         kind = type(event).__name__
         if kind == "AliasEvent":
-            return self.counted(self.alias(event))
+            node = self.alias(event)
+            self.count_in(node.size, line, column)
+            return node
         if event.tag is not None and not (kind == "ScalarEvent" and event.tag == "!"):
             raise DocumentError(
                 line, column, str(event.tag), "no tags: a scene is plain numbers, texts and lists"
@@ -127,7 +129,7 @@ class _Builder:
         if len(path) > MAX_DEPTH:
             raise DocumentError(line, column, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
         node = Node(None, line, column)
-        self.counted(node)
+        self.count_in(1, line, column)
         if event.anchor is not None:
             self.anchors[event.anchor] = None
         if kind == "ScalarEvent":
@@ -141,12 +143,11 @@ class _Builder:
             self.anchors[event.anchor] = node
         return node
 
-    def counted(self, node: Node) -> Node:
-        """Count a node into the bound on the whole document."""
-        self.count += node.size
+    def count_in(self, size: int, line: int, column: int) -> None:
+        """Count a value into the bound on the whole document."""
+        self.count += size
         if self.count > MAX_NODES:
-            raise DocumentError(node.line, node.column, f"more than {MAX_NODES} values", "a smaller scene")
-        return node
+            raise DocumentError(line, column, f"more than {MAX_NODES} values", "a smaller scene")
 
     def alias(self, event: Any) -> Node:
         """Return the node that an alias stands for."""
