@@ -34,6 +34,7 @@ class SolverEntry:
 
 
 _CVXPY = "reference.complementarity.solvers.cvxpy_qp"
+_PINOCCHIO = "reference.complementarity.solvers.pinocchio_contact"
 _HERE = "reference.complementarity.solvers"
 
 SOLVERS: dict[str, SolverEntry] = {
@@ -52,7 +53,10 @@ SOLVERS: dict[str, SolverEntry] = {
     "cvxpy_scs": SolverEntry(_CVXPY, "cvxpy scs", "ADMM on the conic form", "convex", True, "SCS"),
     "nsgs": SolverEntry(f"{_HERE}.block_gauss_seidel", "numba", "block Gauss-Seidel on the cones", "cone"),
     "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "cvxpy clarabel", "interior point, fixed point", "cone"),
+    "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
+    "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
 }
+_INSTALL_NAMES = {"pinocchio": "pin"}  # where a package is not installed under the name it is imported by
 
 
 def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
@@ -102,7 +106,7 @@ def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
             importlib.import_module(package)
         return importlib.import_module(entry.module).solve
     except ImportError as error:
-        install = f"pip install {entry.package}"
+        install = "pip install " + " ".join(_INSTALL_NAMES.get(x, x) for x in entry.package.split())
         raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
 
 

@@ -1,0 +1,64 @@
+"""Pinocchio's contact solvers, projected Gauss-Seidel and ADMM, on Coulomb's law or its relaxation.
+
+Pinocchio orders a contact (tangent, tangent, normal); rows are turned on the way in and out.
+Source: Carpentier, Montaut, Le Lidec, From compliant to rigid contact simulation, RSS (2024).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import SolverError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import velocity_scale
+from reference.complementarity.solvers.answer import Answer
+
+_ACCURACY = 1e-12  # asked for at unit W and b
+_ITERATIONS = 20_000
+
+
+def solve(problem: ImpactProblem, method: str) -> Answer:
+    """Return the impulse by `method` ("PGS" or "ADMM"), converged or not: the residuals tell."""
+    import pinocchio as pin
+
+    if problem.contact_size != 3:
+        raise SolverError("refused: takes contacts of three components only")
+    if method == "PGS" and problem.relaxed:
+        raise SolverError("refused: pin 4.1 solves Coulomb's law here, whatever its setting solve_ncp says")
+    turned = _normal_last(problem.contacts)
+    inertia, speed = float(np.abs(problem.delassus).max()) or 1.0, velocity_scale(problem)
+    w = np.ascontiguousarray((problem.delassus / inertia)[np.ix_(turned, turned)])
+    models, states = _contacts(pin, problem)
+    solver, settings, result = (
+        getattr(pin, method + name)() for name in ("ConstraintSolver", "SolverSettings", "SolverResult")
+    )
+    settings.max_iterations, settings.solve_ncp = _ITERATIONS, not problem.relaxed
+    settings.absolute_feasibility_tol = settings.absolute_complementarity_tol = _ACCURACY
+    settings.relative_feasibility_tol = settings.relative_complementarity_tol = _ACCURACY
+    offset = (problem.offset / speed)[turned]
+    done = solver.solve(pin.DelassusOperatorDense(w), offset, models, states, settings, result)
+    impulse = np.empty(problem.size)
+    impulse[turned] = result.retrieveConstraintImpulses()
+    return Answer(
+        impulse * speed / inertia, f"{method}: converged {done} after {result.iterations} iterations"
+    )
+
+
+def _normal_last(contacts: int) -> NDArray[np.int64]:
+    """Indices of (t, t, n) of every contact in our order (n, t, t)."""
+    return (np.array([1, 2, 0]) + 3 * np.arange(contacts)[:, None]).ravel()
+
+
+def _contacts(pin: Any, problem: ImpactProblem) -> tuple[Any, Any]:
+    """One point contact per contact, which carries nothing but its friction."""
+    model = pin.Model()
+    models, states = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+    for mu in problem.friction_or_zero:
+        contact = pin.PointContactConstraintModel(model)
+        contact.setFriction(float(mu))
+        models.append(pin.ConstraintModel(contact))
+        states.append(pin.ConstraintModel(contact).createData())
+    return models, states
