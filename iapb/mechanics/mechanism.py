@@ -162,11 +162,11 @@ class Mechanism:
         return float(kernels.kinetic_energy(self._block, self._at(q), self._velocity(v)))
 
     def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
-        """Return -sum m g . c [J] for the field g (3,) [m/s^2]."""
+        """Return -sum m g . c [J] of the bodies that can move, for the field g (3,) [m/s^2]."""
         return float(kernels.potential_energy(self._block, self._at(q), _field(g)))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return (6,): momentum [N s] and angular momentum about the common centre of mass [N m s]."""
+        """Return (6,): momentum [N s] and angular momentum [N m s] about the centre of mass of what moves."""
         return self._filled((6,), kernels.centroidal_momentum, self._at(q), self._velocity(v))
 
     def _at(self, q: ArrayLike) -> Block:

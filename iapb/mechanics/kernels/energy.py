@@ -27,21 +27,23 @@ def kinetic_energy(m, w, v):
 
 @kernel
 def potential_energy(m, w, g):
-    """Return -sum of m g . c [J], zero with every centre of mass at the world origin."""
+    """Return -sum of m g . c [J] over the bodies that can move; zero with every centre at the world origin."""
     total = 0.0
     for b in range(m.kind.shape[0]):
-        total -= m.mass[b] * dot((g[0], g[1], g[2]), load(w.center, b))
+        if m.last_dof[b] >= 0:
+            total -= m.mass[b] * dot((g[0], g[1], g[2]), load(w.center, b))
     return total
 
 
 @kernel
 def centroidal_momentum(m, w, v, out):
-    """out (6,) <- linear momentum [N s] and angular momentum about the common centre of mass [N m s]."""
+    """out (6,) <- linear momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
     body_velocities(m, w, v)
     mass, first_moment, linear, angular = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
-        mass += m.mass[b]
-        first_moment = add(first_moment, scale(m.mass[b], load(w.center, b)))
+        if m.last_dof[b] >= 0:
+            mass += m.mass[b]
+            first_moment = add(first_moment, scale(m.mass[b], load(w.center, b)))
     common = scale(1.0 / mass if mass > 0.0 else 0.0, first_moment)
     for b in range(m.kind.shape[0]):
         momentum = scale(m.mass[b], center_velocity(w, b))
