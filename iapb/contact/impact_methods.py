@@ -157,7 +157,7 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
         return factored(problem, 0, clamped, tolerance)
     W, gamma = _delassus(problem)
     share = DAMPING if tolerance is None else tolerance
-    regular = W + share * max(float(np.max(np.diag(W))), np.finfo(float).tiny) * np.eye(len(W))
+    regular = W + share * max(float(np.max(np.diag(W))), float(np.finfo(float).tiny)) * np.eye(len(W))
     impulses: Floats = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
     return _from_impulses(problem, impulses, problem.contacts, clamped)
 
