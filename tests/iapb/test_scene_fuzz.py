@@ -59,7 +59,7 @@ def damaged(text: str, kind: str, where: float, what: object) -> str:
     return "\n".join(lines)
 
 
-@settings(max_examples=300)
+@settings(max_examples=max(300, settings.default.max_examples))  # type: ignore[union-attr]
 @given(st.sampled_from(TEXTS), st.lists(mutation, min_size=1, max_size=4))
 def test_damaged_file_is_a_scene_or_a_scene_error(
     text: str, mutations: list[tuple[str, float, object]]

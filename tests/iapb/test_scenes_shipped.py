@@ -1,0 +1,151 @@
+"""The scenes that come with the project: each says what its opening comment promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from iapb.contact.geometry import contact_capacity, make_contact_buffer
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.scene import Scene, load_scene
+from iapb.scene_files import find_scene, scene_names
+from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of, start_of
+
+
+def contacts_at(scene: Scene, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Return point, normal and gap of every contact of a configuration."""
+    shapes = shapes_of(scene)
+    pairs = pairs_of(scene, shapes)
+    buffer = make_contact_buffer(contact_capacity(shapes, pairs))
+    rotation, position = mechanism_of(scene).placements(q)
+    count = detect(shapes, pairs, rotation, position, 0.0, buffer)
+    return [(buffer.point[i].copy(), buffer.normal[i].copy(), float(buffer.gap[i])) for i in range(count)]
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_scene_loads_under_its_file_name_and_starts_without_deep_overlap(name: str) -> None:
+    scene = load_scene(find_scene(name))
+    assert scene.name == name
+    assert scene.title
+    assert scene.source
+    q, _ = start_of(scene)
+    assert all(gap > -1e-3 for _, _, gap in contacts_at(scene, q))
+    assert np.linalg.eigvalsh(mechanism_of(scene).mass_matrix(q)).min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "height", "along"), [("two_link_arm_a", 1.7, 0.7), ("two_link_arm_b", 1.5, 0.5)]
+)
+def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
+    name: str, height: float, along: float
+) -> None:
+    scene = load_scene(find_scene(name))
+    q, v = start_of(scene)
+    mechanism = mechanism_of(scene)
+    ((point, normal, gap),) = contacts_at(scene, q)
+    assert gap == pytest.approx(-1e-9, abs=1e-13)
+    np.testing.assert_allclose(normal, [1.0, 0.0, 0.0], atol=1e-12)
+    row = normal @ mechanism.point_jacobian(q, mechanism.index("forearm"), point)
+    np.testing.assert_allclose(row, [-height, -along], atol=1e-9)
+    assert mechanism.kinetic_energy(q, v) == pytest.approx(7.0 / 3.0, rel=1e-14)
+
+
+def test_point_mass_reading_of_the_arm_starts_with_5_joules() -> None:
+    links = ("upper_arm", "forearm")
+    points = {f"bodies.{link}.center_of_mass": [1, 0] for link in links} | {
+        f"bodies.{link}.inertia": 0 for link in links
+    }
+    scene = load_scene(find_scene("two_link_arm_a")).with_values(points)
+    assert mechanism_of(scene).kinetic_energy(*start_of(scene)) == pytest.approx(5.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["peg_corner", "peg_room"])
+def test_peg_has_the_numbers_of_the_paper_and_is_pushed_into_the_corner(name: str) -> None:
+    scene = load_scene(find_scene(name))
+    peg = scene.bodies[0]
+    assert (scene.rate, peg.mass, peg.inertia, peg.shapes[0].size) == (512.0, 2.0, 0.005, (0.021, 0.0105))  # type: ignore[union-attr]
+    assert (scene.contact.stiffness, scene.contact.damping, scene.contact.restitution) == (1000.0, 50.0, 0.0)
+    assert scene.hand is not None and scene.device is not None
+    assert scene.device.force_limit == (15.0, 15.0, 1.0)
+    normals = np.array([wall.normal for wall in scene.walls if wall.name in ("right_wall", "floor")])  # type: ignore[union-attr]
+    assert (
+        normals @ np.array(scene.hand.force[:2]) < 0.0
+    ).all()  # the push goes into both walls of the corner
+
+
+def test_table_1_stands_in_the_peg_scenes() -> None:
+    for name in ("peg_corner", "peg_hole", "peg_room"):
+        couplings = load_scene(find_scene(name)).couplings
+        assert couplings.four_channel is not None and couplings.unilateral is not None
+        assert couplings.four_channel.stiffness == (100.0, 100.0, 0.5)
+        assert couplings.four_channel.damping == (70.0, 70.0, 0.375)
+        assert couplings.unilateral.stiffness == (1000.0, 1000.0, 2.5)
+        assert couplings.unilateral.damping == (50.0, 50.0, 0.125)
+
+
+def test_peg_starts_8_mm_above_the_floor_and_10_mm_from_the_wall() -> None:
+    x, y, tilt = load_scene(find_scene("peg_corner")).bodies[0].position
+    reach_x = 0.0105 * math.cos(tilt) + 0.00525 * math.sin(tilt)
+    reach_y = 0.0105 * math.sin(tilt) + 0.00525 * math.cos(tilt)
+    assert x - reach_x == pytest.approx(0.010, abs=1e-4)
+    assert -y - reach_y == pytest.approx(0.008, abs=1e-4)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
+def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float) -> None:
+    """Six contacts approach at once wherever in the step the peg arrives; their rows have rank 3."""
+    scene = load_scene(find_scene("peg_hole"))
+    mechanism = mechanism_of(scene)
+    seated = np.array([0.0, 0.0105, 0.0])
+    assert not contacts_at(scene, seated + [0.0, 1e-9, 0.0])
+    q, inward = seated - [0.0, depth, 0.0], np.array([0.0, -0.04, 0.0])
+    found = contacts_at(scene, q)
+    rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
+    assert rows.shape == (6, 3)
+    assert (rows @ inward < -10.0 * scene.contact.approach_velocity).all()
+    assert np.linalg.matrix_rank(rows, tol=1e-4) == 3
+
+
+def test_hole_with_parallel_sides_gives_no_six_approaching_contacts() -> None:
+    """Why the hole has a draft: sliding straight in approaches the end only."""
+    straight = {
+        "bodies.peg.shapes.0.vertices": [
+            [-0.00525, -0.0105],
+            [0.00525, -0.0105],
+            [0.00525, 0.0105],
+            [-0.00525, 0.0105],
+        ],
+        "walls.left_side.vertices": [[0.00525, -0.005], [0.02, -0.005], [0.02, 0.03], [0.00525, 0.03]],
+        "walls.right_side.vertices": [[-0.00525, -0.005], [-0.02, -0.005], [-0.02, 0.03], [-0.00525, 0.03]],
+    }
+    scene = load_scene(find_scene("peg_hole")).with_values(straight)
+    mechanism, q = mechanism_of(scene), np.array([0.0, 0.01049, 0.0])
+    found = contacts_at(scene, q)
+    rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
+    assert (rows @ [0.0, -0.04, 0.0] < -scene.contact.approach_velocity).sum() == 2
+
+
+def test_one_dimensional_wall_is_one_contact() -> None:
+    scene = load_scene(find_scene("wall_1d"))
+    assert mechanism_of(scene).nv == 1
+    assert len(contacts_at(scene, np.array([-0.009]))) == 1
+
+
+def test_fingertip_block_and_wall_form_one_chain_of_contacts() -> None:
+    scene = load_scene(find_scene("arm_pushing"))
+    q, _ = start_of(scene)
+    assert not contacts_at(scene, q)
+    mechanism = mechanism_of(scene)
+    rotation, position = mechanism.placements(q)
+    tip = position[1] + rotation[1] @ [0.3, 0.0, 0.0]
+    overlap = 1e-5
+    block = tip[0] + 0.02 + 0.05 - overlap
+    pressed = scene.with_values(
+        {"bodies.block.position.0": block, "walls.wall.point": [block + 0.05 - overlap, 0.0]}
+    )
+    found = contacts_at(pressed, start_of(pressed)[0])
+    assert len(found) == 3  # the fingertip, and two corners of the block at the wall
+    rows = np.array([gap for _, _, gap in found])
+    np.testing.assert_allclose(rows, -overlap, rtol=1e-6)
