@@ -10,13 +10,16 @@ takes a tenth of the one and a hundredth of the other. In Python a block has the
 
 from __future__ import annotations
 
+import hashlib
 import struct
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import njit, typeof
-from numba.core import cgutils, imputils, types
+from numba.core import cgutils, config, imputils, types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
@@ -28,7 +31,29 @@ from numba.extending import (
     unbox,
 )
 
-kernel = njit(cache=True, fastmath=False, _nrt=False)
+
+def _source_stamp() -> str:
+    """Hash of all files with kernels: numba alone would keep a cached kernel when one that it calls has changed."""
+    digest = hashlib.sha256()
+    folder = Path(__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        text = path.read_bytes()
+        if b"iapb.compiled" in text or path.name in ("compiled.py", "run.py", "arrays.py"):
+            digest.update(str(path.relative_to(folder)).encode() + b"\0" + text)
+    return digest.hexdigest()
+
+
+_STAMP = _source_stamp()
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function as a kernel (see the file's docstring); cached until any file with kernels changes."""
+    compiled = njit(fastmath=False, _nrt=False)(function)
+    if config.DISABLE_JIT:
+        return compiled
+    compiled.enable_caching()
+    compiled._cache._cache_file._source_stamp = _STAMP  # numba has no public way to say what a kernel depends on
+    return compiled
 
 
 @kernel

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,12 +24,29 @@ from iapb.effects import decide_effects
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.kernels import couple, drive_device
+from iapb.mechanics.energy import energy_of_run
 from iapb.recording import Record, chunk_steps, contact_table, impact_table, joined, make_record, write_step
 from iapb.run import EffectRow, Run
 from iapb.scene import Scene, load_scene
 from iapb.system import System
 
 Floats = NDArray[np.float64]
+
+_KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
+                      "device_actuator_work")
+
+
+class Checkpoint(Protocol):
+    """Something that keeps a run in the making."""
+
+    @property
+    def due(self) -> bool:
+        """Whether enough has happened since the last time."""
+        ...
+
+    def __call__(self, run: Run) -> object:
+        """Keep the run so far."""
+        ...
 
 
 @kernel
@@ -139,7 +157,8 @@ class Simulation:
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
              world: str = "", steps: int | None = None,
-             progress: Callable[[int, int], None] | None = None) -> Run:
+             progress: Callable[[int, int], None] | None = None,
+             checkpoint: Checkpoint | None = None) -> Run:
     """Simulate a scene under a contact law and a coupling and return the whole record.
 
     Parameters
@@ -149,6 +168,7 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     world : name of the combination for the record, such as ``"IAPB"``; default: law and coupling.
     steps : number of steps; default: the scene's duration times its rate.
     progress : called as progress(steps done, steps in all) after every chunk.
+    checkpoint : called with the run so far after a chunk, where its ``due`` is true.
 
     Returns
     -------
@@ -172,6 +192,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
             status = recording.chunk(total)
             if progress is not None:
                 progress(recording.steps, total)
+            if checkpoint is not None and recording.steps < total and checkpoint.due:
+                checkpoint(recording.run(world, complete=False))
     except KeyboardInterrupt:
         pass
     if status and recording.steps == 0:
@@ -218,7 +240,7 @@ class _Recording:
             "hand_force", "coupling_force", "penalty_force", "friction_force", "impulse", "environment_force",
             "device_force", "state")}
         law, coupling = simulation.law, simulation.coupling
-        return Run(
+        run = Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
@@ -231,6 +253,16 @@ class _Recording:
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python",
         )  # fmt: skip
+        return replace(run, energy=_energy(run, system))
+
+
+def _energy(run: Run, system: System) -> dict[str, Floats]:
+    """The ledger; without the tool's balance under a unilateral coupler, where the tool is carried at times."""
+    device = system.device_mechanism() if run.coupling != "none" else None
+    ledger = energy_of_run(run, system.mechanism, system.gravity, device)
+    if run.coupling != "unilateral":
+        return ledger
+    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED}
 
 
 def _effects(simulation: Simulation) -> tuple[EffectRow, ...]:

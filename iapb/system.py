@@ -12,10 +12,10 @@ from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
-from iapb.contact.laws import INTEGRATORS
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
+from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
 from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of

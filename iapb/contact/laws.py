@@ -15,30 +15,11 @@ from numpy.typing import NDArray
 
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
+from iapb.mechanics.integrators import INTEGRATORS
 
 Floats = NDArray[np.float64]
 
 RENDERINGS = ("full", "saturate", "scale", "spread")
-
-
-class Integrator(NamedTuple):
-    """An explicit integrator as the compiled step reads it: stages, their weights, and its declared order."""
-
-    name: str
-    order: int
-    fraction: tuple[float, ...]  # where in the step each force evaluation stands
-    weight: tuple[float, ...]  # its share of the step
-    semi_implicit: bool = False
-
-
-INTEGRATORS = {
-    method.name: method
-    for method in (
-        Integrator("semi_implicit_euler", 1, (0.0,), (1.0,), semi_implicit=True),
-        Integrator("midpoint", 2, (0.0, 0.5), (0.0, 1.0)),
-        Integrator("runge_kutta_4", 4, (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
-    )
-}
 
 
 class StepResult(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from iapb.compiled import kernel
+from iapb.contact.kernels.device_limit import largest_share
 from iapb.contact.kernels.impact import factored_impact, rank_tolerance
 from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
 from iapb.contact.kernels.rows import body_row, contact_row
@@ -59,21 +60,6 @@ def gather_rows(world, state, group, size):
 
 
 @kernel
-def device_share(world, state, size):
-    """Largest common factor in (0, 1] with |Jᵀp / Δt| within the device's limits (paper section VI).
-
-    One factor for the whole group is an effective restitution in [−1, e], hence passive.
-    """
-    share = 1.0
-    for i in range(size):
-        force = abs(state.group_impulse[i]) / world.dt
-        limit = world.impulse_limit[state.dofs[i]]
-        if force * share > limit:
-            share = limit / force
-    return share
-
-
-@kernel
 def apply_group(world, state, size, share):
     """Write the group's new velocity and impulse back; return the kinetic energy it lost [J].
 
@@ -119,7 +105,9 @@ def resolve_group(world, state, group):
     work = state.work
     rank, clamp = factored_impact(mass, lower, v, world.restitution, count, rank_tolerance(lower), size, True,
                                   work, v_plus, impulse)
-    share = device_share(world, state, size) if world.switches.impulse_limit else 1.0
+    share = 1.0
+    if world.switches.impulse_limit:
+        share = largest_share(state.group_impulse, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
         for t in range(world.tree_start.shape[0]):
             if state.group_of_tree[t] == group:
