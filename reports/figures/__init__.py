@@ -23,8 +23,8 @@ from reports.figures.figure import Recipe
 RECIPES: tuple[Recipe, ...] = (
     hero_corner.RECIPE,
     fig04_peg_corner.RECIPE,
-    fig01_contact_forces.RECIPE,
     fig02_two_link_arm.RECIPE,
+    fig01_contact_forces.RECIPE,
     scenes_gallery.RECIPE,
     fig05_couplings.RECIPE,
     fig03_energy_loss.RECIPE,

@@ -42,9 +42,8 @@ def wire(axes: Any, corners: Sequence[tuple[float, float]], text: str = "", at: 
 
 
 def make_board(drawing: Any, width: float, height: float) -> Any:
-    """Return axes of the given size in units, without frame."""
+    """Return axes of the given size in units, without frame; the figure has the same proportions."""
     axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlim=(0, width), ylim=(0, height))
     axes.set_axis_off()
     return axes

@@ -16,15 +16,23 @@ TURNED = ("peg_",)  # scenes in the paper's frame, x to the left and y down: dra
 
 
 def make_canvas(drawing: Any, low: Floats, high: Floats, *, turned: bool) -> Any:
-    """Return axes that show the rectangle from `low` to `high` and nothing else."""
+    """Return axes without a frame that show at least the rectangle from `low` to `high`, at equal scales."""
     axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_aspect("equal", adjustable="datalim")
+    low, high = widened(low, high, drawing.get_figwidth() / drawing.get_figheight())
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_axis_off()
     if turned:
         axes.xaxis.set_inverted(True)
         axes.yaxis.set_inverted(True)
     return axes
+
+
+def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Floats]:
+    """Return the smallest rectangle with width / height = `proportion` around the given one, same centre."""
+    width, height = np.asarray(high) - np.asarray(low)
+    size = np.array([max(width, height * proportion), max(height, width / proportion)])
+    center = (np.asarray(low) + np.asarray(high)) / 2
+    return center - size / 2, center + size / 2
 
 
 def is_turned(scene: Mapping[str, Any]) -> bool:
@@ -40,10 +48,10 @@ def draw_walls(axes: Any, scene: Mapping[str, Any], reach: float) -> None:
 
 
 def draw_bodies(axes: Any, scene: Mapping[str, Any], coordinates: Sequence[float] | None = None, *,
-                color: str = PEG, edge: str = INK, width: float = 1.1, alpha: float = 1.0) -> None:
+                color: str = PEG, edge: str = INK, width: float = 1.1) -> None:
     """Fill the moving bodies at `coordinates`, or where the scene starts."""
     for _, corners in body_outlines(scene, coordinates):
-        axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, alpha=alpha, zorder=2)
+        axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
 
 
 def arrow(axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0) -> None:

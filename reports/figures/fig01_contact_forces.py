@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from iapb.run import Run
-from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note
+from reports.figures.canvas import arrow, draw_bodies, draw_walls, is_turned, make_canvas, note
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
-from reports.figures.planar import body_outlines, bounds
+from reports.figures.planar import body_outlines, body_poses, bounds
 from reports.figures.style import BLUE, FORCE, INK, PANEL, styled
 from reports.figures.svg import to_svg
 
-KEY, NUMBER, TITLE = "fig01", "Figure 1", "What acts on the peg"
-RUN = "corner/IAPB"
+KEY, NUMBER, TITLE = "fig01", "Figure 1", "What acts on a contact group"
+RUN = "group/IAPB"
 CAPTION = (
-    "The same run at two instants. When a contact is new, all approaching contacts of the group share one collision "
-    "(blue: impulses). While contacts last, springs and dampers at the walls (blue: forces) balance the hand (red). "
-    "In each picture the longest blue arrow sets the scale; the table has the numbers."
+    "An arm pushes a block against a wall: one contact group, two instants of one run. When a contact is new, all "
+    "approaching contacts of the group share one collision (blue: impulses). While contacts last, springs "
+    "and dampers (blue: forces) pass the hand's push (red) on. The longest blue arrow of a picture sets its scale."
 )
-_LONGEST = 0.4  # arrow length, as a share of the peg's longer side
-_MARGIN = 0.35
+_LONGEST = 0.22  # arrow length, as a share of the picture
+_MARGIN = 0.12
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -62,17 +62,23 @@ def _picture(run: Run, step: int, values: np.ndarray, key: str) -> str:
     scene, q = run.scene_resolved, run.q[step]
     corners = [outline for _, outline in body_outlines(scene, q)]
     low, high = bounds(corners, _MARGIN)
-    longest = _LONGEST * max(high - low) / (1 + 2 * _MARGIN)
+    longest = _LONGEST * max(high - low)
     with styled() as new_figure:
         drawing = new_figure(figsize=(PANEL[0], PANEL[0] * (high - low)[1] / (high - low)[0]))
-        axes = make_canvas(drawing, low, high, turned=True)
+        axes = make_canvas(drawing, low, high, turned=is_turned(scene))
         draw_walls(axes, scene, reach=1.0)
         draw_bodies(axes, scene, q)
         _contact_arrows(axes, run, step, values, longest)
-        hand = np.asarray(scene["hand"]["force"][:2])
-        arrow(axes, q[:2], 0.7 * longest * hand / np.hypot(*hand))
-        note(axes, q[:2] + 0.7 * longest * hand / np.hypot(*hand), "hand", (4, -8), ha="left", color=FORCE)
+        _hand_arrow(axes, scene, q, 0.8 * longest)
         return to_svg(drawing, key)
+
+
+def _hand_arrow(axes: Any, scene: Mapping[str, Any], q: np.ndarray, length: float) -> None:
+    hand = scene["hand"]
+    force = np.asarray(hand["force"][:2], dtype=float)
+    point = body_poses(scene, q)[hand["body"]].of(hand["point"])
+    arrow(axes, point, length * force / np.hypot(*force))
+    note(axes, point, "hand", (-2, -19), color=FORCE)
 
 
 def _contact_arrows(axes: Any, run: Run, step: int, values: np.ndarray, longest: float) -> None:
@@ -87,7 +93,7 @@ def _contact_arrows(axes: Any, run: Run, step: int, values: np.ndarray, longest:
 
 def _words(run: Run, step: int, values: np.ndarray, unit: str) -> str:
     parts = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts_of(run, step))
-    return f"The peg at t = {run.time[step]:.3f} s with its contacts; along their normals: {parts}."
+    return f"The group at t = {run.time[step]:.3f} s with its contacts; along their normals: {parts}."
 
 
 RECIPE = Recipe(KEY, NUMBER, TITLE, (RUN,), draw, section="idea")

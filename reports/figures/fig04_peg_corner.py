@@ -21,7 +21,8 @@ CAPTION = (
     "force; where the peg starts, and how it is tilted, is ours and is varied in the claims."
 )
 _ARROW = 0.02  # [m] on paper per newton
-_AXIS = 0.008  # [m], length of the drawn axes
+_AXIS = 0.006  # [m], length of the drawn axes
+_WALL = 0.008  # [m], thickness of the walls shown
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -35,7 +36,7 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
 def _picture(scene: Mapping[str, Any]) -> str:
     outlines = [corners for _, corners in body_outlines(scene)]
     low, high = bounds([*outlines, np.zeros((1, 2))], 0.12)
-    low = np.minimum(low, -0.006)
+    low, high = np.minimum(low, -_WALL), np.maximum(high, _WALL)  # x to the left, y down: show some of both walls
     with styled() as new_figure:
         drawing = new_figure(figsize=(PANEL[0], PANEL[0] * (high - low)[1] / (high - low)[0]))
         axes = make_canvas(drawing, low, high, turned=True)
@@ -46,13 +47,13 @@ def _picture(scene: Mapping[str, Any]) -> str:
         arrow(axes, center, _ARROW * force)
         note(axes, center + _ARROW * force, "F hand", (6, -8), ha="left")
         _frame(axes)
-        scale_bar(axes, (high[0] - 0.002, low[1] + 0.003), 0.01, "10 mm", turned=True)
+        scale_bar(axes, (high[0] - 0.002, high[1] - 0.003), 0.01, "10 mm", turned=True)
         return to_svg(drawing, KEY)
 
 
 def _frame(axes: Any) -> None:
     """Draw the axes of the world at the corner."""
-    for vector, name, offset in (((_AXIS, 0), "x", (-7, 0)), ((0, _AXIS / 2), "y", (0, -7))):
+    for vector, name, offset in (((_AXIS, 0), "x", (0, 7)), ((0, _AXIS), "y", (7, 2))):
         arrow(axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
         note(axes, vector, name, offset, color=MUTED)
 

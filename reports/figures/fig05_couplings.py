@@ -17,7 +17,8 @@ CAPTION = (
     "positions together (blue). The unilateral coupler is a spring and damper only (green), and only while the tool is "
     "in contact: the hand feels the wall through it, never the wall itself."
 )
-_WIDTH, _HEIGHT, _SIZE = 8.2, 5.2, (5.0, 3.17)
+_WIDTH, _HEIGHT = 8.2, 5.2
+_SIZE = (5.0, 5.0 * _HEIGHT / _WIDTH)  # inches
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:

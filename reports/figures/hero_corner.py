@@ -10,48 +10,70 @@ import numpy as np
 from iapb.run import Run
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note, scale_bar
 from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.style import HERO, MUTED, STYLES, line_arguments, styled
+from reports.figures.planar import body_outlines
+from reports.figures.style import FORCE, MUTED, STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
-from reports.figures.trajectories import marks
+from reports.figures.trajectories import MILLI, marks
 from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, TITLE = "hero", "Four worlds in one corner"
 CAPTION = (
-    "A constant force pushes the tilted peg (pale: where it starts; solid: where the rigid world leaves it) into the "
-    "corner. The curves are the path of the hand; the closer to the black one, the more the wall feels like a wall. "
-    "Drawn to scale."
+    "A constant force pushes a tilted peg into a corner (left; outlines: the rigid world, from start to end). Right, "
+    "magnified: where the hand goes from shortly before the first contact. The closer a curve is to the black one, the "
+    "more the wall feels like a rigid wall."
 )
 _GHOSTS = 4  # poses of the ideal run between start and end
-_MARGIN = 0.012  # [m] of wall and of air around the motion
-_FORCE_LENGTH = 0.018  # [m] on paper per newton
+_MARGIN = 0.005  # [m] of wall and of air around the motion
+_FORCE_LENGTH = 0.013  # [m] on paper per newton
+_SIZE = (4.5, 3.8)  # inches
+_BEFORE_CONTACT = 0.05  # [s] shown of the approach
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw the picture from the runs named in worlds.UNLIMITED."""
     runs = runs_of(UNLIMITED, inputs)
-    panel = Panel(_picture(runs), _words(runs), wide=True)
-    return Figure(KEY, "", TITLE, CAPTION, (panel,), None, legend_of(UNLIMITED), tuple(UNLIMITED.values()))
+    panels = (Panel(_scene(runs["ideal"]), "A tilted peg moves to the lower right and comes to rest in a corner.",
+                    "the motion in the rigid world, to scale"),
+              Panel(_paths(runs), _words(runs), "the path of the hand, magnified, equal scales"))
+    return Figure(KEY, "", TITLE, CAPTION, panels, None, legend_of(UNLIMITED), tuple(UNLIMITED.values()))
 
 
-def _picture(runs: Mapping[str, Run]) -> str:
-    ideal = runs["ideal"]
-    scene = ideal.scene_resolved
-    low, high = _view(ideal)
+def _scene(run: Run) -> str:
+    scene = run.scene_resolved
     with styled() as new_figure:
-        drawing = new_figure(figsize=(HERO, HERO * (high - low)[1] / (high - low)[0]))
+        drawing = new_figure(figsize=_SIZE)
+        low, high = _view(run)
         axes = make_canvas(drawing, low, high, turned=True)
         draw_walls(axes, scene, reach=1.0)
-        for k in ghost_steps(ideal):
-            draw_bodies(axes, scene, ideal.q[k], alpha=0.55, edge=MUTED, width=0.7)
-        draw_bodies(axes, scene, ideal.q[-1])
-        for number, (curve, run) in enumerate(runs.items()):
-            axes.plot(*run.device_q[:, :2].T, **line_arguments(STYLES[curve]), zorder=4 + number / 10,
-                      markevery=marks(len(run.time), number))
-        start, force = ideal.q[0, :2], np.asarray(scene["hand"]["force"][:2])
+        draw_bodies(axes, scene, run.q[-1])
+        for k in ghost_steps(run):
+            draw_bodies(axes, scene, run.q[k], color="none", edge=MUTED, width=0.8)
+        axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
+        start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
         arrow(axes, start, _FORCE_LENGTH * force)
-        note(axes, start + _FORCE_LENGTH * force, "hand, 0.51 N", (4, -11), ha="left", fontsize=9)
-        scale_bar(axes, (high[0] - 0.003, high[1] - 0.003), 0.01, "10 mm", turned=True)
-        return to_svg(drawing, KEY)
+        note(axes, start, f"hand, {np.hypot(*force):.2f} N", (0, 10), color=FORCE)
+        scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
+        return to_svg(drawing, f"{KEY}-scene")
+
+
+def _paths(runs: Mapping[str, Run]) -> str:
+    with styled() as new_figure:
+        drawing = new_figure(figsize=_SIZE, layout="constrained")
+        axes = drawing.add_subplot()
+        for number, (curve, run) in enumerate(runs.items()):
+            x, y = MILLI * run.device_q[_first_shown(runs["ideal"]) :, :2].T
+            axes.plot(x, y, **line_arguments(STYLES[curve]), zorder=4 + number / 10, markevery=marks(len(x), number))
+        axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.xaxis.set_inverted(True)
+        axes.yaxis.set_inverted(True)
+        return to_svg(drawing, f"{KEY}-paths")
+
+
+def _first_shown(run: Run) -> int:
+    """Return the step shortly before the first contact."""
+    touching = np.flatnonzero(np.diff(run.contacts.offsets))
+    return max(int(touching[0]) - round(_BEFORE_CONTACT / run.dt), 0) if len(touching) else 0
 
 
 def ghost_steps(run: Run) -> list[int]:
@@ -61,16 +83,16 @@ def ghost_steps(run: Run) -> list[int]:
 
 
 def _view(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of the picture: the ideal motion and a strip of wall."""
-    low, high = run.q[:, :2].min(axis=0), run.q[:, :2].max(axis=0)
-    return np.minimum(low - _MARGIN, -_MARGIN / 2), np.maximum(high + _MARGIN, _MARGIN / 2)
+    """Return the corners of the picture: the peg's motion and a strip of wall."""
+    corners = np.vstack([outline for k in (0, -1) for _, outline in body_outlines(run.scene_resolved, run.q[k])])
+    return np.minimum(corners.min(axis=0), 0.0) - _MARGIN, np.maximum(corners.max(axis=0), 0.0) + _MARGIN
 
 
 def _words(runs: Mapping[str, Run]) -> str:
-    apart = {name: 1e3 * np.hypot(*(run.device_q[-1, :2] - runs["ideal"].device_q[-1, :2]))
+    apart = {name: MILLI * np.hypot(*(run.device_q[-1, :2] - runs["ideal"].device_q[-1, :2]))
              for name, run in runs.items() if name != "ideal"}
     ends = ", ".join(f"{name} {distance:.2f} mm" for name, distance in apart.items())
-    return f"The peg slides along the floor into the corner. Distance of the hand from the ideal at the end: {ends}."
+    return f"Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: {ends}."
 
 
 RECIPE = Recipe(KEY, "", TITLE, tuple(UNLIMITED.values()), draw, section="hero")

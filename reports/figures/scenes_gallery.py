@@ -35,7 +35,7 @@ def scene_panel(key: str, scene: Mapping[str, Any]) -> Panel:
     reach = max(high - low)
     low, high = low - 0.35 * reach, high + 0.35 * reach
     with styled() as new_figure:
-        drawing = new_figure(figsize=(PANEL[0], PANEL[1]))
+        drawing = new_figure(figsize=PANEL)
         axes = make_canvas(drawing, low, high, turned=turned)
         draw_walls(axes, scene, reach=20 * reach)
         draw_bodies(axes, scene)

@@ -79,7 +79,6 @@ _PARAMETERS: Any = {
 }
 
 PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a desk, one on a phone
-HERO = 7.2  # inches, the width of the first picture
 
 
 @contextmanager

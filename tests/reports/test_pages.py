@@ -1,0 +1,155 @@
+"""The page: whole, self-contained, honest about what is missing."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from iapb.errors import ArgumentError
+from reports.figures.fig03_energy_loss import arm_energies
+from reports.figures.figure import Numbers
+from reports.pages.builder import OUTCOME_MARKS
+from reports.pages.formulas import prose
+from reports.pages.records import (
+    LIMITED,
+    OUTCOMES,
+    REFUTED,
+    REPRODUCED,
+    Claim,
+    CrossCheck,
+    Evidence,
+    HardCase,
+    Property,
+    SceneEffect,
+    StoredFile,
+    Verdict,
+)
+from reports.pages.sections import SECTIONS
+from reports.report import build_report, write_report
+
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+
+
+class Outline(HTMLParser):
+    """What the tests ask of a page: identifiers, links, and tags that were not closed."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.open: list[str] = []
+        self.wrong: list[str] = []
+        self.tags: set[str] = set()
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        given = dict(attrs)
+        if given.get("id"):
+            self.ids.append(str(given["id"]))
+        self.links += [str(given[name]) for name in ("href", "src", "xlink:href") if given.get(name)]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+
+@pytest.fixture(scope="module")
+def full() -> Evidence:
+    claim = Claim("C01", "KE never rises <b>", "Thm 1", LIMITED, "half of the printed loss: $\\frac{1}{2}$",
+                  numbers=Numbers(("κ", "gain"), ((1e3, 2e-16),)), fails="as printed")
+    return Evidence(
+        inputs={"arm_energies": arm_energies()},
+        verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "properties"),),
+        claims=(claim, Claim("C02", "the same", "Thm 2", REFUTED, "no")),
+        properties=(Property("KE", 10, "0", "1", True, "sign", True),),
+        cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
+        hard_cases=(HardCase("bar", "ours", "$0.5$", (("factored", 1e-16, None, "exact"),)),),
+        accuracy=Numbers(("method", "µs"), (("factored", 1.0),)),
+        effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
+        provenance={"commit": "abc"},
+        manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
+    )
+
+
+@pytest.fixture(scope="module", params=["empty", "full"])
+def page(request: pytest.FixtureRequest, full: Evidence) -> str:
+    return build_report(full if request.param == "full" else Evidence())
+
+
+def test_the_page_is_well_formed(page: str) -> None:
+    outline = Outline(page)
+    assert outline.wrong == []
+    assert outline.open == []
+    assert len(outline.ids) == len(set(outline.ids))
+
+
+def test_the_page_asks_for_nothing_and_runs_nothing(page: str) -> None:
+    outline = Outline(page)
+    assert all(link.startswith("#") or link == "data:," for link in outline.links)
+    assert "script" not in outline.tags
+    assert not re.search(r"@import|url\((?!#)", page)
+
+
+def test_every_anchor_resolves(page: str) -> None:
+    outline = Outline(page)
+    anchors = {link[1:] for link in outline.links if link.startswith("#")}
+    assert anchors <= set(outline.ids)
+
+
+def test_every_section_is_there(page: str) -> None:
+    assert {section.id for section in SECTIONS} <= set(Outline(page).ids)
+
+
+def test_what_was_not_computed_is_said() -> None:
+    page = build_report(Evidence())
+    empty = [section for section in SECTIONS if not section.ready(Evidence())]
+    assert page.count("<p class=\"absent\">Not computed in this run.</p>") == len(empty)
+    assert "reproduced" not in page.split("</style>")[1]
+
+
+def test_a_page_repeats_byte_for_byte(full: Evidence) -> None:
+    assert build_report(full) == build_report(full)
+
+
+def test_text_is_escaped_and_formulas_are_not(full: Evidence) -> None:
+    page = build_report(full)
+    assert "KE never rises &lt;b&gt;" in page
+    assert "<mfrac>" in page
+
+
+def test_outcomes_are_told_by_a_mark_as_well_as_by_colour() -> None:
+    assert set(OUTCOME_MARKS) == set(OUTCOMES)
+    assert len(set(OUTCOME_MARKS.values())) == len(OUTCOMES)
+
+
+def test_each_outcome_is_counted(full: Evidence) -> None:
+    page = build_report(full)
+    assert f"1 {LIMITED}" in page
+    assert f"1 {REFUTED}" in page
+
+
+def test_prose_keeps_a_lone_dollar() -> None:
+    assert str(prose("costs 5$ <i>")) == "costs 5$ &lt;i&gt;"
+
+
+def test_a_page_is_written_whole(tmp_path: Path) -> None:
+    target = write_report(tmp_path / "out" / "report.html", "<html>")
+    assert target.read_text() == "<html>"
+    assert [path.name for path in target.parent.iterdir()] == ["report.html"]
+
+
+def test_a_page_too_large_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="8000000"):
+        write_report(tmp_path / "report.html", "x" * 8_000_001)
+    assert list(tmp_path.iterdir()) == []
