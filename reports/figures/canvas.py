@@ -47,7 +47,7 @@ def draw_walls(axes: Any, scene: Mapping[str, Any], reach: float) -> None:
         axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
 
 
-def draw_bodies(axes: Any, scene: Mapping[str, Any], coordinates: Sequence[float] | None = None, *,
+def draw_bodies(axes: Any, scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None, *,
                 color: str = PEG, edge: str = INK, width: float = 1.1) -> None:
     """Fill the moving bodies at `coordinates`, or where the scene starts."""
     for _, corners in body_outlines(scene, coordinates):

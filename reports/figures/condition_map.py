@@ -32,8 +32,8 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.add_subplot()
-        for (place_x, place_y), held in places.items():
-            share = float(np.mean(held))
+        for (place_x, place_y), trials in places.items():
+            share = float(np.mean(trials))
             if share < 1.0:
                 axes.plot(place_x, place_y, "x", color=VERMILION, markersize=6, markeredgewidth=1.4, zorder=3)
             if share > 0.0:

@@ -38,7 +38,7 @@ def pose(angle: float = 0.0, origin: Sequence[float] = (0.0, 0.0)) -> Pose:
     return Pose(np.array([[c, -s], [s, c]]), np.asarray(origin, dtype=float))
 
 
-def body_poses(scene: Mapping[str, Any], coordinates: Sequence[float] | None = None) -> dict[str, Pose]:
+def body_poses(scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None) -> dict[str, Pose]:
     """Return the pose of every body, at `coordinates` (nq,) or where the scene starts."""
     poses, used = {WORLD: pose()}, 0
     for body in scene["bodies"]:
@@ -50,7 +50,7 @@ def body_poses(scene: Mapping[str, Any], coordinates: Sequence[float] | None = N
     return poses
 
 
-def _moved(body: Mapping[str, Any], q: Sequence[float]) -> Pose:
+def _moved(body: Mapping[str, Any], q: Sequence[float] | Floats) -> Pose:
     """Return what the joint does to the body frame."""
     if body["joint"] == "revolute":
         return pose(q[0])
@@ -81,7 +81,7 @@ def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
     return point + reach * np.array([along, along - 2 * normal, -along - 2 * normal, -along])
 
 
-def body_outlines(scene: Mapping[str, Any], coordinates: Sequence[float] | None = None) -> Iterator[tuple[str, Floats]]:
+def body_outlines(scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None) -> Iterator[tuple[str, Floats]]:
     """Yield (body, corners in world axes) for every shape of every body."""
     poses = body_poses(scene, coordinates)
     for body in scene["bodies"]:

@@ -92,9 +92,9 @@ def test_a_drawing_is_a_whole_svg_that_asks_for_nothing(figure: Figure) -> None:
         assert panel.alt
 
 
-def test_every_colour_of_a_drawing_follows_the_page(recipe: Recipe, inputs: dict[str, object]) -> None:
+def test_every_colour_of_a_drawing_follows_the_page(figure: Figure) -> None:
     known = {f"var(--{name}, {value})" for value, name in VARIABLES.items()}
-    for panel in drawn(recipe, inputs).panels:
+    for panel in figure.panels:
         used = set(re.findall(r"(?:fill|stroke): ([^;\"]+)", panel.svg))
         assert used <= known | {"none"}
 
