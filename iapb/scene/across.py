@@ -34,9 +34,9 @@ def across_parts(given: Any) -> list[InitErrorDetails]:
 
 def _mappings(items: Any) -> list[dict[str, Any]]:
     """Return the items of a list; those that are no mappings as empty ones, to keep the numbering."""
-    return (
-        [item if isinstance(item, dict) else {} for item in items] if isinstance(items, (list, tuple)) else []
-    )
+    if not isinstance(items, (list, tuple)):
+        return []
+    return [item if isinstance(item, dict) else {} for item in items]
 
 
 def _name(mapping: dict[str, Any], field: str = "name", default: str | None = None) -> str | None:
@@ -62,7 +62,7 @@ def _parents(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
         if parent is None or parent == WORLD or parent in names[:i]:
             continue
         advice = "listed before it" if parent in names else "of this scene"
-        yield located((("bodies", i, "parent")), parent, f"world, or the name of a body {advice}")
+        yield located(("bodies", i, "parent"), parent, f"world, or the name of a body {advice}")
 
 
 def _scattered_trees(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:

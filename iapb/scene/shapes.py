@@ -45,28 +45,20 @@ class Polygon(Part):
     @field_validator("vertices")
     @classmethod
     def _convex(cls, vertices: tuple[Vector2, ...]) -> tuple[Vector2, ...]:
-        turns = [
-            _turn(*vertices[i - 2 : i + 1])
-            if i >= 2
-            else _turn(vertices[i - 2], vertices[i - 1], vertices[i])
-            for i in range(len(vertices))
-        ]
-        if any(turn is None for turn in turns):
-            raise expectation("corners that differ from their neighbours")
-        if sum(turns) < 0.0:  # type: ignore[arg-type]
-            vertices, turns = vertices[::-1], [-turn for turn in turns]  # type: ignore[operator]
-        once_around = abs(sum(turns) - 2.0 * math.pi) < 1.0  # type: ignore[arg-type]
-        if not once_around or any(math.sin(t) <= _STRAIGHT for t in turns):  # type: ignore[arg-type]
-            raise expectation("the corners of a convex polygon, in order, no three of them on one line")
+        corners = zip((*vertices[-1:], *vertices), vertices, (*vertices[1:], *vertices[:1]), strict=False)
+        turns = [_turn(before, at, after) for before, at, after in corners]
+        if sum(turns) < 0.0:
+            vertices, turns = vertices[::-1], [-turn for turn in turns]
+        once_around = abs(sum(turns) - 2.0 * math.pi) < 1.0  # the sum is a multiple of 2 pi
+        if not once_around or any(math.sin(turn) <= _STRAIGHT for turn in turns):
+            raise expectation("the corners of a convex polygon in order, none twice, no three on one line")
         return vertices
 
 
-def _turn(before: Vector2, at: Vector2, after: Vector2) -> float | None:
-    """Return the angle by which the outline turns at a corner [rad], None where two corners coincide."""
+def _turn(before: Vector2, at: Vector2, after: Vector2) -> float:
+    """Return the angle by which the outline turns at a corner [rad]; 0 where two corners coincide."""
     ux, uy = at[0] - before[0], at[1] - before[1]
     vx, vy = after[0] - at[0], after[1] - at[1]
-    if (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
-        return None
     return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
