@@ -29,6 +29,21 @@ _NAMES = (
     "independent_subset",
     "step_37",
     "reverse_order_law",
+    "delassus_definite",
+    "single_contact_complementarity",
+    "coordinate_invariance",
+    "scaled_impulse",
+    "loss_without_stiffness",
+    "projector_form",
+    "spectral_filter",
+    "damped_impact",
+    "any_truncation",
+    "energy_clamp",
+    "unequal_restitution",
+    "newton_lcp",
+    "newton_lcp_equal",
+    "poisson_two_lcps",
+    "momentum",
 )
 
 

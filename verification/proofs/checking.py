@@ -8,7 +8,7 @@ from verification.proofs.algebra import names_in
 from verification.proofs.exact import FlintBackend, Instance, SympyBackend, all_hold, completed, holds
 from verification.proofs.notation import case_lines, fact_line, step_claim, step_lines
 from verification.proofs.statement import ProofRecord, Refutation, Statement, StepRecord, Twin, Without
-from verification.proofs.steps import Known, Refused, Step
+from verification.proofs.steps import Exact, Known, Refused, Step
 
 
 def checked(statement: Statement, started: float | None = None) -> ProofRecord:
@@ -76,6 +76,8 @@ def _needed(without: Without, statement: Statement) -> Refutation:
 
 def _twin(twin: Twin, statement: Statement) -> Refutation:
     """The twin's instance keeps every hypothesis and breaks the twin's claim: on both exact backends."""
+    if isinstance(twin.claim, Exact):
+        return Refutation(twin.title, step_claim(twin.claim), (), twin.note, not twin.claim.is_true)
     case = completed(twin.instance, statement.definitions)
     refuted = all_hold(statement.given, case) and not any(
         holds(twin.claim, case, backend) for backend in (FlintBackend, SympyBackend)

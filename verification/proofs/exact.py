@@ -26,9 +26,11 @@ class Instance:
 
     values: Mapping[str, Matrix | Fraction]
 
-    def with_values(self, **changed: Number | Rows) -> Instance:
+    def with_values(
+        self, values: Mapping[str, Number | Rows] | None = None, /, **changed: Number | Rows
+    ) -> Instance:
         """The same instance with some letters changed."""
-        return Instance({**self.values, **instance(**changed).values})
+        return Instance({**self.values, **instance(values, **changed).values})
 
 
 def instance(values: Mapping[str, Number | Rows] | None = None, /, **named: Number | Rows) -> Instance:

@@ -10,7 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from verification.proofs.algebra import Expression, Operand, Scalars, Word, expression, word_expression
+from verification.proofs.algebra import (
+    Expression,
+    Operand,
+    Scalars,
+    Word,
+    expression,
+    transposed,
+    word_expression,
+)
 from verification.proofs.facts import Equation, NonNegative
 from verification.proofs.steps import Cofactor, Identity, Positivity, Refused, Term
 
@@ -42,7 +50,7 @@ def identity(
     remainder = claim.difference
     for cofactor in first:
         remainder = remainder - cofactor.value
-    rest, cofactors = rewritten(remainder, rules)
+    rest, cofactors = _reduced(remainder, rules)
     if not rest.vanishes():
         raise Refused(f"'{name}': rewriting leaves {len(rest.canonical().terms)} terms")
     return Identity(claim, (*first, *cofactors), because)
@@ -56,10 +64,23 @@ def positivity(
     remainder = claim.value
     for term in terms:
         remainder = remainder - term.value
-    rest, cofactors = rewritten(remainder, rules)
+    rest, cofactors = _reduced(remainder, rules)
     if not rest.vanishes():
         raise Refused(f"'{name}': rewriting leaves {len(rest.canonical().terms)} terms")
     return Positivity(claim, tuple(terms), cofactors, because)
+
+
+def _reduced(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:
+    """Rewrite; then, for a 1 x 1 value, turn words over (a number is its own transpose) where that rewrites to a
+    smaller word, so that xᵀ W y and yᵀ W x meet when W is symmetric."""
+    rest, cofactors = rewritten(value, rules)
+    if rest.is_scalar:
+        for (scalars, word), coefficient in tuple(rest.ordered()):
+            turned, more = rewritten(word_expression(transposed(word), scalars, coefficient), rules)
+            if len(turned.terms) == 1 and next(iter(turned.terms))[1] < word:
+                rest = rest - word_expression(word, scalars, coefficient) + turned
+                cofactors += more
+    return rest, cofactors
 
 
 def _first_match(value: Expression, rules: Sequence[Equation]) -> Cofactor | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from verification.proofs.exact import Instance
 from verification.proofs.facts import Equation, Fact
-from verification.proofs.steps import Step
+from verification.proofs.steps import Exact, Step
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,14 @@ class Without:
 
 @dataclass(frozen=True)
 class Twin:
-    """A nearby statement that is wrong: under the same hypotheses `claim` fails on `instance`."""
+    """A nearby statement that is wrong: under the same hypotheses `claim` fails on `instance`.
+
+    A claim about numbers (`Exact`) needs no instance: it is false as it stands.
+    """
 
     title: str
-    claim: Fact
-    instance: Instance
+    claim: Fact | Exact
+    instance: Instance = Instance({})
     note: str = ""
 
 

@@ -208,9 +208,13 @@ class Exact:
     claim: None = field(default=None, init=False)
     because: str = ""
 
+    @property
+    def is_true(self) -> bool:
+        return bool(RELATIONS[self.relation](self.left, self.right))
+
     def verify(self, known: Known) -> None:
         del known
-        if not RELATIONS[self.relation](self.left, self.right):
+        if not self.is_true:
             raise Refused(f"'{self.says}': {self.left} {self.relation} {self.right} is false")
 
 
