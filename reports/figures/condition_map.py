@@ -1,47 +1,76 @@
-"""Where a claim holds: a small map over two conditions, for a claim's record (no recipe: claims call it).
+"""Where a claim holds: small maps over two conditions, for a claim's record (no recipe: the ledger calls it).
 
-A filled dot holds, a cross fails; where several trials share a place, the size of the dot is the share that holds.
+A filled dot holds, a cross fails, a ring cannot tell; where several trials share a place, the size of the dot is
+the share that holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
-from reports.figures.style import BLUE, PAPER, VERMILION, styled
+from reports.figures.style import BLUE, MUTED, PAPER, VERMILION, styled
 from reports.figures.svg import to_svg
 
-_SIZE = (4.1, 2.7)
+_SIZE = (4.1, 2.4)  # inches
 _DOT = 46.0  # area of a full dot [points²]
+
+Outcomes = Sequence[bool | None]
 
 
 def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[float]], y: tuple[str, Sequence[float]],
-                  holds: Sequence[bool]) -> Figure:
+                  holds: Outcomes, panels: Sequence[Any] | None = None) -> Figure:
     """Draw where a claim holds.
 
     Parameters
     ----------
     x, y : label with unit, and the condition's value in each trial.
-    holds : whether the claim held in each trial.
+    holds : whether the claim held in each trial; None where the trial cannot tell.
+    panels : the value by which trials are split into maps of their own; default one map.
     """
-    places: dict[tuple[float, float], list[bool]] = {}
-    for place_x, place_y, held in zip(x[1], y[1], holds, strict=True):
-        places.setdefault((float(place_x), float(place_y)), []).append(bool(held))
+    split = ["" for _ in holds] if panels is None else [str(value) for value in panels]
+    drawn = []
+    for number, name in enumerate(dict.fromkeys(split)):
+        kept = [k for k, value in enumerate(split) if value == name]
+        places = _places([x[1][k] for k in kept], [y[1][k] for k in kept], [holds[k] for k in kept])
+        drawn.append(Panel(_map(f"{key}-{number}", x[0], y[0], places), _words(x[0], y[0], places), name))
+    legend = (("holds", "holds"), ("fails", "fails"), ("cannot tell", "cannot tell"))
+    return Figure(key, "", title, caption, tuple(drawn), None, legend if None in holds else legend[:2])
+
+
+Places = dict[tuple[float, float], list[bool | None]]
+
+
+def _places(x: Sequence[float], y: Sequence[float], holds: Outcomes) -> Places:
+    """Collect the outcomes of the trials at each place."""
+    places: Places = {}
+    for place_x, place_y, held in zip(x, y, holds, strict=True):
+        places.setdefault((float(place_x), float(place_y)), []).append(held)
+    return places
+
+
+def _map(key: str, x_label: str, y_label: str, places: Places) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.add_subplot()
-        for (place_x, place_y), trials in places.items():
-            share = float(np.mean(trials))
-            if share < 1.0:
-                axes.plot(place_x, place_y, "x", color=VERMILION, markersize=6, markeredgewidth=1.4, zorder=3)
+        for (x, y), trials in places.items():
+            decided = [held for held in trials if held is not None]
+            share = float(np.mean(decided)) if decided else 0.0
+            if not decided:
+                axes.plot(x, y, "o", markersize=5, markerfacecolor=PAPER, markeredgecolor=MUTED, zorder=3)
+            elif share < 1.0:
+                axes.plot(x, y, "x", color=VERMILION, markersize=6, markeredgewidth=1.4, zorder=4)
             if share > 0.0:
-                axes.scatter(place_x, place_y, s=_DOT * share, color=BLUE, edgecolor=PAPER, linewidth=0.5, zorder=4)
+                axes.scatter(x, y, s=_DOT * share, color=BLUE, edgecolor=PAPER, linewidth=0.5, zorder=3)
         axes.margins(0.08)
-        axes.set(xlabel=x[0], ylabel=y[0])
-        svg = to_svg(drawing, key)
-    total = int(np.sum(np.asarray(holds, dtype=bool)))
-    alt = f"Map over {x[0]} and {y[0]}: the claim holds in {total} of {len(holds)} trials."
-    legend = (("holds", "holds"), ("fails", "fails"))
-    return Figure(key, "", title, caption, (Panel(svg, alt),), None, legend)
+        axes.set(xlabel=x_label, ylabel=y_label)
+        return to_svg(drawing, key)
+
+
+def _words(x_label: str, y_label: str, places: Places) -> str:
+    outcomes = [held for trials in places.values() for held in trials]
+    return (f"Map over {x_label} and {y_label}: the claim holds in {outcomes.count(True)} of {len(outcomes)} trials, "
+            f"fails in {outcomes.count(False)}.")

@@ -32,7 +32,7 @@ class Pose:
         return self.origin + np.asarray(points, dtype=float) @ self.rotation.T
 
 
-def pose(angle: float = 0.0, origin: Sequence[float] = (0.0, 0.0)) -> Pose:
+def pose(angle: float = 0.0, origin: Sequence[float] | Floats = (0.0, 0.0)) -> Pose:
     """Return the frame turned by `angle` at `origin`."""
     c, s = np.cos(angle), np.sin(angle)
     return Pose(np.array([[c, -s], [s, c]]), np.asarray(origin, dtype=float))
@@ -81,7 +81,9 @@ def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
     return point + reach * np.array([along, along - 2 * normal, -along - 2 * normal, -along])
 
 
-def body_outlines(scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None) -> Iterator[tuple[str, Floats]]:
+def body_outlines(
+    scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None
+) -> Iterator[tuple[str, Floats]]:
     """Yield (body, corners in world axes) for every shape of every body."""
     poses = body_poses(scene, coordinates)
     for body in scene["bodies"]:

@@ -54,6 +54,7 @@ STYLES: dict[str, LineStyle] = {
     # maps of conditions
     "holds": LineStyle(BLUE, "o", (), 0.0),
     "fails": LineStyle(VERMILION, "X", (), 0.0),
+    "cannot tell": LineStyle(MUTED, "o", (), 0.0, filled=False),
 }
 
 # series that are ours to number: methods, tolerances, ...
