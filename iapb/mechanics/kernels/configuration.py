@@ -53,6 +53,8 @@ def turn_quaternion(q, i, phi, out):
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
     scalar = s * t - dot(a, b)
     length = sqrt(dot(vector, vector) + scalar * scalar)
+    if t < 0.0:  # of the two quaternions of this rotation, the one nearer to the old one
+        length = -length
     out[i], out[i + 1], out[i + 2] = scale(1.0 / length, vector)
     out[i + 3] = scalar / length
 
