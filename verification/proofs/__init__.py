@@ -44,6 +44,16 @@ _NAMES = (
     "newton_lcp_equal",
     "poisson_two_lcps",
     "momentum",
+    "erratum_half",
+    "erratum_symmetric",
+    "erratum_hypothesis",
+    "erratum_rank",
+    "erratum_shape",
+    "erratum_friction_sign",
+    "erratum_self_collision",
+    "erratum_adhesion",
+    "erratum_spreading",
+    "erratum_saturation",
 )
 
 

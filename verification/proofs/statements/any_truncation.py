@@ -46,8 +46,8 @@ def statement() -> Statement:
         title="Every truncation is passive",
         source="design section 4 (anytime)",
         statement=(
-            r"Let $Q = (Q_1 \; Q_2)$ have orthonormal columns. Stopping after $Q_1$ gives "
-            r"$u_1 = u - (1+e) Q_1 Q_1^\top u$ with $|u|^2 - |u_1|^2 = (1-e^2) |Q_1^\top u|^2 \geq 0$, whatever the rows "
+            r"Let $Q = (Q_1 \; Q_2)$ have orthonormal columns. Stopping after $Q_1$ gives $u_1 = u - (1+e) "
+            r"Q_1 Q_1^\top u$ with $|u|^2 - |u_1|^2 = (1-e^2) |Q_1^\top u|^2 \geq 0$, whatever the rows "
             r"left out are; its distance from the complete answer is exactly $(1+e) |Q_2^\top u|$."
         ),
         given=(unit1, unit2, across, E_AT_MOST_ONE, E_AT_LEAST_MINUS_ONE),

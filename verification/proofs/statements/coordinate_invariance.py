@@ -50,8 +50,9 @@ def statement() -> Statement:
         title="The impact does not depend on coordinates",
         source="paper V-A; C06",
         statement=(
-            r"Let $q = f(r)$ with invertible $F = \partial f / \partial r$, so $v = F w$, $M_r = F^\top M F$, $J_r = J F$. "
-            r"The Delassus matrix, hence $G$ and the impulses, are the same, and $F w^+ = v^+$."
+            r"Let $q = f(r)$ with invertible $F = \partial f / \partial r$, so $v = F w$, $M_r = F^\top M "
+            r"F$, $J_r = J F$. The Delassus matrix, hence $G$ and the impulses, are the same, and $F w^+ = "
+            r"v^+$."
         ),
         given=(left, right, INVERSE_MASS),
         definitions=names,

@@ -73,8 +73,9 @@ def statement() -> Statement:
         title="The damped impact is passive",
         source="design section 4 (damping); a spectral filter with its own certificate",
         statement=(
-            r"With $X = (W + \lambda I)^{-1}$, $\lambda \geq 0$, and $v^+ = v - (1+e) M^{-1} J^\top X J v$ twice the loss is "
-            r"$(1-e^2) \, y^\top W y + 2 (1+e) \lambda \, y^\top y \geq 0$ with $y = X J v$, for every $e \in [-1, 1]$."
+            r"With $X = (W + \lambda I)^{-1}$, $\lambda \geq 0$, and $v^+ = v - (1+e) M^{-1} J^\top X J v$ "
+            r"twice the loss is $(1-e^2) \, y^\top W y + 2 (1+e) \lambda \, y^\top y \geq 0$ with $y = X J "
+            r"v$, for every $e \in [-1, 1]$."
         ),
         given=(*MASS, inverse, positive, E_AT_MOST_ONE, E_AT_LEAST_MINUS_ONE),
         definitions=(name,),

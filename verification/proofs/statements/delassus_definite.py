@@ -45,8 +45,8 @@ def statement() -> Statement:
         title="Independent rows make the Delassus matrix definite",
         source="paper (35)",
         statement=(
-            r"If the rows of $J$ are independent ($J K = I$ for some $K$) and $M \succ 0$, then "
-            r"$x^\top J M^{-1} J^\top x \geq 0$ for every $x$, and $y^\top J M^{-1} J^\top y = 0$ only for $y = 0$."
+            r"If the rows of $J$ are independent ($J K = I$ for some $K$) and $M \succ 0$, then $x^\top J "
+            r"M^{-1} J^\top x \geq 0$ for every $x$, and $y^\top J M^{-1} J^\top y = 0$ only for $y = 0$."
         ),
         given=(INVERSE_MASS, DEFINITE_MASS, independent, zero),
         steps=(form, square, Cancelling(half, square.claim, DEFINITE_MASS), end),

@@ -53,9 +53,9 @@ def statement() -> Statement:
         title="The dynamically consistent inverse",
         source="paper (28)-(31), Appendix I",
         statement=(
-            r"With $\bar J = M^{-1} J^\top W^{-1}$ and $W = J M^{-1} J^\top$ invertible: $J \bar J = I$, "
-            r"$M \bar J J = J^\top \bar J^\top M$ and $J^\top \bar J^\top M \bar J J = M \bar J J$; so $\bar J J$ is the "
-            r"projector, orthogonal in the kinetic metric, that the impact (28) applies."
+            r"With $\bar J = M^{-1} J^\top W^{-1}$ and $W = J M^{-1} J^\top$ invertible: $J \bar J = I$, $M "
+            r"\bar J J = J^\top \bar J^\top M$ and $J^\top \bar J^\top M \bar J J = M \bar J J$; so $\bar J "
+            r"J$ is the projector, orthogonal in the kinetic metric, that the impact (28) applies."
         ),
         given=(SYMMETRIC_MASS, INVERSE_MASS, inverse),
         definitions=(definition,),

@@ -40,10 +40,10 @@ def statement() -> Statement:
         title="The energy clamp",
         source="design section 4 (energy clamp)",
         statement=(
-            r"Let $\Delta$ be any candidate change of velocity, and "
-            r"$0 \leq \alpha \leq -2 \, v^\top M \Delta / \Delta^\top M \Delta$. Then $v^+ = v + \alpha \Delta$ loses "
-            r"$\frac12 \alpha \, (-2 v^\top M \Delta - \alpha \Delta^\top M \Delta) \geq 0$. Where "
-            r"$v^\top M \Delta \geq 0$ there is no such $\alpha > 0$, and $\alpha = 0$ is taken."
+            r"Let $\Delta$ be any candidate change of velocity, and $0 \leq \alpha \leq -2 \, v^\top M "
+            r"\Delta / \Delta^\top M \Delta$. Then $v^+ = v + \alpha \Delta$ loses $\frac12 \alpha \, (-2 "
+            r"v^\top M \Delta - \alpha \Delta^\top M \Delta) \geq 0$. Where $v^\top M \Delta \geq 0$ there "
+            r"is no such $\alpha > 0$, and $\alpha = 0$ is taken."
         ),
         given=(SYMMETRIC_MASS, positive, slack),
         definitions=(name,),

@@ -30,8 +30,8 @@ def statement() -> Statement:
         title="The impulse (19) is the only one",
         source="paper (19), (27)",
         statement=(
-            r"If $M v^+ = M v + J^\top p$ and $J v^+ = -e J v$, and $W = J M^{-1} J^\top$ is invertible, then "
-            r"$p = -(1+e) W^{-1} J v$."
+            r"If $M v^+ = M v + J^\top p$ and $J v^+ = -e J v$, and $W = J M^{-1} J^\top$ is invertible, "
+            r"then $p = -(1+e) W^{-1} J v$."
         ),
         given=(mass_inverse, inverse, balance, law),
         steps=(impulse,),

@@ -60,9 +60,9 @@ def statement() -> Statement:
         title="Redundant rows may stay",
         source="paper (25), (33), (41); C03",
         statement=(
-            r"Let $J = S J_n$, where the rows of $J_n$ are independent rows of $J$ ($J_n = R J$, $R S = I$) and "
-            r"$W_n = J_n M^{-1} J_n^\top$ is invertible. Then $J^\top G J = J_n^\top W_n^{-1} J_n$ for every "
-            r"{1}-inverse $G$ of $J M^{-1} J^\top$, the Moore-Penrose inverse among them."
+            r"Let $J = S J_n$, where the rows of $J_n$ are independent rows of $J$ ($J_n = R J$, $R S = I$) "
+            r"and $W_n = J_n M^{-1} J_n^\top$ is invertible. Then $J^\top G J = J_n^\top W_n^{-1} J_n$ for "
+            r"every {1}-inverse $G$ of $J M^{-1} J^\top$, the Moore-Penrose inverse among them."
         ),
         given=(choice, left, right, inverse),
         definitions=(rows,),
@@ -85,7 +85,7 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            r"No symmetry and no definiteness of $M$ is needed once $W_n$ is invertible; a positive definite $M$ is what "
-            r"makes $W_n$ invertible for independent rows, (35).",
+            r"No symmetry and no definiteness of $M$ is needed once $W_n$ is invertible; a positive "
+            r"definite $M$ is what makes $W_n$ invertible for independent rows, (35).",
         ),
     )

@@ -27,9 +27,9 @@ def statement() -> Statement:
         title="Stiffness and damping take no part in the impact",
         source="paper II, V (8); C17",
         statement=(
-            r"The impact (21) holds neither stiffness nor damping. Whatever finite force $F$ the springs and dampers exert "
-            r"during the impact's duration $h$, it changes twice the kinetic energy by "
-            r"$2 h \, {v^+}^\top F + h^2 F^\top M^{-1} F$, which vanishes with $h$."
+            r"The impact (21) holds neither stiffness nor damping. Whatever finite force $F$ the springs "
+            r"and dampers exert during the impact's duration $h$, it changes twice the kinetic energy by $2 "
+            r"h \, {v^+}^\top F + h^2 F^\top M^{-1} F$, which vanishes with $h$."
         ),
         given=(SYMMETRIC_MASS, INVERSE_MASS),
         definitions=(name,),

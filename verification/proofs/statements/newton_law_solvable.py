@@ -45,9 +45,9 @@ def statement() -> Statement:
         title="When Newton's law can be met",
         source="paper (15), (20); design section 4 (unequal restitution)",
         statement=(
-            r"Let $b = -(I+E)\gamma^-$ and $W G W = W$. Some impulse $p$ gives every contact its own restitution, "
-            r"$W p = b$, if and only if $W G b = b$; the solutions are then $p = G b + (I - G W) z$ with $z$ arbitrary. "
-            r"(The converse needs no more words: $W G b = b$ shows $p = G b$.)"
+            r"Let $b = -(I+E)\gamma^-$ and $W G W = W$. Some impulse $p$ gives every contact its own "
+            r"restitution, $W p = b$, if and only if $W G b = b$; the solutions are then $p = G b + (I - G "
+            r"W) z$ with $z$ arbitrary. (The converse needs no more words: $W G b = b$ shows $p = G b$.)"
         ),
         given=(solution, inverse),
         definitions=(wanted,),
@@ -68,7 +68,7 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            r"With one scalar $e$ for all contacts $b = -(1+e) J v$ lies in the range of $J$, which is the range of "
-            r"$W$ for a positive definite $M$: then the law can always be met (theorem_2).",
+            r"With one scalar $e$ for all contacts $b = -(1+e) J v$ lies in the range of $J$, which is the "
+            r"range of $W$ for a positive definite $M$: then the law can always be met (theorem_2).",
         ),
     )

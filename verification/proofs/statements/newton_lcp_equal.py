@@ -48,8 +48,9 @@ def statement() -> Statement:
         title="With equal restitution the Newton LCP is passive for all velocities",
         source="design section 4, sharpened",
         statement=(
-            r"If $v^+ = v + M^{-1} J^\top p$ and $p^\top (J v^+ + e J v) = 0$ with one scalar $e \in (-1, 1]$, then twice the "
-            r"loss is $\frac{1-e}{1+e} \, p^\top W p \geq 0$: no sign of $p$ or of $J v$ is used."
+            r"If $v^+ = v + M^{-1} J^\top p$ and $p^\top (J v^+ + e J v) = 0$ with one scalar $e \in (-1, "
+            r"1]$, then twice the loss is $\frac{1-e}{1+e} \, p^\top W p \geq 0$: no sign of $p$ or of $J "
+            r"v$ is used."
         ),
         given=(*MASS, complementary, E_AT_MOST_ONE),
         definitions=(name,),

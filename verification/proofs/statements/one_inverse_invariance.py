@@ -40,8 +40,8 @@ def statement() -> Statement:
         title="Every {1}-inverse gives the same impact",
         source="the step missing from Appendix III of the paper",
         statement=(
-            r"If $W G W = W$ and $W H W = W$ for $W = J M^{-1} J^\top$, then $J^\top G J = J^\top H J$: the velocity "
-            r"after the impact does not depend on which generalized inverse is used."
+            r"If $W G W = W$ and $W H W = W$ for $W = J M^{-1} J^\top$, then $J^\top G J = J^\top H J$: the "
+            r"velocity after the impact does not depend on which generalized inverse is used."
         ),
         given=(INVERSE_MASS, DEFINITE_MASS, GENERALIZED_INVERSE, given),
         steps=(*ROW_SPACE_LEMMAS, *column_space_lemmas(other, "H", given), same),

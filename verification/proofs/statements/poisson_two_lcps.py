@@ -71,9 +71,10 @@ def statement() -> Statement:
         title="Poisson's law by two LCPs is passive",
         source="design section 4 (unequal restitution); Glocker and Pfeiffer",
         statement=(
-            r"Compression: $v_k = v + M^{-1} J^\top p$, $0 \leq p \perp J v_k$. Restitution: "
-            r"$v^+ = v_k + M^{-1} J^\top p_e$, $p_e - E p \perp J v^+ \geq 0$, with $E$ diagonal and $e_i \leq 1$. For "
-            r"any velocity $v$ twice the loss is $(p - p_e)^\top W (p - p_e) + 2 (J v^+)^\top (I - E) p \geq 0$."
+            r"Compression: $v_k = v + M^{-1} J^\top p$, $0 \leq p \perp J v_k$. Restitution: $v^+ = v_k + "
+            r"M^{-1} J^\top p_e$, $p_e - E p \perp J v^+ \geq 0$, with $E$ diagonal and $e_i \leq 1$. For "
+            r"any velocity $v$ twice the loss is $(p - p_e)^\top W (p - p_e) + 2 (J v^+)^\top (I - E) p "
+            r"\geq 0$."
         ),
         given=(*MASS, pushes, open_, inelastic, first, second),
         definitions=names,

@@ -72,8 +72,8 @@ def statement() -> Statement:
         title="The impact is an orthogonal projection",
         source="design section 4; paper (21)",
         statement=(
-            r"Let $M = L L^\top$, $u = L^\top v$, $A = J L^{-\top}$ and let the columns of $Q$ be an orthonormal basis of the "
-            r"row space of $A$. Then (21) is $u^+ = u - (1+e) Q Q^\top u$ and "
+            r"Let $M = L L^\top$, $u = L^\top v$, $A = J L^{-\top}$ and let the columns of $Q$ be an "
+            r"orthonormal basis of the row space of $A$. Then (21) is $u^+ = u - (1+e) Q Q^\top u$ and "
             r"$|u|^2 - |u^+|^2 = (1-e^2) |Q^\top u|^2$. No Delassus matrix is formed."
         ),
         given=(orthonormal, spanned, inverse, left),

@@ -67,8 +67,8 @@ def statement() -> Statement:
         source="paper VI (scaling, spreading, e = −1); C08, C09",
         statement=(
             r"Multiply the impulse by one factor $s \in [0, 1]$. The result is the impact with restitution "
-            r"$e_s = s(1+e) - 1 \in [-1, e]$, so it is passive. For $s = 0$, or $e = -1$, nothing happens: only the "
-            r"penalty forces remain."
+            r"$e_s = s(1+e) - 1 \in [-1, e]$, so it is passive. For $s = 0$, or $e = -1$, nothing happens: "
+            r"only the penalty forces remain."
         ),
         given=(*MASS, GENERALIZED_INVERSE, at_least_0, at_most_1, E_AT_MOST_ONE, E_AT_LEAST_MINUS_ONE),
         definitions=names,

@@ -48,8 +48,8 @@ def statement() -> Statement:
         source="paper V-A; C05",
         statement=(
             r"Let $w = J M^{-1} J^\top > 0$ and $\gamma^- \leq 0$, $e \geq -1$. Whatever $p$ solves "
-            r"$\gamma^+ + e \gamma^- \geq 0$, $p \, (\gamma^+ + e \gamma^-) = 0$ with $\gamma^+ = \gamma^- + w p$ is "
-            r"$p = -(1+e) \gamma^- / w$, and it is not negative."
+            r"$\gamma^+ + e \gamma^- \geq 0$, $p \, (\gamma^+ + e \gamma^-) = 0$ with $\gamma^+ = \gamma^- "
+            r"+ w p$ is $p = -(1+e) \gamma^- / w$, and it is not negative."
         ),
         given=(approaching, separated, complementary, inverse, positive, E_AT_LEAST_MINUS_ONE),
         definitions=(name,),

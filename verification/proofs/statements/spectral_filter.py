@@ -42,10 +42,10 @@ def statement() -> Statement:
         title="Every spectral filter is passive",
         source="design section 4 (one family)",
         statement=(
-            r"Let $V^\top V = I$ and $E = E^\top$ with $-I \leq E \leq I$. Then $u^+ = u - V (I+E) V^\top u$ has "
-            r"$|u|^2 - |u^+|^2 = u^\top V (I - E^2) V^\top u \geq 0$. With $E$ diagonal mode $k$ has its own restitution "
-            r"$e_k$: truncation ($e_k \in \{e, -1\}$), damping ($1 + e_k = (1+e) \sigma_k^2 / (\sigma_k^2 + \lambda)$) and "
-            r"one scale factor are all of this kind."
+            r"Let $V^\top V = I$ and $E = E^\top$ with $-I \leq E \leq I$. Then $u^+ = u - V (I+E) V^\top "
+            r"u$ has $|u|^2 - |u^+|^2 = u^\top V (I - E^2) V^\top u \geq 0$. With $E$ diagonal mode $k$ has "
+            r"its own restitution $e_k$: truncation ($e_k \in \{e, -1\}$), damping ($1 + e_k = (1+e) "
+            r"\sigma_k^2 / (\sigma_k^2 + \lambda)$) and one scale factor are all of this kind."
         ),
         given=(orthonormal, symmetric, above, below),
         definitions=(name,),

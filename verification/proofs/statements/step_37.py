@@ -43,8 +43,8 @@ def statement() -> Statement:
         title="What (37) computes is not the Moore-Penrose inverse",
         source="paper (36)-(41); paper.md erratum 2",
         statement=(
-            r"With $P = \begin{pmatrix} I & 0 \\ A & I \end{pmatrix}$ and $R = (I \; 0)$, the matrix "
-            r"$X = P^\top R^\top W_n^{-1} R P$ of (37) is just $R^\top W_n^{-1} R$. It satisfies $W X W = W$ and "
+            r"With $P = \begin{pmatrix} I & 0 \\ A & I \end{pmatrix}$ and $R = (I \; 0)$, the matrix $X = "
+            r"P^\top R^\top W_n^{-1} R P$ of (37) is just $R^\top W_n^{-1} R$. It satisfies $W X W = W$ and "
             r"$X W X = X$, and (41) follows; but $W X$ is not symmetric, so $X \neq W^\dagger$."
         ),
         given=(eliminate, choice, right),

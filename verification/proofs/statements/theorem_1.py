@@ -52,9 +52,9 @@ def statement() -> Statement:
         title="Theorem 1: one contact never creates energy",
         source="paper (18)-(19), Appendix I (27)-(32), with the factor ½ that (18) lost",
         statement=(
-            r"Let $v^+ = v - (1+e) M^{-1} J^\top \omega J v$ with one row $J$ and $\omega = (J M^{-1} J^\top)^{-1}$. "
-            r"Then $J v^+ = -e J v$ and $KE^+ = KE - \frac12 (1-e^2) \, v^\top J^\top \omega J v \leq KE$ for every "
-            r"$e \in [-1, 1]$ and every number $d$ of degrees of freedom."
+            r"Let $v^+ = v - (1+e) M^{-1} J^\top \omega J v$ with one row $J$ and $\omega = (J M^{-1} "
+            r"J^\top)^{-1}$. Then $J v^+ = -e J v$ and $KE^+ = KE - \frac12 (1-e^2) \, v^\top J^\top \omega "
+            r"J v \leq KE$ for every $e \in [-1, 1]$ and every number $d$ of degrees of freedom."
         ),
         given=(*MASS, inverse, E_AT_MOST_ONE, E_AT_LEAST_MINUS_ONE),
         definitions=(impact,),

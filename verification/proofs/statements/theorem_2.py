@@ -56,10 +56,10 @@ def statement() -> Statement:
         title="Theorem 2: simultaneous contacts, redundant ones included, never create energy",
         source="paper (20)-(24), Appendix II (34), with the factor ½ that (24) lost; C01, C02, C04, C08",
         statement=(
-            r"Let $v^+ = v - (1+e) M^{-1} J^\top G J v$, where $G$ is any matrix with $W G W = W$ for "
-            r"$W = J M^{-1} J^\top$ (the Moore-Penrose inverse $W^\dagger$ is one). Then $J v^+ = -e J v$ and "
-            r"$KE^+ = KE - \frac12 (1-e^2) \, v^\top J^\top G J v \leq KE$ for every $e \in [-1, 1]$, every number $c$ "
-            r"of contacts and every rank of $J$."
+            r"Let $v^+ = v - (1+e) M^{-1} J^\top G J v$, where $G$ is any matrix with $W G W = W$ for $W = "
+            r"J M^{-1} J^\top$ (the Moore-Penrose inverse $W^\dagger$ is one). Then $J v^+ = -e J v$ and "
+            r"$KE^+ = KE - \frac12 (1-e^2) \, v^\top J^\top G J v \leq KE$ for every $e \in [-1, 1]$, every "
+            r"number $c$ of contacts and every rank of $J$."
         ),
         given=(*MASS, GENERALIZED_INVERSE, E_AT_MOST_ONE, E_AT_LEAST_MINUS_ONE),
         definitions=(impact,),
@@ -69,8 +69,8 @@ def statement() -> Statement:
         needed=_needed(),
         twins=_twins(twice_the_loss, loss_form),
         remarks=(
-            r"Of the four Penrose equations only the first, $W G W = W$, is used: the other three are not needed, so "
-            r"they are not among the hypotheses.",
+            r"Of the four Penrose equations only the first, $W G W = W$, is used: the other three are not "
+            r"needed, so they are not among the hypotheses.",
             r"$e = 1$ conserves the energy (C04), $e = -1$ leaves the velocity as it is (C09).",
         ),
     )

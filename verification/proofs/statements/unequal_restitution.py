@@ -64,10 +64,10 @@ def statement() -> Statement:
         source="design section 4; the paper's future work",
         statement=(
             r"Let $W = J M^{-1} J^\top$ be invertible and $v^+ = v - M^{-1} J^\top W^{-1} (I+E) J v$. Then "
-            r"$J v^+ = -E J v$ and twice the loss is $\gamma^\top (W^{-1} - E^\top W^{-1} E) \gamma$ with $\gamma = J v$. "
-            r"Every $\gamma$ occurs, so the law is passive for all velocities if and only if "
-            r"$W^{-1} - E^\top W^{-1} E \succeq 0$. For $E = e I$ this is $e \in [-1, 1]$; for unequal $e_i$ it ties them "
-            r"to the masses."
+            r"$J v^+ = -E J v$ and twice the loss is $\gamma^\top (W^{-1} - E^\top W^{-1} E) \gamma$ with "
+            r"$\gamma = J v$. Every $\gamma$ occurs, so the law is passive for all velocities if and only "
+            r"if $W^{-1} - E^\top W^{-1} E \succeq 0$. For $E = e I$ this is $e \in [-1, 1]$; for unequal "
+            r"$e_i$ it ties them to the masses."
         ),
         given=(SYMMETRIC_MASS, INVERSE_MASS, inverse_),
         definitions=(name,),
