@@ -1,0 +1,74 @@
+"""Random trees of rigid bodies and random states, from a seed: what comparisons and properties run over."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.mechanics.joints import KINDS
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+
+Floats = NDArray[np.float64]
+
+# Masses [kg] and radii of gyration [m] span these decades; a flat or rod-like body has a nearly singular
+# inertia: a principal moment down to this share of the largest.
+MASS_DECADES = (-3.0, 2.0)
+GYRATION_DECADES = (-2.0, 0.0)
+THINNEST = 1e-9
+
+
+def random_rotation(rng: np.random.Generator) -> Floats:
+    """Return a rotation matrix (3, 3), uniform over SO(3)."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q if np.linalg.det(q) > 0.0 else -q
+
+
+def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
+    """Return a physical inertia (3, 3) about the centre of mass, sometimes nearly singular.
+
+    Made from second moments of mass s >= 0: principal moments s_y + s_z, s_z + s_x, s_x + s_y.
+    """
+    gyration = 10.0 ** rng.uniform(*GYRATION_DECADES)
+    second = mass * gyration**2 * np.where(rng.random(3) < 0.3, THINNEST, rng.random(3))
+    axes = random_rotation(rng)
+    inertia = axes @ np.diag(second.sum() - second) @ axes.T
+    return 0.5 * (inertia + inertia.T)
+
+
+def random_body(rng: np.random.Generator, name: str, parent: str | None, kind: str) -> Body:
+    """Return a body on a joint of that kind, everything else random."""
+    mass = 10.0 ** rng.uniform(*MASS_DECADES)
+    x, y, z = (float(entry) for entry in rng.normal(size=3))
+    return Body(
+        name=name,
+        parent=parent,
+        joint=Joint(kind, (x, y, z)),
+        placement=(random_rotation(rng), rng.normal(scale=0.5, size=3)),
+        mass=mass,
+        center_of_mass=rng.normal(scale=0.3, size=3),
+        inertia=random_inertia(rng, mass),
+    )
+
+
+def random_mechanism(
+    rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
+) -> Mechanism:
+    """Return trees of `joints` bodies each, depth first, from long chains to bushes, of the joint kinds given."""
+    bodies: list[Body] = []
+    for tree in range(trees):
+        chain: list[str] = []  # from the root to the newest body
+        bushy = rng.random()
+        for i in range(joints):
+            while len(chain) > 1 and rng.random() < 0.7 * bushy:
+                chain.pop()
+            name = f"body {tree}.{i}"
+            bodies.append(random_body(rng, name, chain[-1] if chain else None, str(rng.choice(kinds))))
+            chain.append(name)
+    return Mechanism(bodies)
+
+
+def random_state(rng: np.random.Generator, mechanism: Mechanism, speed: float = 1.0) -> tuple[Floats, Floats]:
+    """Return (q, v): a configuration far from neutral, and velocities of about `speed` [m/s, rad/s]."""
+    q = mechanism.integrate(mechanism.neutral(), rng.normal(scale=2.0, size=mechanism.nv))
+    return q, rng.normal(scale=speed, size=mechanism.nv)

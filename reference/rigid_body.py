@@ -1,0 +1,214 @@
+"""Rigid-body dynamics by Pinocchio, for comparison with the engine's own. The only file that imports it for this.
+
+A Pinocchio model comes from a Mechanism (`model_of`) or, independently of the engine's reading, from the URDF
+file by Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` answers in the engine's conventions.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.mechanics.mechanism import Body, Mechanism
+
+Floats = NDArray[np.float64]
+
+
+def _pinocchio() -> ModuleType:
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise MissingDependencyError("pinocchio", "The rigid-body reference", "pip install pin") from error
+    return pinocchio
+
+
+class PinocchioMechanism:
+    """A Pinocchio model behind the engine's vocabulary (same q, v, shapes, units and axes as `Mechanism`).
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+        With one body frame per body, of the body's name.
+    """
+
+    def __init__(self, model: Any) -> None:
+        self.model, self.data = model, model.createData()
+        self.nq, self.nv = int(model.nq), int(model.nv)
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        """M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
+        upper = np.triu(_pinocchio().crba(self.model, self.data, q))
+        return upper + np.triu(upper, 1).T
+
+    def bias(self, q: Floats, v: Floats) -> Floats:
+        """B(q, v) (d,) without gravity."""
+        return self._under((0.0, 0.0, 0.0), q, v, np.zeros(self.nv))
+
+    def gravity(self, q: Floats, g: ArrayLike) -> Floats:
+        """G(q) (d,) for the field g (3,) [m/s^2]."""
+        return self._under(g, q, np.zeros(self.nv), np.zeros(self.nv))
+
+    def inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, g: ArrayLike) -> Floats:
+        """tau = M dv + B + G (d,)."""
+        return self._under(g, q, v, dv)
+
+    def _under(self, g: ArrayLike, q: Floats, v: Floats, dv: Floats) -> Floats:
+        self.model.gravity.linear = np.array(g, dtype=np.float64)
+        return np.array(_pinocchio().rnea(self.model, self.data, q, v, dv))
+
+    def frame_jacobian(self, q: Floats, body: str) -> Floats:
+        """J (6, d) of the body's origin and of its turning, world axes."""
+        pinocchio = _pinocchio()
+        jacobian = pinocchio.computeFrameJacobian(
+            self.model, self.data, q, self._frame(body), pinocchio.LOCAL_WORLD_ALIGNED
+        )
+        return np.array(jacobian).reshape(6, self.nv)  # one column comes as a vector
+
+    def point_jacobian(self, q: Floats, body: str, point: Floats) -> Floats:
+        """J (3, d) of a world point fixed to the body: v_origin + omega x (point - origin)."""
+        jacobian = self.frame_jacobian(q, body)
+        x, y, z = point - self.placement(q, body)[1]
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return jacobian[:3] - across @ jacobian[3:]
+
+    def placement(self, q: Floats, body: str) -> tuple[Floats, Floats]:
+        """Axes (3, 3) and origin (3,) [m] of a body in the world."""
+        _pinocchio().framesForwardKinematics(self.model, self.data, q)
+        frame = self.data.oMf[self._frame(body)]
+        return np.array(frame.rotation), np.array(frame.translation)
+
+    def kinetic_energy(self, q: Floats, v: Floats) -> float:
+        """Kinetic energy [J]."""
+        return float(_pinocchio().computeKineticEnergy(self.model, self.data, q, v))
+
+    def potential_energy(self, q: Floats, g: ArrayLike) -> float:
+        """Potential energy [J] of the bodies that can move."""
+        self.model.gravity.linear = np.array(g, dtype=np.float64)
+        return float(_pinocchio().computePotentialEnergy(self.model, self.data, q))
+
+    def centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        """Momentum and angular momentum about the centre of mass (6,) [N s, N m s]."""
+        return np.array(_pinocchio().computeCentroidalMomentum(self.model, self.data, q, v).vector)
+
+    def integrate(self, q: Floats, v: Floats, dt: float) -> Floats:
+        """Configuration (nq,) after dt [s] with constant v."""
+        return np.array(_pinocchio().integrate(self.model, q, v * dt))
+
+    def difference(self, q0: Floats, q1: Floats) -> Floats:
+        """The velocity (d,) that leads from q0 to q1 in unit time."""
+        return np.array(_pinocchio().difference(self.model, q0, q1))
+
+    def impulse_dynamics(self, q: Floats, v: Floats, contact_jacobian: Floats, restitution: float) -> Floats:
+        """v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""
+        run = _pinocchio().impulseDynamics
+        return np.array(run(self.model, self.data, q, v, contact_jacobian, restitution, 0.0))
+
+    def _frame(self, body: str) -> int:
+        body_type = _pinocchio().FrameType.BODY
+        if not self.model.existFrame(body, body_type):
+            raise ArgumentError("body", body, "the name of a body of the model")
+        return int(self.model.getFrameId(body, body_type))
+
+
+def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioMechanism:
+    """Read a URDF file by Pinocchio's own parser."""
+    pinocchio = _pinocchio()
+    root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
+    return PinocchioMechanism(pinocchio.buildModelFromUrdf(str(path), *root))
+
+
+def model_of(mechanism: Mechanism) -> PinocchioMechanism:
+    """Build the same mechanism in Pinocchio.
+
+    A fixed body becomes a frame, its inertia part of the body it is fixed to; a planar joint becomes three.
+
+    Raises
+    ------
+    ArgumentError
+        Bodies not depth first: Pinocchio would silently give wrong results.
+    """
+    _check_depth_first(mechanism)
+    pinocchio = _pinocchio()
+    model = pinocchio.Model()
+    anchors: dict[str | None, tuple[int, Any]] = {None: (0, pinocchio.SE3.Identity())}
+    for body in mechanism.bodies:
+        joint, offset = anchors[body.parent]
+        placement = offset * pinocchio.SE3(*body.placement)
+        for step, (part, before) in enumerate(_joint_models(pinocchio, body)):
+            joint = model.addJoint(joint, part, placement * before, f"{body.name} joint {step}")
+            placement = before.inverse()
+        anchors[body.name] = (joint, placement)
+        inertia = pinocchio.Inertia(body.mass, body.center_of_mass, body.inertia)
+        model.appendBodyToJoint(joint, inertia, placement)
+        model.addBodyFrame(body.name, joint, placement, 0)
+    return PinocchioMechanism(model)
+
+
+def _check_depth_first(mechanism: Mechanism) -> None:
+    """Each body's parent must be the body before it, or carry that one."""
+    open_chain: list[str] = []
+    for body in mechanism.bodies:
+        while open_chain and open_chain[-1] != body.parent:
+            open_chain.pop()
+        if body.parent is not None and not open_chain:
+            raise ArgumentError("mechanism", body.name, "bodies in depth-first order")
+        open_chain.append(body.name)
+
+
+def _joint_models(pinocchio: ModuleType, body: Body) -> list[tuple[Any, Any]]:
+    """Return the Pinocchio joints, in a chain, that make the body's joint, each with a turn before it.
+
+    The turn is undone behind the joint: Pinocchio's unbounded joint turns about z, wherever our axis points.
+    """
+    kind, axis, straight = body.joint.kind, body.joint.unit_axis, pinocchio.SE3.Identity()
+    if kind == "fixed":
+        return []
+    if kind == "planar":
+        chain = (pinocchio.JointModelPX, pinocchio.JointModelPY, pinocchio.JointModelRZ)
+        return [(part(), straight) for part in chain]
+    if kind == "continuous":
+        turn = pinocchio.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
+        return [(pinocchio.JointModelRUBZ(), pinocchio.SE3(turn.toRotationMatrix(), np.zeros(3)))]
+    if kind == "revolute":
+        return [(pinocchio.JointModelRevoluteUnaligned(axis), straight)]
+    if kind == "prismatic":
+        return [(pinocchio.JointModelPrismaticUnaligned(axis), straight)]
+    whole = {
+        "planar_se2": pinocchio.JointModelPlanar,
+        "spherical": pinocchio.JointModelSpherical,
+        "free_flyer": pinocchio.JointModelFreeFlyer,
+    }
+    return [(whole[kind](), straight)]
+
+
+def impulse_dynamics(
+    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float
+) -> Floats:
+    """Return v after an impact (d,) by Pinocchio's `impulseDynamics` for any mass matrix.
+
+    The function takes a model; a serial chain of d joints has a full M, which is then overwritten by ours.
+    It factors M, forms the Delassus matrix J M^-1 J^T and factors that: rows must be independent, and
+    the error grows with the square of the condition number of A = J L^-T.
+
+    Parameters
+    ----------
+    mass_matrix : (d, d) symmetric positive definite
+    contact_jacobian : (c, d) independent rows, c >= 1
+    velocity : (d,)
+    restitution : in [-1, 1]
+    """
+    pinocchio = _pinocchio()
+    mass, rows = np.array(mass_matrix, np.float64), np.array(contact_jacobian, np.float64)
+    v = np.array(velocity, np.float64)
+    model = pinocchio.Model()
+    joint = 0
+    for k in range(len(v)):
+        joint = model.addJoint(joint, pinocchio.JointModelPX(), pinocchio.SE3.Identity(), f"joint {k}")
+    data = model.createData()
+    data.M[:, :] = mass
+    return np.array(pinocchio.impulseDynamics(model, data, v, rows, restitution, 0.0))
