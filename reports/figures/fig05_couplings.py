@@ -24,10 +24,10 @@ _SIZE = (5.0, 5.0 * _HEIGHT / _WIDTH)  # inches
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw both diagrams; the table repeats the scene's gains."""
     panels = (
-        Panel(_four_channels(), "The hand pushes device and tool alike; the environment force of the tool goes to the "
-              "device; a spring and damper joins device and tool.", "(b) four channels: ideal, IAPB, PB"),
         Panel(_unilateral(), "The hand pushes the device only; a spring and damper joins device and tool while the "
               "tool is in contact.", "(a) unilateral coupler: CBuc"),
+        Panel(_four_channels(), "The hand pushes device and tool alike; the environment force of the tool goes to the "
+              "device; a spring and damper joins device and tool.", "(b) four channels: ideal, IAPB, PB"),
     )
     return Figure(KEY, NUMBER, TITLE, CAPTION, panels, _table(inputs[SCENE]), (), (SCENE,))
 

@@ -1,6 +1,6 @@
 """Figure 10: as Figure 7, impulses of IAPB spread over steps to stay within the device limits.
 
-The last panel adds the penetration, of which the paper only speaks.
+The last panels add what the paper only speaks of: tool against device, and penetration.
 """
 
 from __future__ import annotations
@@ -9,7 +9,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.figure import Figure, Recipe
-from reports.figures.trajectories import penetration_panel, trajectory_numbers, trajectory_panels
+from reports.figures.trajectories import (
+    penetration_panel,
+    separation_panel,
+    trajectory_numbers,
+    trajectory_panels,
+)
 from reports.figures.worlds import LIMITED, legend_of, runs_of
 
 KEY, NUMBER, TITLE = "fig10", "Figure 10", "Hand trajectories with a limited device"
@@ -22,7 +27,7 @@ CAPTION = (
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw the figure from the runs named in worlds.LIMITED."""
     runs = runs_of(LIMITED, inputs)
-    panels = (*trajectory_panels(KEY, runs), penetration_panel(KEY, runs))
+    panels = (*trajectory_panels(KEY, runs), separation_panel(KEY, runs), penetration_panel(KEY, runs))
     numbers = trajectory_numbers(runs)
     return Figure(KEY, NUMBER, TITLE, CAPTION, panels, numbers, legend_of(LIMITED), tuple(LIMITED.values()))
 

@@ -13,7 +13,7 @@ from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.planar import body_outlines
 from reports.figures.style import FORCE, MUTED, STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
-from reports.figures.trajectories import MILLI, marks
+from reports.figures.trajectories import MILLI, first_shown, marks
 from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, TITLE = "hero", "Four worlds in one corner"
@@ -26,7 +26,6 @@ _GHOSTS = 4  # poses of the ideal run between start and end
 _MARGIN = 0.005  # [m] of wall and of air around the motion
 _FORCE_LENGTH = 0.013  # [m] on paper per newton
 _SIZE = (4.5, 3.8)  # inches
-_BEFORE_CONTACT = 0.05  # [s] shown of the approach
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -61,19 +60,13 @@ def _paths(runs: Mapping[str, Run]) -> str:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[_first_shown(runs["ideal"]) :, :2].T
+            x, y = MILLI * run.device_q[first_shown(runs) :, :2].T
             axes.plot(x, y, **line_arguments(STYLES[curve]), zorder=4 + number / 10, markevery=marks(len(x), number))
         axes.set(xlabel="x [mm]", ylabel="y [mm]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.xaxis.set_inverted(True)
         axes.yaxis.set_inverted(True)
         return to_svg(drawing, f"{KEY}-paths")
-
-
-def _first_shown(run: Run) -> int:
-    """Return the step shortly before the first contact."""
-    touching = np.flatnonzero(np.diff(run.contacts.offsets))
-    return max(int(touching[0]) - round(_BEFORE_CONTACT / run.dt), 0) if len(touching) else 0
 
 
 def ghost_steps(run: Run) -> list[int]:

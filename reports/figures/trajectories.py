@@ -24,6 +24,7 @@ from reports.figures.svg import to_svg
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
+_BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
 _MARKS = 9  # markers along a curve: enough to tell it in grey, few enough to see the line
 
 
@@ -33,19 +34,28 @@ def marks(count: int, number: int) -> tuple[int, int]:
     return (number * every // 5) % every, every
 
 
+def first_shown(runs: Mapping[str, Run]) -> int:
+    """Return the step shortly before the first contact of any run: before it all paths are one straight line."""
+    touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
+    dt = next(iter(runs.values())).dt
+    return max(min(touching) - round(_BEFORE_CONTACT / dt), 0) if touching else 0
+
+
 def path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
-    """Draw y against x of the device."""
+    """Draw y against x of the device, from shortly before the first contact."""
+    first = first_shown(runs)
     with styled() as new_figure:
         drawing = new_figure(figsize=PANEL, layout="constrained")
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[:, 0], MILLI * run.device_q[:, 1]
+            x, y = MILLI * run.device_q[first:, :2].T
             axes.plot(x, y, **line_arguments(STYLES[curve]), markevery=marks(len(x), number), zorder=3 + number / 10)
         axes.set(xlabel="x [mm]", ylabel="y [mm]")
         axes.xaxis.set_inverted(True)
         axes.yaxis.set_inverted(True)
         svg = to_svg(drawing, f"{key}-path")
-    return Panel(svg, f"Paths of the hand in the plane, in mm: {_ends(runs)}", "path of the hand, y against x")
+    alt = f"Paths of the hand in the plane, in mm: {_ends(runs)}"
+    return Panel(svg, alt, "path of the hand, from just before contact")
 
 
 def time_panel(key: str, runs: Mapping[str, Run], coordinate: int) -> Panel:
