@@ -1,0 +1,87 @@
+"""The algebraic claims on the engine itself, and on resolvers with a planted fault."""
+
+import numpy as np
+import pytest
+
+from iapb.contact.impact import resolve_impact
+from verification.claims import c03_rows_removed, c04_elastic, c05_complementarity, check_claims, losses
+from verification.claims.claim import LIMITED, REPRODUCED
+from verification.claims.exact_pseudo_inverse import pseudo_inverse
+from verification.claims.instances import Family, draw
+from verification.claims.study import Study
+
+
+class Faulty:
+    """An impact whose velocity was tampered with."""
+
+    def __init__(self, impact, velocity, impulses=None):
+        self.velocity = velocity
+        self.impulses = impact.impulses if impulses is None else impulses
+
+
+def energetic(mass, rows, velocity, e, **options):
+    """Gains: restitution of 1.2."""
+    impact = resolve_impact(mass, rows, velocity, 0.0, **options)
+    return Faulty(impact, velocity + 2.2 * (impact.velocity - velocity))
+
+
+def lossy(mass, rows, velocity, e, **options):
+    """Takes a little too much, wherever the velocity points."""
+    impact = resolve_impact(mass, rows, velocity, e, **options)
+    return Faulty(impact, impact.velocity * (1.0 - 1e-6), impact.impulses * (1.0 + 1e-6))
+
+
+def last_rows_only(mass, rows, velocity, e, **options):
+    """Forgets a contact."""
+    return resolve_impact(mass, rows[1:], velocity, e, **options)
+
+
+def test_the_algebraic_claims_of_the_engine():
+    verdicts = {result.id: result.verdict for result in check_claims(ids=["C01", "C02", "C03", "C04", "C05"])}
+    assert verdicts == {"C01": LIMITED, "C02": LIMITED, "C03": REPRODUCED, "C04": REPRODUCED, "C05": REPRODUCED}
+
+
+def test_theorem_1_and_2_fail_only_in_the_printed_factor():
+    for result in check_claims(ids=["C01", "C02"]):
+        failed = {row["part"] for row in result.table.that(False).records()}
+        assert failed == {losses.AS_PRINTED}
+
+
+@pytest.mark.parametrize("fault", [energetic, lossy])
+def test_losses_notice_a_wrong_energy(monkeypatch, fault):
+    monkeypatch.setattr(losses, "resolve_impact", fault)
+    rows = list(losses.loss_batches([Family(3, 1, 1, 1e2)], 4, seed=1))
+    wrong = {row["part"] for row in rows if row["error"] > row["bound"]}
+    assert losses.WITH_HALF in wrong
+    assert (losses.PASSIVE in wrong) == (fault is energetic)
+
+
+@pytest.mark.parametrize(
+    ("claim", "fault"), [(c03_rows_removed, last_rows_only), (c04_elastic, lossy), (c05_complementarity, lossy)]
+)
+def test_a_planted_fault_is_noticed(monkeypatch, claim, fault):
+    monkeypatch.setattr(claim, "resolve_impact", fault)
+    result = claim.CLAIM.check(Study())
+    assert any(held is False for held in result.table.holds)
+
+
+def test_instances_repeat_and_have_the_rank_they_say():
+    family = Family(6, 12, 4, 1e4)
+    first, second = list(draw(family, 3, seed=7)), list(draw(family, 3, seed=7))
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one.mass_matrix, other.mass_matrix)
+        assert np.linalg.matrix_rank(one.contact_jacobian) == one.rank == 4
+        assert np.linalg.cond(one.mass_matrix) == pytest.approx(1e4, rel=1e-6)
+
+
+def test_exact_pseudo_inverse_keeps_penrose_conditions():
+    from reference.exact import rational_matrix
+
+    rng = np.random.default_rng(3)
+    rows = rng.integers(-3, 4, (4, 2)).astype(float)
+    w = rational_matrix("w", rows @ rows.T)
+    inverse = pseudo_inverse(w)
+    assert w * inverse * w == w
+    assert inverse * w * inverse == inverse
+    assert (w * inverse).transpose() == w * inverse
+    assert (inverse * w).transpose() == inverse * w

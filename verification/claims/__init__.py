@@ -1,0 +1,26 @@
+"""The claims ledger: each claim of the paper as a computation with a verdict over a range of conditions.
+
+One file per claim. `check_claims` runs them; `CLAIMS` has them by id.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from verification.claims.claim import VERDICTS, Claim, ClaimResult
+from verification.claims.study import Study, check_claims, conditions
+from verification.claims.table import Column, Table
+
+_FILES = (
+    "c01_one_collision",
+    "c02_redundant_collisions",
+    "c03_rows_removed",
+    "c04_elastic",
+    "c05_complementarity",
+    "c10_trajectory",
+)
+CLAIMS: dict[str, Claim] = {
+    claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)
+}
+
+__all__ = ["CLAIMS", "VERDICTS", "Claim", "ClaimResult", "Column", "Study", "Table", "check_claims", "conditions"]

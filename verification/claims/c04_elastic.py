@@ -1,0 +1,74 @@
+"""C04: a perfectly elastic impact conserves kinetic energy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from iapb import resolve_impact
+from verification.claims.algebraic import COLUMNS, energy_gains, solve_bound, summary, within_bound, worst
+from verification.claims.claim import Claim
+from verification.claims.instances import Family, draw, whole_numbers
+from verification.claims.table import Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+DOUBLES = "in doubles"
+EXACT = "in rationals"
+FAMILIES = tuple(
+    Family(d, contacts, rank, k)
+    for d, contacts, rank in ((1, 1, 1), (3, 1, 1), (3, 6, 3), (6, 12, 4), (12, 60, 8))
+    for k in (1e1, 1e4, 1e8)
+)
+IMPACTS = {"quick": 12, "full": 200}
+
+
+def measure(study: Study) -> Table:
+    """e = 1 at one contact and at redundant ones."""
+    count = IMPACTS[study.depth]
+    return table_of(COLUMNS, [*_batches(count, study.seed), *_exact_batches(count // 4, study.seed)])
+
+
+def _batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
+    for family in FAMILIES:
+        instances = list(draw(family, count, seed))
+        after = [resolve_impact(*instance[:3], 1.0).velocity for instance in instances]
+        yield {**_names(family), "part": DOUBLES, "condition number": family.condition_number, "impacts": count,
+               "error": worst(np.abs(energy_gains(instances, after))),
+               "bound": solve_bound(family.coordinates, family.condition_number)}  # fmt: skip
+
+
+def _exact_batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
+    from reference.exact import exact_impact
+
+    for family in FAMILIES[::3]:
+        impacts = [exact_impact(*instance[:3], 1) for instance in whole_numbers(family, count, seed)]
+        error = worst(float(abs(i.energy_after - i.energy_before)) for i in impacts)
+        yield {**_names(family), "part": EXACT, "impacts": count, "error": error, "bound": 0.0}
+
+
+def _names(family: Family) -> dict[str, Any]:
+    return {"coordinates": family.coordinates, "contacts": family.contacts, "restitution": 1.0}
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    return (
+        f"Relative change of energy {summary(table, DOUBLES)}; without rounding the change of energy [J] is "
+        f"{summary(table, EXACT)}."
+    )
+
+
+CLAIM = Claim(
+    id="C04",
+    statement="With e = 1 kinetic energy is conserved.",
+    place="Sections V-A and V-B",
+    quantity="Worst relative change of kinetic energy, gains and losses alike.",
+    tolerance="100 d ε κ(M) in doubles (the factorization of M decides what is lost, never gained); in rationals none.",
+    measure=measure,
+    holds=within_bound,
+    finding=finding,
+)

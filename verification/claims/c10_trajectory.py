@@ -1,0 +1,43 @@
+"""C10: the device's trajectory under IAPB is closer to ideal than under PB and CBuc (Fig. 7)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import COLUMNS, by_coordinate, closest, distances, median_ratio
+from verification.claims.table import Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+
+def measure(study: Study) -> Table:
+    """Every start, in the four worlds."""
+    return table_of(COLUMNS, (row for condition in study.starts() for row in distances(study, condition, "full")))
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    ratios = ", ".join(
+        f"{median_ratio(table, name, 'PB'):.2f} in {name}" for name in ("x", "y", "theta")
+    )
+    return (
+        f"IAPB is the closest in {by_coordinate(table)}. Its distance to ideal is, in the median, this multiple of "
+        f"PB's: {ratios}."
+    )
+
+
+CLAIM = Claim(
+    id="C10",
+    statement="The device trajectory of IAPB is closest to ideal, ahead of PB and CBuc.",
+    place="Section VI, Fig. 7",
+    quantity="RMS distance of the device trajectory from the ideal world's, per coordinate, from the first contact "
+    "until the ideal peg has settled; the largest distance beside it.",
+    tolerance="Strictly the smallest of the three. Where all three are within 1e-7 of ideal the trial cannot tell.",
+    measure=measure,
+    holds=closest,
+    finding=finding,
+    map_axes=("tilt", "clearance"),
+    map_panels="coordinate",
+)

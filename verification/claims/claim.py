@@ -1,0 +1,154 @@
+"""Claim and ClaimResult: what is claimed, how a trial decides, and what came of it.
+
+The verdict follows from the trials by one rule, for every claim alike (`verdict_of`): nobody types it in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from verification.claims.table import Row, Table
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+REPRODUCED = "reproduced"
+LIMITED = "reproduced within stated limits"
+REFUTED = "refuted"
+NOT_TESTABLE = "not testable here"
+VERDICTS = (REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE)
+
+# A claim that fails in more trials than it holds in is not "true with exceptions".
+LEAST_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper as a computation.
+
+    Attributes
+    ----------
+    id : key of the ledger, C01 to C22
+    statement : the claim in our words; place : where the paper makes it
+    quantity : what is measured; tolerance : when a trial counts as holding, and why there
+    measure : study -> trials, not yet judged
+    holds : one trial -> True, False, or None where it cannot tell; a pure function of the row
+    finding : judged trials -> one sentence with numbers
+    map_axes : two condition columns over which the outcome is best drawn; map_panels : the column that splits maps
+    """
+
+    id: str
+    statement: str
+    place: str
+    quantity: str
+    tolerance: str
+    measure: Callable[[Study], Table]
+    holds: Callable[[Row], bool | None]
+    finding: Callable[[Table], str]
+    map_axes: tuple[str, str] | None = None
+    map_panels: str | None = None
+
+    def judge(self, table: Table) -> Table:
+        """Return the table with the outcome of each trial."""
+        return replace(table, holds=tuple(self.holds(row) for row in table.records()))
+
+    def check(self, study: Study) -> ClaimResult:
+        """Measure, judge and conclude."""
+        return self.conclude(self.judge(self.measure(study)))
+
+    def conclude(self, table: Table) -> ClaimResult:
+        """Return the record of a judged table."""
+        return ClaimResult(
+            self.id, self.statement, self.place, self.quantity, self.tolerance, verdict_of(table.holds),
+            self.finding(table), ranges(table), _where_it_fails(table), table, self.map_axes, self.map_panels,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ClaimResult:
+    """What came of a claim: plain data for a report.
+
+    conditions : the range over which it was computed; fails : where it does not hold, empty if nowhere
+    """
+
+    id: str
+    statement: str
+    place: str
+    quantity: str
+    tolerance: str
+    verdict: str
+    finding: str
+    conditions: str
+    fails: str
+    table: Table
+    map_axes: tuple[str, str] | None = None
+    map_panels: str | None = None
+
+    @property
+    def held(self) -> int:
+        """Trials in which the claim held."""
+        return sum(outcome is True for outcome in self.table.holds)
+
+    @property
+    def decided(self) -> int:
+        """Trials that could tell."""
+        return sum(outcome is not None for outcome in self.table.holds)
+
+
+def verdict_of(holds: Sequence[bool | None]) -> str:
+    """Return the verdict of a claim from the outcomes of its trials.
+
+    All that can tell hold: reproduced. At least LEAST_SHARE of them: reproduced within stated limits. Fewer:
+    refuted. None can tell: not testable here.
+    """
+    decided = [outcome for outcome in holds if outcome is not None]
+    if not decided:
+        return NOT_TESTABLE
+    share = sum(decided) / len(decided)
+    if share == 1.0:
+        return REPRODUCED
+    return LIMITED if share >= LEAST_SHARE else REFUTED
+
+
+def ranges(table: Table) -> str:
+    """Return the conditions of a table in words: each with its values, or its ends where there are many."""
+    parts = []
+    for column in table.columns:
+        if column.condition and table.rows:
+            parts.append(f"{column.name} {_span(table.column(column.name))} {column.unit}".rstrip())
+    return "; ".join(parts)
+
+
+def _where_it_fails(table: Table) -> str:
+    """In how many trials, and where; apart for each part of the claim."""
+    names = [column.name for column in table.columns if column.part]
+    if not names:
+        return _failures(table)
+    parts = dict.fromkeys(table.column(names[0]))
+    failures = {part: _failures(table.where(**{names[0]: part})) for part in parts}
+    return "; ".join(f"{part}: {text}" for part, text in failures.items() if text)
+
+
+def _failures(table: Table) -> str:
+    failed = table.that(False)
+    if not failed.rows:
+        return ""
+    decided = sum(outcome is not None for outcome in table.holds)
+    if len(failed.rows) == decided:
+        return f"in all {decided} trials"
+    return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
+
+
+_LISTED = 8  # more values than this are given by their ends
+
+
+def _span(values: list[Any]) -> str:
+    found = {value for value in values if value is not None}
+    if any(isinstance(value, str) for value in found):
+        return ", ".join(sorted(map(str, found)))
+    ordered = sorted(found)
+    if len(ordered) > _LISTED:
+        return f"{ordered[0]:g} to {ordered[-1]:g}"
+    return ", ".join(f"{value:g}" for value in ordered)

@@ -1,0 +1,87 @@
+"""How close the worlds' device trajectories come to "ideal": shared by C10 and C13."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from verification.claims.measures import largest_distance, root_mean_square
+from verification.claims.table import Column, Row, Table
+from verification.claims.trace import COORDINATES
+
+if TYPE_CHECKING:
+    from verification.claims.conditions import Condition
+    from verification.claims.study import Study
+
+COLUMNS = (
+    Column("tilt", "rad", condition=True),
+    Column("clearance", "m", condition=True),
+    Column("travel", "m", condition=True),
+    Column("friction", condition=True),
+    Column("coordinate", part=True),
+    Column("IAPB"),
+    Column("PB"),
+    Column("CBuc"),
+    Column("IAPB, largest"),
+    Column("PB, largest"),
+    Column("CBuc, largest"),
+)
+
+# Distances below this [m, rad] are nothing that a hand or a figure could tell apart (a tenth of a micrometre): a
+# coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat, cannot tell.
+INDISTINGUISHABLE = 1e-7
+
+
+def distances(study: Study, condition: Condition, rendering: str) -> Iterator[dict[str, Any]]:
+    """Yield one trial per coordinate: RMS and largest distance of each world from ideal."""
+    ideal = study.trace(condition, "ideal")
+    worlds = {
+        "IAPB": study.trace(condition, "IAPB", rendering),
+        "PB": study.trace(condition, "PB"),
+        "CBuc": study.trace(condition, "CBuc"),
+    }
+    mean = {name: root_mean_square(trace, ideal) for name, trace in worlds.items()}
+    peak = {f"{name}, largest": largest_distance(trace, ideal) for name, trace in worlds.items()}
+    for i, coordinate in enumerate(COORDINATES):
+        numbers = {name: float(values[i]) for name, values in (mean | peak).items()}
+        yield condition.record() | {"coordinate": coordinate} | numbers
+
+
+def closest(row: Row) -> bool | None:
+    """IAPB is nearer to ideal (RMS) than PB and than CBuc; None where all are indistinguishable from it."""
+    if max(row["IAPB"], row["PB"], row["CBuc"]) < INDISTINGUISHABLE:
+        return None
+    return bool(row["IAPB"] < min(row["PB"], row["CBuc"]))
+
+
+def count(table: Table) -> str:
+    """`held of decided`."""
+    decided = [held for held in table.holds if held is not None]
+    return f"{sum(decided)} of {len(decided)}"
+
+
+def by_coordinate(table: Table) -> str:
+    """Return in how many trials the claim holds, per coordinate, and the tilts up to which it always does."""
+    parts = []
+    for coordinate in COORDINATES:
+        trials = table.where(coordinate=coordinate)
+        parts.append(f"{coordinate}: {count(trials)}{_reach(trials)}")
+    return "; ".join(parts)
+
+
+def _reach(trials: Table) -> str:
+    """The largest tilt below which no trial fails, in words."""
+    failed, held = trials.that(False).column("tilt"), trials.that(True).column("tilt")
+    if not failed or not held:
+        return ""
+    below = [tilt for tilt in held if abs(tilt) < min(map(abs, failed))]
+    return f" (all up to a tilt of {max(below):g} rad)" if below else ""
+
+
+def median_ratio(table: Table, coordinate: str, other: str) -> float:
+    """Median of distance(IAPB) / distance(other) over the trials of a coordinate that can tell."""
+    rows = [row for row, held in zip(table.records(), table.holds, strict=True)
+            if held is not None and row["coordinate"] == coordinate]  # fmt: skip
+    return float(np.median([row["IAPB"] / row[other] for row in rows])) if rows else np.nan

@@ -1,0 +1,90 @@
+"""The conditions of the peg in the corner that the paper leaves open, as ranges (paper Fig. 4, section VI).
+
+A trial starts from a tilt, a clearance to the wall and a travel to the floor: how far the peg's nearest corners
+are from the two when the hand begins to push. Then come friction, stiffness and damping of the walls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from iapb.scene import Scene
+
+HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
+
+# Worlds without friction and penalties do not see these; one run of theirs serves all values.
+PENALTY_ONLY = ("friction", "stiffness", "damping")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One variation of the peg scene; friction, stiffness and damping are those of the walls.
+
+    tilt [rad]; clearance to the wall and travel to the floor [m]; stiffness [N/m]; damping [N s/m]
+    """
+
+    tilt: float = 0.08
+    clearance: float = 0.010
+    travel: float = 0.008
+    friction: float = 0.0
+    stiffness: float = 1000.0
+    damping: float = 50.0
+
+    def rigid(self) -> Condition:
+        """The same trial as a world of rigid, frictionless contacts sees it."""
+        default = Condition()
+        return replace(self, **{name: getattr(default, name) for name in PENALTY_ONLY})
+
+    def record(self) -> dict[str, float]:
+        """The condition by column name."""
+        return asdict(self)
+
+    def place(self, scene: Scene) -> Scene:
+        """The scene under this condition."""
+        half = np.array(HALF_SIZE)
+        c, s = abs(np.cos(self.tilt)), abs(np.sin(self.tilt))
+        x = self.clearance + half[0] * c + half[1] * s
+        y = -(self.travel + half[0] * s + half[1] * c)
+        return scene.with_values({
+            "bodies.peg.position": [float(x), float(y), self.tilt],
+            "contact.friction": self.friction,
+            "contact.stiffness": self.stiffness,
+            "contact.damping": self.damping,
+        })  # fmt: skip
+
+
+TILTS = {
+    "quick": (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35),
+    "full": (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
+}
+CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
+TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
+FRICTIONS = (0.1, 0.3)
+STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
+DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
+
+
+def start_conditions(depth: str) -> tuple[Condition, ...]:
+    """Every tilt with every clearance, then other travels and frictions at three tilts."""
+    grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
+    few = (0.0, 0.02, 0.1)
+    travels = [Condition(tilt, travel=travel) for tilt in few for travel in TRAVELS[depth]]
+    frictions = [Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS]
+    return tuple(dict.fromkeys(grid + travels + frictions))
+
+
+def wall_conditions() -> tuple[Condition, ...]:
+    """Stiffness and damping of the walls, at two tilts (C17)."""
+    return tuple(
+        Condition(tilt, stiffness=stiffness, damping=damping)
+        for tilt in (0.0, 0.1) for stiffness in STIFFNESSES for damping in DAMPINGS
+    )  # fmt: skip
+
+
+def describe(condition: Condition) -> dict[str, Any]:
+    """The condition with units, for a report."""
+    units = {"tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m"}
+    return {f"{name} [{units[name]}]" if units[name] else name: value for name, value in condition.record().items()}

@@ -1,0 +1,112 @@
+"""What the trajectory claims measure, each from one or two traces. Lengths in metres, angles in radians."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verification.claims.conditions import HALF_SIZE
+from verification.claims.trace import Trace
+
+Floats = NDArray[np.float64]
+
+# Slower than this in every coordinate is settled: 1 mm/s and 0.01 rad/s are below a hundredth of the peg's speed at
+# contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
+SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
+
+# A corner has left its wall where it is further away than this [m]; it touches it again at zero. A twentieth of the
+# static sink F_h / K, above the flicker of resting contacts.
+LIFTED = 1e-5
+
+
+def settled_at(trace: Trace) -> int:
+    """Return the state from which on the device is slower than SETTLED_SPEED; len(time) where it never is."""
+    moving = np.flatnonzero(np.any(np.abs(trace.device_velocity) > SETTLED_SPEED, axis=1))
+    return int(moving[-1]) + 1 if len(moving) else 0
+
+
+def settling_time(trace: Trace) -> float | None:
+    """Return when the device came to rest, counted from its first contact [s]; None where it has not yet."""
+    state = settled_at(trace)
+    if state >= len(trace.time):
+        return None
+    return max(float(trace.time[state] - trace.time[min(trace.first_contact, len(trace.time) - 1)]), 0.0)
+
+
+def comparison_window(ideal: Trace) -> slice:
+    """States from the ideal world's first contact to its settling, or to the end where it does not settle."""
+    start = min(ideal.first_contact, len(ideal.time) - 2)
+    return slice(start, max(settled_at(ideal), start + 2))
+
+
+def root_mean_square(trace: Trace, ideal: Trace) -> Floats:
+    """Return the RMS distance of the two device trajectories per coordinate (3,) over the comparison window."""
+    window = comparison_window(ideal)
+    return np.sqrt(np.mean((trace.device[window] - ideal.device[window]) ** 2, axis=0))
+
+
+def largest_distance(trace: Trace, ideal: Trace) -> Floats:
+    """Return the largest distance of the two device trajectories per coordinate (3,) over the comparison window."""
+    window = comparison_window(ideal)
+    return np.max(np.abs(trace.device[window] - ideal.device[window]), axis=0)
+
+
+def momentum_distance(trace: Trace, ideal: Trace) -> Floats:
+    """Return the RMS distance of the momenta that the actuators have given so far, per coordinate [N s, N m s].
+
+    Forces are compared through their time integral: a spike of one step that comes one step later is then a small
+    difference, where the force itself differs by all of its height.
+    """
+    given = np.cumsum(trace.device_force - ideal.device_force, axis=0) * ideal.dt
+    window = comparison_window(ideal)
+    return np.sqrt(np.mean(given[window] ** 2, axis=0))
+
+
+def peak_force(trace: Trace) -> Floats:
+    """Return the largest force of the device's actuators per coordinate (3,) [N, N m]."""
+    return np.max(np.abs(trace.device_force), axis=0, initial=0.0)
+
+
+def resting_force(trace: Trace) -> Floats | None:
+    """Return the mean actuator force after settling (3,) [N, N m]; None where the device has not settled."""
+    state = settled_at(trace)
+    return None if state >= len(trace.device_force) else np.mean(trace.device_force[state:], axis=0)
+
+
+def deepest_penetration(trace: Trace) -> float:
+    """Return the largest overlap of tool and walls [m]."""
+    return float(np.max(trace.penetration, initial=0.0))
+
+
+def largest_separation(trace: Trace) -> Floats:
+    """Return the largest difference of tool and device per coordinate (3,)."""
+    return np.max(np.abs(trace.tool - trace.device), axis=0)
+
+
+def bounces(trace: Trace) -> int:
+    """Return how often a corner of the device's peg leaves a wall that it has touched."""
+    return sum(_departures(gap) for gap in corner_gaps(trace.device))
+
+
+def corner_gaps(positions: Floats) -> list[Floats]:
+    """Return the gap of each of the four corners to the right wall (x = 0) and to the floor (y = 0) over time [m]."""
+    x, y, theta = positions.T
+    c, s = np.cos(theta), np.sin(theta)
+    gaps = []
+    for sign_a in (-1.0, 1.0):
+        for sign_b in (-1.0, 1.0):
+            a, b = sign_a * HALF_SIZE[0], sign_b * HALF_SIZE[1]
+            gaps += [x + a * c - b * s, -(y + a * s + b * c)]
+    return gaps
+
+
+def _departures(gap: Floats) -> int:
+    """Times the gap goes above LIFTED after having been at or below zero."""
+    events = np.where(gap <= 0.0, 1, np.where(gap > LIFTED, -1, 0))
+    events = events[events != 0]
+    return int(np.sum((events[:-1] == 1) & (events[1:] == -1)))
+
+
+def share_limited(trace: Trace) -> float:
+    """Return the share of the impacts that the device's limits cut."""
+    return float(np.mean(trace.impact_scale < 1.0)) if len(trace.impact_scale) else 0.0

@@ -1,0 +1,126 @@
+"""Study: runs the scenes that the claims call for, each once, and hands out their traces.
+
+    check_claims()                              every claim with `reference.worlds.run_world`
+    check_claims(run=lambda scene, world, rendering: ...)     with runs from a store
+
+Nothing is written here; whoever wants the runs kept passes a `run` that keeps them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from iapb.errors import ArgumentError
+from iapb.run import Run
+from iapb.scene import Scene
+from verification.claims.claim import ClaimResult
+from verification.claims.conditions import Condition, describe, start_conditions, wall_conditions
+from verification.claims.trace import Trace, trace_of
+
+Runner = Callable[[Scene, str, str], Run]
+
+DEPTHS = ("quick", "full")
+RIGID = ("ideal", "CBuc")
+SEED = 20050601  # of the random instances; the month the paper appeared
+
+
+def run_directly(scene: Scene, world: str, rendering: str) -> Run:
+    """Simulate without a store."""
+    from reference.worlds import run_world
+
+    return run_world(scene, world, rendering)
+
+
+@dataclass
+class Study:
+    """What a claim computes with.
+
+    run : (scene, world, rendering) -> Run
+    depth : "quick" or "full", how fine the conditions are
+    seed : of the random impacts
+    """
+
+    run: Runner = run_directly
+    depth: str = "quick"
+    seed: int = SEED
+    _traces: dict[tuple[Any, ...], Trace] = field(default_factory=dict, repr=False)
+    _scenes: dict[Any, Scene] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.depth not in DEPTHS:
+            raise ArgumentError("depth", self.depth, "one of " + ", ".join(DEPTHS))
+
+    def scene(self, name: str) -> Scene:
+        """A scene that comes with the project."""
+        from iapb.scene import load_scene
+        from iapb.scene_files import find_scene
+
+        if name not in self._scenes:
+            self._scenes[name] = load_scene(find_scene(name))
+        return self._scenes[name]
+
+    def starts(self) -> tuple[Condition, ...]:
+        """The starting conditions of the peg at this depth."""
+        return start_conditions(self.depth)
+
+    def trace(self, condition: Condition, world: str, rendering: str = "full") -> Trace:
+        """The peg under a condition in a world; rigid worlds see neither friction nor penalties."""
+        seen = condition.rigid() if world in RIGID else condition
+        key = (seen, world, rendering)
+        if key not in self._traces:
+            run = self.run(self._placed(seen), world, rendering)
+            self._traces[key] = trace_of(run)
+        return self._traces[key]
+
+    def _placed(self, condition: Condition) -> Scene:
+        if condition not in self._scenes:
+            self._scenes[condition] = condition.place(self.scene("peg_corner"))
+        return self._scenes[condition]
+
+    @property
+    def runs_done(self) -> int:
+        """Simulations asked for so far."""
+        return len(self._traces)
+
+
+def check_claims(
+    run: Runner = run_directly,
+    depth: str = "quick",
+    ids: Sequence[str] | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> tuple[ClaimResult, ...]:
+    """Check the paper's claims and return one record each.
+
+    Parameters
+    ----------
+    run : (scene, world, rendering) -> Run, called once per different simulation
+    depth : "quick" (about a minute) or "full"
+    ids : the claims to check; default all
+    progress : called as progress(claims done, claims in all, id of the next)
+
+    Raises
+    ------
+    ArgumentError
+        An unknown depth or claim.
+    """
+    from verification.claims import CLAIMS
+
+    unknown = [name for name in ids or () if name not in CLAIMS]
+    if unknown:
+        raise ArgumentError("ids", unknown, "some of " + ", ".join(CLAIMS))
+    chosen = tuple(CLAIMS) if ids is None else tuple(ids)
+    study, results = Study(run, depth), []
+    for done, name in enumerate(chosen):
+        if progress is not None:
+            progress(done, len(chosen), name)
+        results.append(CLAIMS[name].check(study))
+    if progress is not None:
+        progress(len(chosen), len(chosen), "")
+    return tuple(results)
+
+
+def conditions(depth: str = "quick") -> tuple[dict[str, Any], ...]:
+    """Every variation of the peg scene that the claims of this depth compute, for a report."""
+    return tuple(describe(condition) for condition in dict.fromkeys(start_conditions(depth) + wall_conditions()))
