@@ -1,1 +1,36 @@
-"""Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns records, writes no files."""
+"""Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns records, writes no files.
+
+The names below are loaded when first used, so that ``import verification`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from verification.accuracy_time import work_precision as work_precision
+    from verification.hard_cases import judge_hard_cases as judge_hard_cases
+    from verification.properties import bulk_impacts as bulk_impacts
+    from verification.properties import check_passivity as check_passivity
+
+_HOME = {
+    "check_passivity": "verification.properties",
+    "bulk_impacts": "verification.properties",
+    "judge_hard_cases": "verification.hard_cases",
+    "work_precision": "verification.accuracy_time",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'verification' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -105,7 +105,7 @@ def _least_norm_of(work: ImpactWork, length: Floats, rank: int, change: Floats) 
     return impulses
 
 
-def _from_impulses(problem: ImpactInput, impulses: Floats, rank: int, clamped: bool) -> Whitened:
+def _from_impulses(problem: ImpactInput, impulses: NDArray[np.floating], rank: int, clamped: bool) -> Whitened:
     """v⁺ = v⁻ + M⁻¹Jᵀp as (9) says, for a method that computes p first."""
     work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
@@ -130,7 +130,7 @@ def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float
     cutoff = PINV_CUTOFF if tolerance is None else tolerance
     singular_values = np.linalg.svd(W, compute_uv=False)
     rank = int(np.sum(singular_values > cutoff * singular_values[0]))
-    impulses: Floats = -(1.0 + problem.restitution) * size * (np.linalg.pinv(W, rcond=cutoff) @ gamma)
+    impulses = -(1.0 + problem.restitution) * size * (np.linalg.pinv(W, rcond=cutoff) @ gamma)
     return _from_impulses(problem, impulses, rank, clamped)
 
 
@@ -158,7 +158,7 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
     W, gamma = _delassus(problem)
     share = DAMPING if tolerance is None else tolerance
     regular = W + share * max(float(np.max(np.diag(W))), float(np.finfo(float).tiny)) * np.eye(len(W))
-    impulses: Floats = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
+    impulses = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
     return _from_impulses(problem, impulses, problem.contacts, clamped)
 
 

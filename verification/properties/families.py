@@ -1,0 +1,100 @@
+"""Random impacts of many kinds, drawn by numpy: the bulk of the evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from verification.properties.case import Floats, ImpactCase
+
+MASS_KINDS = ("spectral", "graded", "arrow", "diagonal", "identity")
+# Nearly dependent rows come three times: most bugs of rank and conditioning live there.
+ROW_KINDS = ("generic", "kinetic", "dependent", "scaled", "copies", "zeros", "none", "cradle")
+ROW_KINDS += 3 * ("nearly dependent",)
+VELOCITY_KINDS = ("normal", "kinetic normal", "light direction", "grazing", "unseen")
+RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
+
+
+def draw_case(rng: np.random.Generator, largest_condition: float = 1e8, largest_size: int = 10) -> ImpactCase:
+    """Return one random impact with κ(M) up to `largest_condition`."""
+    rows_kind = str(rng.choice(ROW_KINDS))
+    d = int(rng.integers(1, largest_size + 1))
+    condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
+    mass_kind = "diagonal" if rows_kind == "cradle" else str(rng.choice(MASS_KINDS))
+    mass = draw_mass_matrix(rng, mass_kind, d, condition)
+    rows, closeness = draw_rows(rng, rows_kind, mass)
+    velocity_kind = str(rng.choice(VELOCITY_KINDS))
+    v = draw_velocity(rng, velocity_kind, mass, rows)
+    e = float(rng.uniform(-1.0, 1.0)) if rng.random() < 0.4 else float(rng.choice(RESTITUTIONS))
+    translations = np.ones((1, d)) if rows_kind == "cradle" else None
+    name = f"{mass_kind} mass, {rows_kind} rows{closeness}, {velocity_kind} velocity"
+    return ImpactCase(mass, rows, v, e, name, translations)
+
+
+def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: float) -> Floats:
+    """Return a symmetric positive definite M (d, d) whose κ is of the order of `condition`."""
+    spectrum = condition ** -np.sort(rng.uniform(0.0, 1.0, size=d))
+    spectrum[0], spectrum[-1] = 1.0, (1.0 / condition if d > 1 else 1.0)
+    if kind == "identity":
+        return np.eye(d)
+    if kind == "diagonal":
+        return np.diag(rng.permutation(spectrum))
+    if kind == "graded":  # a well conditioned matrix in units that differ
+        s = np.sqrt(rng.permutation(spectrum))
+        inner = draw_mass_matrix(rng, "spectral", d, 10.0)
+        return s[:, None] * inner * s
+    if kind == "arrow":  # one body coupled to many
+        mass = np.diag(spectrum)
+        mass[0, 1:] = mass[1:, 0] = 0.9 * np.sqrt(spectrum[1:] / d) * rng.choice([-1.0, 1.0], size=d - 1)
+        return mass
+    basis = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass = basis * spectrum @ basis.T
+    return 0.5 * (mass + mass.T)
+
+
+def draw_rows(rng: np.random.Generator, kind: str, mass: Floats) -> tuple[Floats, str]:
+    """Return J (c, d) of the kind, and a word on how close to dependent its rows are."""
+    d = len(mass)
+    c = int(rng.integers(1, 2 * d + 2))
+    generic = rng.normal(size=(c, d))
+    generic /= np.linalg.norm(generic, axis=1, keepdims=True)
+    rank = int(rng.integers(1, min(c, d) + 1))
+    if kind == "none":
+        return np.zeros((0, d)), ""
+    if kind == "kinetic":  # random in the kinetic metric, so that light and heavy directions mix
+        return generic @ np.linalg.cholesky(mass).T, ""
+    if kind == "dependent":
+        return rng.integers(-2, 3, size=(c, rank)) @ generic[:rank], ""
+    if kind == "nearly dependent":
+        closeness = 10.0 ** -rng.uniform(1.0, 16.0)
+        return generic[rng.integers(0, rank, size=c)] + closeness * generic, f" ({closeness:.0e})"
+    if kind == "scaled":
+        return 10.0 ** rng.uniform(-8.0, 8.0, size=(c, 1)) * generic, ""
+    if kind == "copies":
+        return np.tile(generic[:rank], (int(rng.integers(2, 6)), 1)), ""
+    if kind == "zeros":
+        return generic * (rng.random((c, 1)) < 0.5), ""
+    if kind == "cradle":
+        return cradle_rows(d), ""
+    return generic, ""
+
+
+def cradle_rows(d: int) -> Floats:
+    """Bodies in a line, each against the next: rows with +1 and −1."""
+    return np.eye(d)[: d - 1] - np.eye(d, k=1)[: d - 1]
+
+
+def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Floats) -> Floats:
+    """Return v (d,): normal, with Lᵀv normal, along M's lightest direction, barely seen or unseen by the rows."""
+    d = len(mass)
+    v = rng.normal(size=d)
+    lower = np.linalg.cholesky(mass)
+    if kind == "kinetic normal":
+        return np.linalg.solve(lower.T, v)
+    if kind == "light direction":
+        return np.linalg.eigh(mass)[1][:, 0]
+    if kind in ("grazing", "unseen") and len(rows):
+        right = np.linalg.svd(rows)[2]
+        unseen = right[min(len(rows), d - 1) :]
+        along = unseen.T @ (unseen @ v)
+        return along + (1e-9 * v if kind == "grazing" else 0.0)
+    return v

@@ -1,0 +1,205 @@
+"""Resolvers with one planted bug each, and the sound one they are made from: the kit must tell them apart.
+
+All are plain numpy, written apart from the engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from verification.properties.case import Floats, Resolver
+
+_RANK_CUT = 1e-10
+
+
+class _Parts(NamedTuple):
+    """M = L Lᵀ, u = Lᵀv, unit rows of A."""
+
+    lower: Floats
+    u: Floats
+    rows: Floats
+
+
+def _whitened(M: Floats, J: Floats, v: Floats) -> _Parts:
+    lower = np.linalg.cholesky(M)
+    rows = np.linalg.solve(lower, J.T).T
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return _Parts(lower, lower.T @ v, np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0))
+
+
+def _row_space(rows: Floats, cut: float = _RANK_CUT) -> Floats:
+    _, values, right = np.linalg.svd(rows, full_matrices=False)
+    return right[values > cut]
+
+
+def _back(parts: _Parts, u_plus: Floats) -> Floats:
+    return np.linalg.solve(parts.lower.T, u_plus)
+
+
+def _projecting(M: Floats, J: Floats, v: Floats, factor: float, cut: float = _RANK_CUT) -> Floats:
+    parts = _whitened(M, J, v)
+    Q = _row_space(parts.rows, cut)
+    return _back(parts, parts.u - factor * (Q.T @ (Q @ parts.u)))
+
+
+def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """u⁺ = u − (1 + e) Qᵀ Q u, Q from the singular value decomposition of the unit rows of A."""
+    return _projecting(M, J, v, 1.0 + e)
+
+
+def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, -(1.0 + e))
+
+
+def squared_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, 1.0 + e * e)
+
+
+def lost_one_plus(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, e)
+
+
+def missing_half(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, 0.5 * (1.0 + e))
+
+
+def too_loose_rank(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, 1.0 + e, cut=1e-2)
+
+
+def too_tight_rank(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(M, J, v, 1.0 + e, cut=1e-18)
+
+
+def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """L where Lᵀ belongs."""
+    parts = _whitened(M, J, v)
+    Q, u = _row_space(parts.rows), parts.lower @ v
+    return np.linalg.solve(parts.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
+
+
+def forgotten_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return _projecting(np.eye(len(v)), J, v, 1.0 + e)
+
+
+def diagonal_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Coupling between coordinates dropped."""
+    return _projecting(np.diag(np.diag(M)), J, v, 1.0 + e)
+
+
+def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Keeps energy and restitution, and needs no contact at all."""
+    return -e * v
+
+
+def one_after_the_other(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Each contact resolved once, in order: later ones undo earlier ones."""
+    parts = _whitened(M, J, v)
+    u = parts.u.copy()
+    for row in parts.rows:
+        u -= (1.0 + e) * (row @ u) * row
+    return _back(parts, u)
+
+
+def double_counted(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Impulses of all contacts added as if each were alone."""
+    parts = _whitened(M, J, v)
+    return _back(parts, parts.u - (1.0 + e) * (parts.rows.T @ (parts.rows @ parts.u)))
+
+
+def approaching_only(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Leaves out the rows that separate, which the caller chose to give."""
+    return sound_resolver(M, J[J @ v < 0.0], v, e)
+
+
+def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Adhesive impulses set to zero one by one."""
+    parts = _whitened(M, J, v)
+    p = -(1.0 + e) * (np.linalg.pinv(parts.rows.T, rcond=_RANK_CUT) @ parts.u)
+    return _back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
+
+
+def printed_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """(21) as printed, with numpy's classical cutoff: W squares the condition number, pinv inverts noise."""
+    X = np.linalg.solve(M, J.T)
+    return v - (1.0 + e) * (X @ (np.linalg.pinv(J @ X, rcond=1e-15) @ (J @ v)))
+
+
+def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """(13)-(14): the two bodies of a self-collision are reversed separately (here: positive and negative entries)."""
+    split = np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)])
+    return sound_resolver(M, split, v, e)
+
+
+def single_precision(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return sound_resolver(M, J, v, e).astype(np.float32).astype(np.float64)
+
+
+def damped_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """(W + λI)⁻¹ with a λ that one can see."""
+    X = np.linalg.solve(M, J.T)
+    W = J @ X
+    return v - (1.0 + e) * (X @ np.linalg.solve(W + 1e-3 * np.eye(len(W)), J @ v))
+
+
+def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Rank decided on rows of unlike scale: the small ones are lost."""
+    lower = np.linalg.cholesky(M)
+    rows = np.linalg.solve(lower, J.T).T
+    _, values, right = np.linalg.svd(rows, full_matrices=False)
+    Q = right[values > 1e-6 * np.max(values, initial=0.0)]
+    u = lower.T @ v
+    return np.linalg.solve(lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
+
+
+def fails_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))
+
+
+def makes_stale_jacobian() -> Resolver:
+    """Remembers the Jacobian of the first call of each shape."""
+    remembered: dict[tuple[int, ...], Floats] = {}
+
+    def stale_jacobian(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+        return sound_resolver(M, remembered.setdefault(J.shape, J), v, e)
+
+    return stale_jacobian
+
+
+class PlantedBug(NamedTuple):
+    """A bug by name: how to make the resolver, and a law that must catch it (others may as well)."""
+
+    make: Callable[[], Resolver]
+    caught_by: str
+
+
+def _plain(resolver: Resolver, caught_by: str) -> PlantedBug:
+    return PlantedBug(lambda: resolver, caught_by)
+
+
+PLANTED_BUGS: dict[str, PlantedBug] = {
+    "wrong_sign": _plain(wrong_sign, "kinetic_energy"),
+    "squared_restitution": _plain(squared_restitution, "restitution"),
+    "lost_one_plus": _plain(lost_one_plus, "restitution"),
+    "missing_half": _plain(missing_half, "restitution"),
+    "too_loose_rank": _plain(too_loose_rank, "restitution"),
+    "too_tight_rank": _plain(too_tight_rank, "free_motion"),
+    "transposed_factor": _plain(transposed_factor, "impulse_range"),
+    "forgotten_mass": _plain(forgotten_mass, "kinetic_energy"),
+    "diagonal_mass": _plain(diagonal_mass, "coordinates"),
+    "reversed_velocity": _plain(reversed_velocity, "impulse_range"),
+    "one_after_the_other": _plain(one_after_the_other, "row_order"),
+    "double_counted": _plain(double_counted, "duplicated_rows"),
+    "approaching_only": _plain(approaching_only, "restitution"),
+    "pulling_clipped": _plain(pulling_clipped, "restitution"),
+    "printed_formula": _plain(printed_formula, "kinetic_energy"),
+    "per_body_rows": _plain(per_body_rows, "momentum"),
+    "single_precision": _plain(single_precision, "restitution"),
+    "damped_formula": _plain(damped_formula, "restitution"),
+    "unscaled_rows": _plain(unscaled_rows, "row_scaling"),
+    "fails_without_contacts": _plain(fails_without_contacts, "kinetic_energy"),
+    "stale_jacobian": PlantedBug(makes_stale_jacobian, "restitution"),
+}

@@ -1,0 +1,89 @@
+"""Make a failing impact smaller while it still fails: fewer rows, fewer coordinates, rounder numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from verification.properties.case import ImpactCase
+
+_DIGITS = (0, 1, 2, 4, 8)
+
+
+def search_counterexample(
+    fails: Callable[[ImpactCase], bool], examples: int, seed: int, largest_exponent: int = 8
+) -> ImpactCase | None:
+    """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing."""
+    import random
+
+    from hypothesis import HealthCheck, Phase, find, settings
+    from hypothesis.errors import NoSuchExample
+
+    from verification.properties.strategies import impact_cases
+
+    profile = settings(
+        max_examples=examples,
+        database=None,
+        deadline=None,
+        phases=(Phase.generate, Phase.shrink),
+        suppress_health_check=list(HealthCheck),
+    )
+    try:
+        return find(impact_cases(largest_exponent), fails, settings=profile, random=random.Random(seed))
+    except NoSuchExample:
+        return None
+
+
+def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
+    """Return a smaller case that still fails, greedily; the case itself if nothing smaller does."""
+    improved = True
+    while improved:
+        improved = False
+        for smaller in _smaller(case):
+            if _is_valid(smaller) and fails(smaller):
+                case, improved = smaller, True
+                break
+    return case
+
+
+def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
+    for i in range(case.contacts):
+        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0))
+    if case.coordinates > 1 and case.translations is None:
+        for k in range(case.coordinates):
+            yield _without_coordinate(case, k)
+    for e in (1.0, 0.0):
+        if case.restitution not in (1.0, e):
+            yield replace(case, restitution=e)
+    for digits in _DIGITS:
+        for name in ("velocity", "contact_jacobian", "mass_matrix"):
+            yield from _rounded(case, name, digits)
+
+
+def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
+    return replace(
+        case,
+        mass_matrix=np.delete(np.delete(case.mass_matrix, k, axis=0), k, axis=1),
+        contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
+        velocity=np.delete(case.velocity, k),
+    )
+
+
+def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
+    """The array in `digits` decimals, if that changes it and it was not rounder already."""
+    array = getattr(case, name)
+    rounder = np.round(array, digits)
+    if _written(rounder) < _written(array):
+        yield replace(case, **{name: rounder})
+
+
+def _written(array: np.ndarray) -> int:
+    """Length of the array as text: the measure of roundness, so that shrinking ends."""
+    return sum(len(repr(float(x))) for x in array.ravel())
+
+
+def _is_valid(case: ImpactCase) -> bool:
+    values = np.linalg.eigvalsh(case.mass_matrix)
+    return bool(values[0] > 1e-14 * values[-1])

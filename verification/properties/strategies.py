@@ -1,0 +1,61 @@
+"""Hypothesis strategies: impacts of small whole numbers and powers of ten, which shrink to something one can read."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from verification.properties.case import Floats, ImpactCase
+from verification.properties.families import cradle_rows
+
+
+@st.composite
+def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
+    """M = T D Tᵀ with T unit triangular of small whole numbers and D powers of ten, κ of order 10^largest_exponent."""
+    powers = draw(st.lists(st.integers(-largest_exponent, 0), min_size=d, max_size=d))
+    entries = draw(st.lists(st.integers(-1, 1), min_size=d * d, max_size=d * d))
+    T = np.tril(np.reshape(entries, (d, d)).astype(float), -1) + np.eye(d)
+    mass = T * 10.0 ** np.array(powers, dtype=float) @ T.T
+    return 0.5 * (mass + mass.T)
+
+
+@st.composite
+def contact_jacobians(draw: st.DrawFn, d: int, largest: int = 5) -> Floats:
+    """Whole-number rows; some are copies of others moved by a power of ten, some are zero."""
+    c = draw(st.integers(0, largest))
+    rows = np.zeros((c, d))
+    for i in range(c):
+        rows[i] = draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d))
+        if i and draw(st.booleans()):  # close to the row before, at a distance from 0.1 to rounding
+            rows[i] = rows[i - 1] + 10.0 ** -draw(st.integers(1, 16)) * rows[i]
+    return rows
+
+
+@st.composite
+def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
+    """Small whole numbers, as v or as Lᵀv, or M's lightest direction."""
+    d = len(mass)
+    whole = np.array(draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d)), dtype=float)
+    kind = draw(st.sampled_from(["v", "u", "light"]))
+    if kind == "u":
+        return np.linalg.solve(np.linalg.cholesky(mass).T, whole)
+    return np.linalg.eigh(mass)[1][:, 0] if kind == "light" else whole
+
+
+def restitutions() -> st.SearchStrategy[float]:
+    """e: the four that matter, or any."""
+    return st.one_of(st.sampled_from([1.0, 0.0, -1.0, 0.5]), st.floats(-1.0, 1.0))
+
+
+@st.composite
+def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int = 4) -> ImpactCase:
+    """An impact with κ(M) about 10^largest_exponent at most."""
+    d = draw(st.integers(1, largest_size))
+    if draw(st.booleans()):
+        masses = 10.0 ** np.array(draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d)), dtype=float)
+        mass: Floats = np.diag(masses)
+        return ImpactCase(
+            mass, cradle_rows(d), draw(velocities(mass)), draw(restitutions()), "cradle", np.ones((1, d))
+        )
+    mass, rows = draw(mass_matrices(d, largest_exponent)), draw(contact_jacobians(d))
+    return ImpactCase(mass, rows, draw(velocities(mass)), draw(restitutions()), "whole numbers")
