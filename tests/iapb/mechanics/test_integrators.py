@@ -1,0 +1,103 @@
+"""Each integrator shows the order it declares, on vector coordinates and on quaternions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from iapb.mechanics.integrators import INTEGRATORS, Integrator, integrator
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+
+FIELD = np.array([0.0, -9.81, 0.0])
+DURATION = 0.5  # [s]
+STEPS = 50  # of the coarsest run: small enough a step for the leading error term to rule
+ORDER_TOLERANCE = 0.15  # next error term at these steps
+ROD = np.diag([0.0, 1 / 12, 1 / 12])
+
+
+def double_pendulum():
+    upper = Body("upper", None, Joint("revolute"), mass=1.0, center_of_mass=(0.5, 0, 0), inertia=ROD)
+    placement = (np.eye(3), (1.0, 0, 0))
+    lower = Body("lower", "upper", Joint("revolute"), placement, 1.0, (0.5, 0, 0), ROD)
+    return Mechanism([upper, lower]), np.array([0.3, 0.5]), np.array([1.0, -2.0])
+
+
+def tumbling_body():
+    body = Body(
+        "body",
+        None,
+        Joint("free_flyer"),
+        (np.eye(3), np.zeros(3)),
+        1.3,
+        (0.1, 0.2, -0.1),
+        np.diag([0.1, 0.2, 0.35]),
+    )
+    mechanism = Mechanism([body])
+    return mechanism, mechanism.neutral(), np.array([0.1, 0.2, 0.3, 1.0, 2.0, -1.0])
+
+
+def state_after(problem, method, steps):
+    mechanism, q, v = problem
+
+    def acceleration(q, v):
+        return np.linalg.solve(mechanism.mass_matrix(q), -mechanism.bias(q, v) - mechanism.gravity(q, FIELD))
+
+    for _ in range(steps):
+        q, v = method.step(mechanism.integrate, acceleration, q, v, DURATION / steps)
+    return q, v
+
+
+def measured_order(problem, method):
+    truth_q, truth_v = state_after(problem, INTEGRATORS["runge_kutta_4"], 16 * STEPS)
+    errors = []
+    for steps in (STEPS, 2 * STEPS):
+        q, v = state_after(problem, method, steps)
+        errors.append(np.linalg.norm(np.concatenate([problem[0].difference(q, truth_q), v - truth_v])))
+    return np.log2(errors[0] / errors[1])
+
+
+@pytest.mark.parametrize("problem", [double_pendulum, tumbling_body])
+@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
+def test_measured_order_is_the_declared_one(method, problem):
+    assert measured_order(problem(), method) == pytest.approx(method.order, abs=ORDER_TOLERANCE)
+
+
+def test_a_wrong_weight_is_seen_as_a_lower_order():
+    wrong = Integrator("wrong midpoint", 2, 2, (0.0, 0.5), (0.1, 0.9))
+    assert measured_order(double_pendulum(), wrong) < 2.0 - 3.0 * ORDER_TOLERANCE
+
+
+def one_displacement(method, integrate, acceleration, q, v, dt):
+    """The compiled step's way: stages on lines, one displacement with the mean velocity."""
+    stages, rate, change, place = [], v, acceleration(q, v), q
+    for i, (fraction, weight) in enumerate(zip(method.fraction, method.weight, strict=True)):
+        if i > 0:
+            place, rate = integrate(q, rate, fraction * dt), v + fraction * dt * change
+            change = acceleration(place, rate)
+        stages.append((weight, rate, change))
+    mean_rate = sum(weight * rate for weight, rate, _ in stages)
+    v_next = v + dt * sum(weight * change for weight, _, change in stages)
+    return integrate(q, v_next if method.semi_implicit else mean_rate, dt), v_next
+
+
+@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
+def test_the_compiled_form_keeps_the_group_order(method):
+    class Compiled:
+        @staticmethod
+        def step(*given):
+            return one_displacement(method, *given)
+
+    assert measured_order(tumbling_body(), Compiled) == pytest.approx(method.group_order, abs=ORDER_TOLERANCE)
+    assert measured_order(double_pendulum(), Compiled) == pytest.approx(method.order, abs=ORDER_TOLERANCE)
+
+
+@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
+def test_weights_and_stages_are_consistent(method):
+    assert sum(method.weight) == pytest.approx(1.0, abs=1e-15)
+    assert method.fraction[0] == 0.0 and len(method.fraction) == len(method.weight)
+
+
+def test_an_unknown_name_is_an_error_that_lists_the_known():
+    with pytest.raises(ArgumentError, match="midpoint"):
+        integrator("leapfrog")

@@ -1,0 +1,201 @@
+"""Laws of the equations of motion, over random trees and on mechanisms small enough to know by heart."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError
+from iapb.mechanics.joints import KINDS
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from reference.random_mechanisms import random_mechanism, random_state
+
+FIELD = np.array([0.3, -9.0, 2.0])  # a gravity field along no axis
+SCALED_CONDITION = 1e12  # beyond it a correct M may round to an indefinite one
+STEP = 1e-5  # of central differences: error STEP^2, rounding eps / STEP
+
+moving_kinds = tuple(kind for kind in KINDS if kind != "fixed")
+seeds = st.integers(0, 2**32 - 1)
+
+
+def rod(name, parent, x, joint=None):
+    inertia = np.diag([0.0, 1.0 / 12.0, 1.0 / 12.0])
+    return Body(name, parent, joint or Joint("revolute"), (np.eye(3), (x, 0, 0)), 1.0, (0.5, 0, 0), inertia)
+
+
+def two_link_arm():
+    return Mechanism([rod("upper", None, 0.0), rod("lower", "upper", 1.0)])
+
+
+def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
+    arm = two_link_arm()
+    for angle in (0.0, 0.4, 2.0):
+        c, s = np.cos(angle), np.sin(angle)
+        expected = np.array([[5 / 3 + c, 1 / 3 + c / 2], [1 / 3 + c / 2, 1 / 3]])
+        np.testing.assert_allclose(arm.mass_matrix([1.1, angle]), expected, rtol=1e-14)
+        u, w = 0.7, -1.3
+        expected = [-s * u * w - s * w * w / 2, s * u * u / 2]
+        np.testing.assert_allclose(arm.bias([1.1, angle], [u, w]), expected, atol=1e-15)
+    assert arm.kinetic_energy([np.pi / 2, 0.0], [1.0, 1.0]) == pytest.approx(7.0 / 3.0, rel=1e-15)
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(1, 12), st.integers(1, 3))
+def test_the_mass_matrix_is_symmetric_block_diagonal_and_positive(seed, joints, trees):
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, joints, moving_kinds, trees)
+    q, v = random_state(rng, mechanism)
+    mass = mechanism.mass_matrix(q)
+    assert (mass == mass.T).all()
+    outside = np.ones_like(mass, dtype=bool)
+    for start, stop in mechanism.tree_dofs:
+        outside[start:stop, start:stop] = False
+    assert (mass[outside] == 0.0).all()
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    scaled = mass * np.outer(scale, scale)
+    if np.linalg.cond(scaled) <= SCALED_CONDITION:
+        assert np.linalg.eigvalsh(scaled)[0] > 0.0
+    by_bodies = mechanism.kinetic_energy(q, v)
+    assert 0.5 * v @ mass @ v == pytest.approx(by_bodies, rel=1e-10)
+
+
+def energy_rate(mechanism, q, v, dv):
+    """d(KE + PE)/dt along the motion, by a central difference."""
+
+    def energy(h):
+        there, rate = mechanism.integrate(q, v + 0.5 * h * dv, h), v + h * dv
+        return mechanism.kinetic_energy(there, rate) + mechanism.potential_energy(there, FIELD)
+
+    return (energy(STEP) - energy(-STEP)) / (2.0 * STEP)
+
+
+def power_gap(mechanism, q, v, dv, tau):
+    """|dE/dt - tau . v| relative to the power of the single forces."""
+    force = np.abs(tau) + np.abs(mechanism.bias(q, v)) + np.abs(mechanism.gravity(q, FIELD))
+    return abs(energy_rate(mechanism, q, v, dv) - tau @ v) / max(float(force @ np.abs(v)), 1e-3)
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(1, 6))
+def test_power_balance(seed, joints):
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, joints, moving_kinds)
+    q, v = random_state(rng, mechanism, speed=0.3)
+    dv = rng.normal(size=mechanism.nv)
+    tau = mechanism.mass_matrix(q) @ dv + mechanism.bias(q, v) + mechanism.gravity(q, FIELD)
+    np.testing.assert_allclose(
+        tau, mechanism.inverse_dynamics(q, v, dv, FIELD), atol=1e-12 * np.abs(tau).max(), rtol=0
+    )
+    assert power_gap(mechanism, q, v, dv, tau) <= 1e-5
+
+
+def test_power_balance_sees_a_missing_coriolis_term():
+    arm, q, v, dv = two_link_arm(), np.array([0.3, 1.0]), np.array([1.0, -2.0]), np.array([0.5, 0.2])
+    tau = arm.mass_matrix(q) @ dv + arm.gravity(q, FIELD)
+    assert power_gap(arm, q, v, dv, tau) > 1e-2
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 8))
+def test_jacobians_are_the_derivatives_of_positions(seed, joints):
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, joints, moving_kinds)
+    q, v = random_state(rng, mechanism)
+    body = joints - 1
+    rotations, positions = mechanism.placements(q)
+    local = rng.normal(size=3)
+
+    def place(h):
+        there, origin = mechanism.placements(mechanism.integrate(q, v, h))
+        return origin[body] + there[body] @ local, there[body]
+
+    (after, turned), (before, unturned) = place(STEP), place(-STEP)
+    point = positions[body] + rotations[body] @ local
+    np.testing.assert_allclose(
+        mechanism.point_jacobian(q, body, point) @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6
+    )
+    spin = (turned - unturned) @ rotations[body].T / (2 * STEP)
+    turning = mechanism.frame_jacobian(q, body)[3:] @ v
+    np.testing.assert_allclose(turning, [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-6, rtol=1e-6)
+
+
+@settings(max_examples=25)
+@given(seeds)
+def test_the_order_of_siblings_does_not_matter(seed):
+    rng = np.random.default_rng(seed)
+    chain = random_mechanism(rng, 3, moving_kinds).bodies
+    twig = random_mechanism(rng, 1, moving_kinds).bodies[0]
+    side = Body(
+        "side", chain[0].name, twig.joint, twig.placement, twig.mass, twig.center_of_mass, twig.inertia
+    )
+    last, early = Mechanism([*chain, side]), Mechanism([chain[0], side, *chain[1:]])
+    n, k = side.joint.layout.nv, chain[0].joint.layout.nv
+    d = last.nv
+    order = [*range(k), *range(d - n, d), *range(k, d - n)]  # velocities of `early` as entries of `last`
+    q, v = random_state(rng, last)
+    m, j = side.joint.layout.nq, chain[0].joint.layout.nq
+    q_early = np.concatenate([q[:j], q[last.nq - m :], q[j : last.nq - m]])
+    expected = last.mass_matrix(q)[np.ix_(order, order)]
+    np.testing.assert_allclose(early.mass_matrix(q_early), expected, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(early.bias(q_early, v[order]), last.bias(q, v)[order], rtol=1e-12, atol=1e-14)
+
+
+def test_a_copy_through_pickle_gives_the_same_numbers():
+    mechanism = random_mechanism(np.random.default_rng(1), 5, moving_kinds)
+    copy = pickle.loads(pickle.dumps(mechanism))
+    q, v = random_state(np.random.default_rng(2), mechanism)
+    assert (copy.mass_matrix(q) == mechanism.mass_matrix(q)).all() and (
+        copy.bias(q, v) == mechanism.bias(q, v)
+    ).all()
+
+
+def test_results_belong_to_the_caller():
+    arm = two_link_arm()
+    rotations, positions = arm.placements([0.1, 0.2])
+    before = rotations.copy(), positions.copy()
+    arm.placements([1.0, -2.0])
+    assert (rotations == before[0]).all() and (positions == before[1]).all()
+
+
+def test_names_units_and_layout():
+    ball = Body("ball", None, Joint("free_flyer"), mass=1.0, inertia=np.eye(3))
+    wheel = Body("wheel", "ball", Joint("continuous", (0, 0, 2)), mass=1.0, inertia=np.eye(3))
+    ground = Body("ground", None, Joint("fixed"))
+    mechanism = Mechanism([ball, wheel, ground])
+    assert (mechanism.nq, mechanism.nv) == (9, 7)
+    assert mechanism.coordinate_names[:3] == ("ball.x", "ball.y", "ball.z")
+    assert mechanism.coordinate_names[-2:] == ("wheel.cos", "wheel.sin")
+    assert mechanism.coordinate_units == ("m",) * 3 + ("1",) * 6
+    assert mechanism.velocity_units == ("m/s",) * 3 + ("rad/s",) * 4
+    assert mechanism.tree_dofs == [(0, 7), (7, 7)] and list(mechanism.tree_of_body) == [0, 0, 1]
+    np.testing.assert_array_equal(mechanism.neutral(), [0, 0, 0, 0, 0, 0, 1, 1, 0])
+
+
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda: Joint("hinge"), "kind"),
+        (lambda: Joint("revolute", (0, 0, 0)), "axis"),
+        (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
+        (lambda: Body("b", None, Joint("fixed"), mass=float("nan")), "mass"),
+        (lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))), "placement rotation"),
+        (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
+        (lambda: Mechanism([rod("a", "b", 0.0)]), "parent"),
+        (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
+        (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
+        (lambda: two_link_arm().mass_matrix([0.0]), "q"),
+        (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
+        (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
+        (
+            lambda: Mechanism([rod("a", None, 0, Joint("continuous"))]).mass_matrix([1.0, 1.0]),
+            "q of body 'a'",
+        ),
+    ],
+)
+def test_errors_name_the_argument(call, named):
+    with pytest.raises(ArgumentError, match=named):
+        call()
