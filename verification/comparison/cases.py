@@ -1,0 +1,185 @@
+"""Impacts to compare laws on: random families, each with the geometry that it is about.
+
+The rows of a case are those that approach (gamma_minus < 0), as the engine's caller gives them; contacts that touch
+and do not approach are kept apart, to see whether the impact makes them. Geometry is controlled in the kinetic
+metric, where it decides: with M = L Lᵀ, rows A = J L⁻ᵀ and u = Lᵀv, two contacts pull on one another when the
+cosine of their rows is positive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ImpactCase:
+    """One frictionless impact: M (d, d), J (c, d), v (d,), e, where it comes from, and rows (k, d) that only touch."""
+
+    family: str
+    mass_matrix: Floats
+    contact_jacobian: Floats
+    velocity: Floats
+    restitution: float
+    touching: Floats | None = None
+
+    @property
+    def contacts(self) -> int:
+        """c."""
+        return len(self.contact_jacobian)
+
+    @property
+    def redundancy(self) -> int:
+        """Rows beyond the rank of J."""
+        return self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian)) if self.contacts else 0
+
+
+@dataclass(frozen=True)
+class Family:
+    """A geometry: draw(rng, redundancy) -> (M, J, v), and the redundancies that it can have."""
+
+    name: str
+    says: str
+    draw: Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]
+    redundancies: tuple[int, ...]
+
+
+def random_cases(
+    count: int,
+    restitutions: tuple[float, ...] = (0.0, 0.5, 1.0),
+    families: tuple[str, ...] | None = None,
+    seed: int = 4,
+) -> Iterator[ImpactCase]:
+    """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same ones."""
+    unknown = set(families or ()) - set(FAMILIES)
+    if unknown:
+        raise ArgumentError("families", sorted(unknown), "some of " + ", ".join(FAMILIES))
+    for family in FAMILIES.values() if families is None else (FAMILIES[name] for name in families):
+        for redundancy in family.redundancies:
+            rng = np.random.default_rng([seed, list(FAMILIES).index(family.name), redundancy])
+            drawn = [family.draw(rng, redundancy) for _ in range(count)]
+            for e in restitutions:
+                for mass, rows, velocity in drawn:
+                    closing = rows @ velocity < 0.0
+                    yield ImpactCase(family.name, mass, rows[closing], velocity, e, rows[~closing])
+
+
+def two_contacts(cosine: float, speed_ratio: float, rng: np.random.Generator, coordinates: int = 4) -> ImpactCase:
+    """Two contacts whose unit rows have this cosine in the kinetic metric, closing at 1 and `speed_ratio`.
+
+    Lengths of the rows, the mass matrix and all motion along neither contact are random.
+    """
+    frame = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
+    rows = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine**2)]]) @ frame[:2]
+    closing = np.linalg.solve(rows @ frame[:2].T, [-1.0, -speed_ratio])
+    u = frame.T @ np.concatenate([closing, rng.normal(size=coordinates - 2)])
+    lower = np.linalg.cholesky(random_mass_matrix(rng, coordinates))
+    lengths = np.exp(rng.normal(size=(2, 1)))
+    return ImpactCase("two contacts", lower @ lower.T, lengths * (rows @ lower.T), np.linalg.solve(lower.T, u), 0.0)
+
+
+def random_mass_matrix(rng: np.random.Generator, coordinates: int) -> Floats:
+    """A symmetric positive definite matrix (d, d) with eigenvalues over two decades."""
+    axes = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
+    return np.asarray((axes * 10.0 ** rng.uniform(-1.0, 1.0, coordinates)) @ axes.T, np.float64)
+
+
+def _approaching(rows: Floats, velocity: Floats) -> Floats:
+    """Rows turned so that every contact closes."""
+    return np.where(rows @ velocity > 0.0, -1.0, 1.0)[:, None] * rows
+
+
+def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    d = int(rng.integers(1, 13))
+    velocity, row = rng.normal(size=d), rng.normal(size=(1, d))
+    row = _approaching(row, velocity)
+    return random_mass_matrix(rng, d), np.vstack([row * s for s in (1.0, *rng.uniform(0.5, 2.0, redundancy))]), velocity
+
+
+def _cradle(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """Balls in a row, velocities falling from left to right: all neighbours close."""
+    n = int(rng.integers(3, 9))
+    rows = np.diff(np.eye(n), axis=0)
+    return np.diag(np.exp(rng.normal(size=n))), rows, -np.cumsum(rng.uniform(0.1, 1.0, n))
+
+
+def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """Rows with cosines <= 0 in the kinetic metric, like the normals of a wedge that opens."""
+    d, c = int(rng.integers(3, 9)), int(rng.integers(2, 4))
+    gram = np.eye(c) - rng.uniform(0.0, 0.9 / (c - 1), size=(c, c)) * (1.0 - np.eye(c))
+    frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    rows = np.linalg.cholesky(np.minimum(gram, gram.T)) @ frame[:c]
+    lower = np.linalg.cholesky(random_mass_matrix(rng, d))
+    u = frame.T @ np.concatenate([np.linalg.solve(rows @ frame[:c].T, -rng.uniform(0.05, 1.0, c)), rng.normal(size=d - c)])
+    return lower @ lower.T, rows @ lower.T, np.linalg.solve(lower.T, u)
+
+
+def _face_on_floor(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """A planar box lands on 2 + redundancy points of its lower face, turning as it falls."""
+    m, half = np.exp(rng.normal()), rng.uniform(0.2, 2.0)
+    inertia = m * (half**2 + rng.uniform(0.1, 1.0) ** 2) / 3.0
+    points = np.sort(rng.uniform(-half, half, 2 + redundancy))
+    rows = np.column_stack([np.zeros_like(points), np.ones_like(points), points])
+    turn = rng.uniform(-0.95, 0.95) / np.abs(points).max()
+    return np.diag([m, m, inertia]), rows, np.array([rng.normal(), -1.0, turn])
+
+
+def _corner(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """A planar box strikes floor and wall at once: two points of the floor or more, the rest at the wall."""
+    mass, floor, velocity = _face_on_floor(rng, 0)
+    height = rng.uniform(-1.0, 1.0, 1 + redundancy) * np.abs(floor[:, 2]).max()
+    wall = np.column_stack([-np.ones_like(height), np.zeros_like(height), height])
+    velocity[0] = rng.uniform(0.1, 1.0) + np.abs(height * velocity[2]).max()
+    return mass, np.vstack([floor, wall]), velocity
+
+
+def _hole(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """A peg in a hole with a draft (1:100): its end and both sides close at once."""
+    length, width, slope = rng.uniform(0.5, 3.0), 1.0, 0.01
+    n = np.array([slope, 1.0]) / np.hypot(slope, 1.0)
+    points = [((x, -length), (0.0, 1.0)) for x in (-width, width)]
+    for y in np.linspace(-length, length, 1 + redundancy):
+        points += [((-width, y), (n[1], n[0])), ((width, y), (-n[1], n[0]))]
+    rows = np.array([[nx, ny, x * ny - y * nx] for (x, y), (nx, ny) in points])
+    m = np.exp(rng.normal())
+    spin = rng.uniform(-1.0, 1.0) * 0.9 * slope / np.abs(rows[:, 2]).max()
+    return np.diag([m, m, m * (length**2 + width**2) / 3.0]), rows, np.array([0.0, -1.0, spin])
+
+
+def _random_rows(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """Normals in all directions on a random mass matrix; redundant rows are combinations with weights > 0."""
+    d = int(rng.integers(3, 13))
+    independent, velocity = rng.normal(size=(int(rng.integers(2, d)), d)), rng.normal(size=d)
+    independent = _approaching(independent, velocity)
+    more = rng.uniform(0.0, 1.0, size=(redundancy, len(independent))) @ independent
+    return random_mass_matrix(rng, d), np.vstack([independent, more]), velocity
+
+
+def _rows_that_touch(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """As `_random_rows`, with one contact more that touches and slowly opens."""
+    mass, rows, velocity = _random_rows(rng, redundancy)
+    row = rng.normal(size=len(velocity))
+    row -= velocity * ((row @ velocity - rng.uniform(0.0, 0.1)) / (velocity @ velocity))
+    return mass, np.vstack([rows, row]), velocity
+
+
+FAMILIES: dict[str, Family] = {
+    family.name: family
+    for family in (
+        Family("one contact", "a single contact, also given several times", _one_contact, (0, 1, 4)),
+        Family("cradle", "balls in a row, neighbours close", _cradle, (0,)),
+        Family("obtuse normals", "rows with cosines <= 0 in the kinetic metric", _obtuse, (0,)),
+        Family("face on floor", "a box lands on points of one face", _face_on_floor, (0, 1, 2, 6)),
+        Family("corner", "a box strikes floor and wall at once", _corner, (0, 1, 2, 6)),
+        Family("tight hole", "a peg strikes end and sides of a hole", _hole, (1, 3, 7)),
+        Family("random rows", "normals in all directions", _random_rows, (0, 1, 4)),
+        Family("with a neighbour", "random rows beside a contact that touches", _rows_that_touch, (0, 4)),
+    )
+}
