@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reports.figures import (
+    energy_gains,
     fig01_contact_forces,
     fig02_two_link_arm,
     fig03_energy_loss,
@@ -17,6 +18,7 @@ from reports.figures import (
     fig13_device_forces,
     hero_corner,
     scenes_gallery,
+    work_precision,
 )
 from reports.figures.figure import Recipe
 
@@ -35,4 +37,6 @@ RECIPES: tuple[Recipe, ...] = (
     fig11_limited_forces.RECIPE,
     fig12_device_trajectories.RECIPE,
     fig13_device_forces.RECIPE,
+    energy_gains.RECIPE,
+    work_precision.RECIPE,
 )

@@ -14,9 +14,9 @@ from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, NUMBER, TITLE = "fig07", "Figure 7", "Hand trajectories of the four worlds"
 CAPTION = (
-    "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. Black is the "
-    "rigid world. Look at which curve leaves it at the first contact, and which one never comes back. The device can "
-    "apply any force here."
+    "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick line "
+    "(“ideal”) is the rigid world. Look at which curve leaves it at the first contact, and which come back to it. The "
+    "device can apply any force here."
 )
 
 

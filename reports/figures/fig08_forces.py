@@ -14,7 +14,7 @@ from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, NUMBER, TITLE = "fig08", "Figure 8", "Forces that the hand feels"
 CAPTION = (
-    "Left, in full: a new contact answers with one blow of one step in the worlds with impulses. Right, magnified: "
+    "In full: a new contact answers with one blow of one step in the worlds with impulses. Magnified: "
     "what remains between blows, to be compared with the 0.32 N that balances the hand."
 )
 

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from reports.figures.style import LineStyle
+
 
 @dataclass(frozen=True)
 class Numbers:
@@ -44,7 +46,7 @@ class Figure:
     caption: str
     panels: tuple[Panel, ...]
     numbers: Numbers | None = None
-    legend: tuple[tuple[str, str], ...] = ()  # (text, name of a style in reports.figures.style)
+    legend: tuple[tuple[str, str | LineStyle], ...] = ()  # (text, a style or the name of one)
     inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
 
 

@@ -18,9 +18,9 @@ from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, TITLE = "hero", "Four worlds in one corner"
 CAPTION = (
-    "A constant force pushes a tilted peg into a corner (left; outlines: the rigid world, from start to end). Right, "
-    "magnified: where the hand goes from shortly before the first contact. The closer a curve is to the black one, the "
-    "more the wall feels like a rigid wall."
+    "A constant force pushes a tilted peg into a corner; first picture: its outlines in the rigid world, from start to "
+    "end. Second picture, magnified: where the hand goes, from shortly before the first contact. The closer a curve is "
+    "to the ideal one, the more the wall feels like a rigid wall."
 )
 _GHOSTS = 4  # poses of the ideal run between start and end
 _MARGIN = 0.005  # [m] of wall and of air around the motion

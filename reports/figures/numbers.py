@@ -25,6 +25,11 @@ def format_number(value: float, digits: int = 4) -> str:
     return f"{mantissa.replace('-', MINUS)} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
 
 
+def power_of_ten(value: float) -> str:
+    """Return 10 to the exponent of `value`, for the ticks of a logarithmic axis."""
+    return f"10{str(round(math.log10(value))).translate(_SUPERSCRIPTS)}" if value > 0.0 else ""
+
+
 def format_cell(value: Any, digits: int = 4) -> str:
     """Return a table cell: None is a dash, whole numbers stay whole, text stays as it is."""
     if value is None:

@@ -6,9 +6,9 @@ grey print can be read. The page maps each colour to a variable, so that dark mo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 INK, MUTED, RULE, PAPER = "#1b1f24", "#66707b", "#d9dde2", "#fffefc"
@@ -51,6 +51,7 @@ STYLES: dict[str, LineStyle] = {
     "KE₀": LineStyle(INK, "", (4, 2), 1.2),
     "uniform rods": LineStyle(BLUE, "o", (), 1.8),
     "point masses": LineStyle(VERMILION, "s", (5, 1.6), 1.5, filled=False),
+    "bound": LineStyle(INK, "", (4, 2), 1.2),
     # maps of conditions
     "holds": LineStyle(BLUE, "o", (), 0.0),
     "fails": LineStyle(VERMILION, "X", (), 0.0),
@@ -80,6 +81,12 @@ _PARAMETERS: Any = {
 }
 
 PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a desk, one on a phone
+
+
+def series_legend(names: Sequence[str], *, line: bool = True) -> tuple[tuple[str, LineStyle], ...]:
+    """Return the legend of series that are numbered in the order of `names`; without `line`, markers only."""
+    looks = (CYCLE[number % len(CYCLE)] for number in range(len(names)))
+    return tuple((name, look if line else replace(look, width=0.0)) for name, look in zip(names, looks, strict=True))
 
 
 @contextmanager

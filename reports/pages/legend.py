@@ -25,10 +25,15 @@ def _color(value: str) -> str:
 def swatch(style: LineStyle | str) -> Markup:
     """Return the swatch of a style, given by itself or by its name."""
     look = STYLES[style] if isinstance(style, str) else style
-    dash = f' stroke-dasharray="{" ".join(f"{1.6 * part:g}" for part in look.dash)}"' if look.dash else ""
-    line = f'<path d="M1 7H35" fill="none" stroke="{_color(look.color)}" stroke-width="{look.width * 1.25:g}"{dash}/>'
+    line = _line(look) if look.width else ""
     marker = _MARKERS.get(look.marker, "")
     if marker:
         fill, edge = (look.color, PAPER) if look.filled else (PAPER, look.color)
         marker = f'<g fill="{_color(fill)}" stroke="{_color(edge)}">{marker}</g>'
     return Markup(f'<svg class="swatch" viewBox="0 0 36 14" aria-hidden="true">{line}{marker}</svg>')
+
+
+def _line(look: LineStyle) -> str:
+    dash = f' stroke-dasharray="{" ".join(f"{1.6 * part:g}" for part in look.dash)}"' if look.dash else ""
+    width = f'stroke-width="{look.width * 1.25:g}"'
+    return f'<path d="M1 7H35" fill="none" stroke="{_color(look.color)}" {width}{dash}/>'

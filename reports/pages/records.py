@@ -109,17 +109,17 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything the report may show. `inputs` holds runs and tables by the names that the figures ask for."""
+    """Everything the report may show. `inputs` holds runs, resolved scenes and tables by the names that the figures
+    ask for (`needs` of each recipe)."""
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
-    scenes: Mapping[str, Any] = field(default_factory=dict)  # scene name -> resolved scene (plain dictionary)
     verdicts: tuple[Verdict, ...] = ()
     claims: tuple[Claim, ...] = ()
     proofs: tuple[ProofRecord, ...] = ()
     properties: tuple[Property, ...] = ()
     cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
-    accuracy: Numbers | None = None  # the table beside the work-precision figure
+    bulk: Numbers | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
     manifest: tuple[StoredFile, ...] = ()

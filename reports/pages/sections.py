@@ -33,7 +33,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs)),
     Section("properties", "Properties", lambda evidence: bool(evidence.properties)),
     Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks)),
-    Section("accuracy", "Accuracy against time", lambda evidence: evidence.accuracy is not None),
+    Section("accuracy", "Accuracy against time", _always),
     Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases)),
     Section("effects", "Effects", lambda evidence: bool(evidence.effects)),
     Section("provenance", "Provenance", lambda evidence: bool(evidence.provenance)),

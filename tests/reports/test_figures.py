@@ -11,12 +11,23 @@ import pytest
 from iapb import load_scene
 from iapb.run import Run
 from iapb.scene_files import find_scene
-from reports.figures import RECIPES
+from reports.figures import RECIPES, energy_gains, work_precision
 from reports.figures.condition_map import condition_map
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.figures.figure import Figure, NotComputed, Recipe, draw
+from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
 from reports.figures.numbers import format_cell, format_number
 from reports.figures.style import CYCLE, STYLES, VARIABLES
+
+
+GAINS = Numbers(
+    (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE),
+    (("factored", "1e2", 0.0, 0.0), ("factored", "1e4", 1e-16, 0.1), ("printed", "1e2", 1e-3, 1e11),
+     ("printed", "all", 1e-3, 1e11)),
+)
+WORK = Numbers(
+    (work_precision.METHOD, work_precision.PROBLEM, work_precision.TIME, work_precision.ERROR, work_precision.GAIN),
+    (("factored", "peg", 1.0, 1e-16, 0.0), ("printed", "peg", 20.0, 1e-12, 1e-9), ("qp", "peg", 900.0, None, 1e-7)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +45,7 @@ def inputs() -> dict[str, object]:
     names = {name for recipe in RECIPES for name in recipe.needs}
     given: dict[str, object] = {name: run for name in names if name.startswith(("corner/", "device/"))}
     given |= {name: load_scene(find_scene(name[6:])).resolved() for name in names if name.startswith("scene/")}
-    return given | {"group/IAPB": group, "arm_energies": arm_energies()}
+    return given | {"group/IAPB": group, "arm_energies": arm_energies(), "energy_gains": GAINS, "work_precision": WORK}
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.key)
@@ -157,3 +168,7 @@ def test_penetration_is_that_of_the_deepest_contact(inputs: dict[str, object]) -
     for k in range(run.steps):
         gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]
         assert depth[k] == max(-gaps.min(), 0) if len(gaps) else depth[k] == 0
+
+
+def test_the_row_that_sums_up_all_conditions_is_no_point_of_the_curve() -> None:
+    assert energy_gains.series(GAINS, "printed", energy_gains.GAIN) == ([1e2], [1e-3])

@@ -28,6 +28,7 @@ from reports.pages.records import (
     Verdict,
 )
 from reports.pages.sections import SECTIONS
+from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -75,7 +76,6 @@ def full() -> Evidence:
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(HardCase("bar", "ours", "$0.5$", (("factored", 1e-16, None, "exact"),)),),
-        accuracy=Numbers(("method", "µs"), (("factored", 1.0),)),
         effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
@@ -137,6 +137,27 @@ def test_each_outcome_is_counted(full: Evidence) -> None:
     page = build_report(full)
     assert f"1 {LIMITED}" in page
     assert f"1 {REFUTED}" in page
+
+
+@pytest.mark.parametrize(("text", "shown"), [
+    ("at most 2.0e-16 of it", "at most 2.0 · 10<sup>−16</sup> of it"), ("1e8", "10<sup>8</sup>"),
+    ("0.0e+00", "0"), ("-3e+00", "−3"), ("key a1e5b", "key a1e5b"),
+])
+def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
+    assert str(prose(text)).replace("\u202f", " ") == shown
+
+
+def test_a_verdict_is_the_worst_of_its_claims_in_its_own_words() -> None:
+    claims = (Claim("C01", "s", "p", REPRODUCED, "fine"),
+              Claim("C02", "s", "p", REFUTED, "Fails in 2.5 of 3. More words. And more"))
+    (verdict,) = verdicts(claims)
+    assert verdict.outcome == REFUTED
+    assert verdict.sentence == "1 of 2 claims reproduced. C02: Fails in 2.5 of 3."
+    assert verdict.link == "C02"
+
+
+def test_a_subject_without_claims_has_no_verdict() -> None:
+    assert verdicts(()) == ()
 
 
 def test_prose_keeps_a_lone_dollar() -> None:
