@@ -18,7 +18,6 @@ from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
 from reports.figures.numbers import format_cell, format_number
 from reports.figures.style import CYCLE, STYLES, VARIABLES
 
-
 GAINS = Numbers(
     (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE),
     (("factored", "1e2", 0.0, 0.0), ("factored", "1e4", 1e-16, 0.1), ("printed", "1e2", 1e-3, 1e11),
