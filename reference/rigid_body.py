@@ -149,6 +149,13 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
     return PinocchioMechanism(model)
 
 
+def _frame_along(axis: Floats) -> Floats:
+    """Return a rotation (3, 3) whose z axis is the given one, exact to rounding for every direction."""
+    x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(axis, x), axis))
+
+
 def _check_depth_first(mechanism: Mechanism) -> None:
     """Each body's parent must be the body before it, or carry that one."""
     open_chain: list[str] = []
@@ -172,8 +179,7 @@ def _joint_models(pinocchio: ModuleType, body: Body) -> list[tuple[Any, Any]]:
         chain = (pinocchio.JointModelPX, pinocchio.JointModelPY, pinocchio.JointModelRZ)
         return [(part(), straight) for part in chain]
     if kind == "continuous":
-        turn = pinocchio.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
-        return [(pinocchio.JointModelRUBZ(), pinocchio.SE3(turn.toRotationMatrix(), np.zeros(3)))]
+        return [(pinocchio.JointModelRUBZ(), pinocchio.SE3(_frame_along(axis), np.zeros(3)))]
     if kind == "revolute":
         return [(pinocchio.JointModelRevoluteUnaligned(axis), straight)]
     if kind == "prismatic":
