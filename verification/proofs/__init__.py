@@ -54,6 +54,13 @@ _NAMES = (
     "erratum_adhesion",
     "erratum_spreading",
     "erratum_saturation",
+    "fp_projector",
+    "fp_cholesky",
+    "fp_clamp",
+    "fp_rounding",
+    "fp_promise",
+    "fp_gram_pinv",
+    "exact_instances",
 )
 
 

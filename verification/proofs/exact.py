@@ -16,7 +16,7 @@ from verification.proofs.algebra import ANY, Expression
 from verification.proofs.facts import Definite, Entrywise, Equation, Fact, NonNegative, Nonzero
 
 Number = int | str | Fraction
-Rows = Sequence[Sequence[Number] | Number]
+Rows = Sequence[Any]  # rows of numbers, or the numbers of a column
 Matrix = tuple[tuple[Fraction, ...], ...]
 
 
@@ -26,14 +26,12 @@ class Instance:
 
     values: Mapping[str, Matrix | Fraction]
 
-    def with_values(
-        self, values: Mapping[str, Number | Rows] | None = None, /, **changed: Number | Rows
-    ) -> Instance:
+    def with_values(self, values: Mapping[str, Any] | None = None, /, **changed: Any) -> Instance:
         """The same instance with some letters changed."""
         return Instance({**self.values, **instance(values, **changed).values})
 
 
-def instance(values: Mapping[str, Number | Rows] | None = None, /, **named: Number | Rows) -> Instance:
+def instance(values: Mapping[str, Any] | None = None, /, **named: Any) -> Instance:
     """Instance from numbers (scalars), lists of numbers (columns) and lists of rows; "1/3" is a third."""
     return Instance({name: _exact(name, value) for name, value in {**(values or {}), **named}.items()})
 

@@ -64,7 +64,8 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            "M need not be definite, and nothing is divided by pᵀWp, which may be zero near the kernel of Jᵀ.",
+            "M need not be definite, and nothing is divided by pᵀWp, which may be zero near the kernel of "
+            "Jᵀ.",
             "A clamped impact is passive, not therefore right: what it leaves approaching must be reported.",
         ),
     )

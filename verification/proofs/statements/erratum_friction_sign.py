@@ -49,7 +49,7 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            "If t is turned to point along the sliding velocity in each step, vₜ is never negative and (6) is right; the "
-            "paper only says that t is orthogonal to the normal.",
+            "If t is turned to point along the sliding velocity in each step, vₜ is never negative and (6) "
+            "is right; the paper only says that t is orthogonal to the normal.",
         ),
     )

@@ -50,8 +50,8 @@ def statement() -> Statement:
         ),
         twins=(Twin("saturation is passive: the peg struck at its corner", _peg()[1]),),
         remarks=(
-            "The peg (2 kg, 0.005 kg m²) meets a wall with the arm 0.01 m, moving at −0.1 m/s and turning away at 4 rad/s, "
-            "e = 0. The limits are the paper's, 15 N and 1 N m for one step at 512 Hz.",
+            "The peg (2 kg, 0.005 kg m²) meets a wall with the arm 0.01 m, moving at −0.1 m/s and turning "
+            "away at 4 rad/s, e = 0. The limits are the paper's, 15 N and 1 N m for one step at 512 Hz.",
         ),
     )
 

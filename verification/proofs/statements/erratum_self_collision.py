@@ -40,13 +40,13 @@ def statement() -> Statement:
             Without(
                 rigid.name,
                 own_rows,
-                "a ball that hits an equal one at rest bounces back at −1 and leaves it at rest; seen from a frame that "
-                "moves along, both bounce at −2 and −1",
+                "a ball that hits an equal one at rest bounces back at −1 and leaves it at rest; seen from "
+                "a frame that moves along, both bounce at −2 and −1",
             ),
         ),
         twins=(Twin("a common velocity changes nothing", equation("w⁺ = v⁺", moved, after), BALLS),),
         remarks=(
-            "The reason given for (13)-(14), passivity, does not ask for them: theorem_2 holds for every J. That they also "
-            "break conservation of momentum is in the file momentum.",
+            "The reason given for (13)-(14), passivity, does not ask for them: theorem_2 holds for every "
+            "J. That they also break conservation of momentum is in the file momentum.",
         ),
     )

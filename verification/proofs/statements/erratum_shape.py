@@ -28,7 +28,8 @@ def statement() -> Statement:
         concludes=(work.claim.name,),
         twins=(
             Twin(
-                "the printed shape, where it can be read at all (d = 3): the force map would be the transpose",
+                "the printed shape, where it can be read at all (d = 3): the force map would be the "
+                "transpose",
                 equation(
                     "Fᵀ J v = (J F)ᵀ v", vector("F", "d").T * square * v, (square * vector("F", "d")).T * v
                 ),

@@ -81,7 +81,8 @@ def statement() -> Statement:
                 "the impulses agree as well",
                 equation("G J = Rᵀ Wₙ⁻¹ Jₙ", G * J, r.T * wi * jn),
                 CASE,
-                "the velocities agree, the impulses at the contacts need not: W† shares the push, (37) does not",
+                "the velocities agree, the impulses at the contacts need not: W† shares the push, (37) "
+                "does not",
             ),
         ),
         remarks=(

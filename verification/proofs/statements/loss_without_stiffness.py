@@ -50,7 +50,8 @@ def statement() -> Statement:
                 "the same of a penalty contact, which needs a finite time",
                 equation("F changes nothing", later.T * M * later, after.T * M * after),
                 CASE,
-                "a spring and damper that push with 3 N for 1 s: the loss depends on them, unlike that of an impact",
+                "a spring and damper that push with 3 N for 1 s: the loss depends on them, unlike that of "
+                "an impact",
             ),
         ),
     )

@@ -71,7 +71,8 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            r"$\gamma^+ + E \gamma^- \geq 0$ and $e_i \geq 0$ belong to the law but are not needed for passivity.",
+            r"$\gamma^+ + E \gamma^- \geq 0$ and $e_i \geq 0$ belong to the law but are not needed for "
+            r"passivity.",
             r"With one scalar $e$ the signs of $J v$ do not matter either: newton_lcp_equal.",
         ),
     )

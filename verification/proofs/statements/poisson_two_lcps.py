@@ -91,7 +91,8 @@ def statement() -> Statement:
             ),
         ),
         remarks=(
-            r"$e_i \geq 0$, $J v_k \geq 0$ and $p_e \geq E p$ belong to the law; passivity does not need them.",
+            r"$e_i \geq 0$, $J v_k \geq 0$ and $p_e \geq E p$ belong to the law; passivity does not need "
+            r"them.",
         ),
     )
 

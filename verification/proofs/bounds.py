@@ -1,0 +1,119 @@
+"""Executable forms of the floating-point bounds; the statements fp_* derive them.
+
+Standard model: every operation rounds to nearest, relative error at most u = 2⁻⁵³; no over- or underflow. With
+ε = 2u. κ is the condition number of the mass matrix; since all rounding is component by component, κ may be
+replaced by the smallest κ(S M S) over positive diagonal S, which is what makes metres and radians harmless.
+
+How `gain_bound` comes about (‖x‖² = xᵀMx, Δ the candidate change of velocity, x = vᵀMΔ, y = ΔᵀMΔ):
+
+1. The clamp computes X ≈ x and Y ≈ y in double-double, rounds each once, and α = min(1, fl(−2X/Y)). The
+   double-double sums err by at most τ‖v‖‖Δ‖ with τ = 16 (d+1) √d u² κ: each of the 2(d+1) compensated steps per
+   entry errs by at most 8u² of the sum of magnitudes, and Σ|vᵢ||Mᵢⱼ||Δⱼ| ≤ √d λ_max |v||Δ| ≤ √d κ ‖v‖‖Δ‖.
+2. Hence (fp_clamp) 2α x + α² y ≤ 3u α² y (1+…) + 2α τ ‖v‖‖Δ‖. As α ≤ 2‖v‖/‖Δ‖ up to rounding, the relative gain
+   before v⁺ is rounded is at most 12u + 12τ.
+3. v⁺ = fl(v + fl(αΔ)) is off by r with |r| ≤ u|v⁺| + u|αΔ|, so ‖r‖ ≤ u√κ (‖v⁺‖ + 2‖v‖) ≈ 3u√κ ‖v‖ (fp_rounding),
+   which adds at most 6u√κ + 9u²κ.
+4. The products of small quantities left out in 1-3 are covered by the factor 65/64 for u√κ ≤ 2⁻¹², τ ≤ 2⁻¹².
+"""
+
+from __future__ import annotations
+
+import math
+
+from iapb.errors import ArgumentError
+
+UNIT_ROUNDOFF = 2.0**-53
+EPSILON = 2.0 * UNIT_ROUNDOFF
+_MARGIN = 65.0 / 64.0  # covers products of terms that are each below 2⁻¹²
+_SMALL = 2.0**-12
+# Every eligible residual in the pivoted factorisation is nearly orthogonal to the basis before its last pass.
+REORTHOGONALISED_OVERLAP = 2.0**-10
+
+
+def gain_bound(d: int, kappa: float) -> float:
+    """Largest relative gain of kinetic energy that the clamped resolver can show.
+
+    (KE⁺ − KE⁻)/KE⁻ ≤ (65/64)(12u + 6u√κ) + 13τ + 10u²κ with τ = 16 (d+1) √d u² κ; see the module's derivation.
+
+    Parameters
+    ----------
+    d : number of degrees of freedom.
+    kappa : condition number of the mass matrix, at least 1.
+
+    Raises
+    ------
+    ArgumentError
+        If d < 1 or kappa < 1, or if kappa is so large that the derivation does not apply (u√κ or τ above 2⁻¹²).
+    """
+    _check(d, kappa)
+    u, root = UNIT_ROUNDOFF, math.sqrt(kappa)
+    tau = double_double_error(d, kappa)
+    if u * root > _SMALL or tau > _SMALL:
+        raise ArgumentError("kappa", kappa, "a condition number for which u√κ and τ stay below 2⁻¹²")
+    return _MARGIN * (12.0 * u + 6.0 * u * root) + 13.0 * tau + 10.0 * u * u * kappa
+
+
+def promised_bound(d: int, kappa: float) -> float:
+    """10 d ε √κ, the bound promised by the design; never below `gain_bound` for κ ≤ 10²⁴/d (fp_promise)."""
+    _check(d, kappa)
+    return 10.0 * d * EPSILON * math.sqrt(kappa)
+
+
+def double_double_error(d: int, kappa: float) -> float:
+    """τ: what the double-double energies may err by, relative to ‖v‖‖Δ‖."""
+    return 16.0 * (d + 1) * math.sqrt(d) * UNIT_ROUNDOFF**2 * kappa
+
+
+def gamma(n: int) -> float:
+    """γₙ = n u / (1 − n u), Higham's bound for n accumulated roundings."""
+    return n * UNIT_ROUNDOFF / (1.0 - n * UNIT_ROUNDOFF)
+
+
+def projector_bound(d: int, departure: float) -> float:
+    """Largest relative gain of |u|² by the projector as computed, whatever M and J are.
+
+    |û⁺|² ≤ (1 + g)|u|², g = (√(1 + 4δ(1+δ)) + ρ)² − 1, with δ = `departure` ≥ ‖QᵀQ − I‖₂ (fp_projector) and
+    ρ = 2(γ_d + γ_{d+2} + u)√d (1+δ) for the two products with Q and the subtraction. No κ occurs.
+    """
+    _check(d, 1.0)
+    rounding = 2.0 * (gamma(d) + gamma(d + 2) + UNIT_ROUNDOFF) * math.sqrt(d) * (1.0 + departure)
+    exact = 4.0 * departure * (1.0 + departure)
+    return exact + 2.0 * math.sqrt(1.0 + exact) * rounding + rounding * rounding
+
+
+def orthogonality_bound(d: int) -> float:
+    """‖QᵀQ − I‖ of a basis built by re-orthogonalised Gram-Schmidt (Kahan's criterion: the last pass keeps half).
+
+    A last pass that starts from a unit vector with overlap ω ≤ 2⁻¹⁰ and keeps at least half of it leaves
+    |Qₖᵀq| ≤ 2(ω δ + 3γ_d √d); over d columns δ ≤ √2 d · 6γ_d √d / (1 − 4dω) + (d + 4) u.
+    """
+    columns = 6.0 * math.sqrt(2.0) * d * gamma(d) * math.sqrt(d)
+    return columns / max(0.25, 1.0 - 4.0 * d * REORTHOGONALISED_OVERLAP) + (d + 4) * UNIT_ROUNDOFF
+
+
+def cholesky_error(d: int, kappa: float) -> float:
+    """η with |vᵀ(L Lᵀ − M)v| ≤ η vᵀMv: η = d γ_{d+1} κ / (1 − d γ_{d+1}) (Higham 2002, Theorem 10.3)."""
+    _check(d, kappa)
+    g = gamma(d + 1)
+    return d * g * kappa / (1.0 - d * g)
+
+
+def unclamped_bound(d: int, kappa: float) -> float:
+    """Relative gain that the factored form may show *without* the final clamp: about 2 d² u κ (fp_cholesky).
+
+    (1+η)/(1−η) (1+g)(1+σ)² − 1: Cholesky's backward error η, the projector's g, and σ = 6 γ_{d+1} √(dκ) for
+    Lᵀv, the triangular solve and the rounding of v⁺. Infinite where η ≥ 1: then L says nothing about M.
+    """
+    eta = cholesky_error(d, kappa)
+    if eta >= 1.0:
+        return math.inf
+    solves = 6.0 * gamma(d + 1) * math.sqrt(d * kappa * (1.0 + eta) / (1.0 - eta))
+    growth = 1.0 + projector_bound(d, orthogonality_bound(d))
+    return (1.0 + eta) / (1.0 - eta) * growth * (1.0 + solves) ** 2 - 1.0
+
+
+def _check(d: int, kappa: float) -> None:
+    if d < 1:
+        raise ArgumentError("d", d, "at least one degree of freedom")
+    if not kappa >= 1.0:
+        raise ArgumentError("kappa", kappa, "a condition number, at least 1")
