@@ -19,6 +19,7 @@ from iapb.mechanics import kernels, structure
 from iapb.mechanics.bodies import Body, finite_array, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.layout import collect_arrays, tree_ranges
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
@@ -62,13 +63,13 @@ class Mechanism:
         self.bodies: tuple[Body, ...] = tuple(bodies)
         parents = parent_indices(self.bodies)
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
-        self.arrays: MechanismArrays = _collect(self.bodies, parents)
+        self.arrays: MechanismArrays = collect_arrays(self.bodies, parents)
         self._block: Block = block(self.arrays)
         self._scratch = threading.local()  # kernels write: each thread needs its own
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
-        self.tree_dofs: list[tuple[int, int]] = _tree_ranges(self.arrays, self.tree_of_body)
+        self.tree_dofs: list[tuple[int, int]] = tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
         self.has_velocity_terms: bool = structure.has_velocity_terms(self.arrays)
 
@@ -198,56 +199,3 @@ class Mechanism:
 
 def _field(g: ArrayLike) -> Floats:
     return finite_array("g", g, (3,), "m/s^2")
-
-
-def _collect(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
-    """Lay the bodies out as arrays."""
-    layouts = [body.joint.layout for body in bodies]
-    v_count = np.array([layout.nv for layout in layouts], dtype=np.int64)
-    v_start = np.cumsum(v_count) - v_count
-    q_count = np.array([layout.nq for layout in layouts], dtype=np.int64)
-    last_dof, dof_body, dof_parent = _chains(v_start, v_count, parents)
-    return MechanismArrays(
-        kind=np.array([layout.code for layout in layouts], dtype=np.int64),
-        parent=np.array(parents, dtype=np.int64),
-        q_start=np.cumsum(q_count) - q_count,
-        v_start=v_start,
-        v_count=v_count,
-        joint_axis=_stack([body.joint.unit_axis for body in bodies], (3,)),
-        placement_rotation=_stack([body.placement[0] for body in bodies], (3, 3)),
-        placement_position=_stack([body.placement[1] for body in bodies], (3,)),
-        mass=np.array([body.mass for body in bodies], dtype=np.float64),
-        center_of_mass=_stack([body.center_of_mass for body in bodies], (3,)),
-        inertia=_stack([body.inertia for body in bodies], (3, 3)),
-        last_dof=np.array(last_dof, dtype=np.int64),
-        dof_body=np.array(dof_body, dtype=np.int64),
-        dof_parent=np.array(dof_parent, dtype=np.int64),
-        dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], dtype=np.bool_),
-    )
-
-
-def _stack(rows: list[Floats], shape: tuple[int, ...]) -> Floats:
-    return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(len(rows), *shape))
-
-
-def _chains(v_start: Any, v_count: Any, parents: list[int]) -> tuple[list[int], list[int], list[int]]:
-    """For each body its last dof on the way from the world; for each dof its body and the dof before it."""
-    last_dof: list[int] = []
-    dof_body: list[int] = []
-    dof_parent: list[int] = []
-    for b, parent in enumerate(parents):
-        last = last_dof[parent] if parent >= 0 else -1
-        for k in range(int(v_start[b]), int(v_start[b] + v_count[b])):
-            dof_body.append(b)
-            dof_parent.append(last)
-            last = k
-        last_dof.append(last)
-    return last_dof, dof_body, dof_parent
-
-
-def _tree_ranges(m: MechanismArrays, tree_of_body: NDArray[np.int64]) -> list[tuple[int, int]]:
-    ranges = []
-    for tree in range(int(tree_of_body.max()) + 1 if len(tree_of_body) else 0):
-        members = np.flatnonzero(tree_of_body == tree)
-        ranges.append((int(m.v_start[members[0]]), int(m.v_start[members[-1]] + m.v_count[members[-1]])))
-    return ranges
