@@ -1,0 +1,98 @@
+"""The floating-point bounds hold under attack, are not idle, and catch what breaks them."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError
+from verification.proofs.attack import attack, engine_resolver, factored_in_bulk, one_by_one
+from verification.proofs.bounds import (
+    gain_bound,
+    orthogonality_bound,
+    projector_bound,
+    promised_bound,
+    unclamped_bound,
+)
+from verification.proofs.statements.fp_gram_pinv import energy_factor, energy_factor_above_cutoff
+
+# The bound is within this factor of the worst impact seen: it is a bound that means something.
+SLACK = 20.0
+
+
+@given(d=st.integers(1, 60), exponent=st.floats(0.0, 20.0))
+def test_gain_bound_keeps_the_promise(d: int, exponent: float) -> None:
+    kappa = 10.0**exponent
+    assert gain_bound(d, kappa) <= promised_bound(d, kappa)
+
+
+@given(d=st.integers(1, 60), exponent=st.floats(0.0, 12.0))
+def test_bounds_grow_with_conditioning_and_size(d: int, exponent: float) -> None:
+    kappa = 10.0**exponent
+    assert gain_bound(d, 2.0 * kappa) > gain_bound(d, kappa)
+    assert unclamped_bound(d, 2.0 * kappa) >= unclamped_bound(d, kappa)
+    assert projector_bound(d + 1, 1e-15) > projector_bound(d, 1e-15)
+    assert orthogonality_bound(d + 1) > orthogonality_bound(d)
+
+
+@pytest.mark.parametrize(("d", "kappa"), [(0, 1.0), (3, 0.5), (3, math.nan), (3, 1e30)])
+def test_bounds_refuse_what_they_do_not_cover(d: int, kappa: float) -> None:
+    with pytest.raises(ArgumentError):
+        gain_bound(d, kappa)
+
+
+def test_compiled_kernel_stays_below_the_bound() -> None:
+    result = attack(factored_in_bulk, 5_000, seed=3)
+    assert result.holds
+    assert result.worst_ratio > 1.0 / SLACK
+
+
+def test_public_resolver_stays_below_the_bound() -> None:
+    assert attack(engine_resolver(), 1_500, seed=4).holds
+
+
+def test_clamp_is_what_keeps_the_bound() -> None:
+    assert not attack(engine_resolver("factored", clamp=False), 1_500, seed=4).holds
+
+
+def test_printed_formula_breaks_the_bound() -> None:
+    assert not attack(engine_resolver("gram_pinv"), 1_500, seed=4).holds
+
+
+def test_planted_gain_is_caught() -> None:
+    louder = one_by_one(lambda m, j, v, e: v * (1.0 + 1e-4))
+    assert not attack(louder, 500).holds
+
+
+def test_same_seed_same_worst_case() -> None:
+    first, second = attack(factored_in_bulk, 500, seed=9), attack(factored_in_bulk, 500, seed=9)
+    assert first.worst_ratio == second.worst_ratio
+    np.testing.assert_array_equal(first.worst_case[0], second.worst_case[0])
+
+
+def test_projector_as_computed_stays_below_its_bound() -> None:
+    """u⁺ = u − 2QQᵀu in doubles, judged exactly: the bound holds, with no condition number in it."""
+    rng = np.random.default_rng(5)
+    for d in (2, 5, 12):
+        q = np.linalg.qr(rng.standard_normal((d, d)))[0][:, : max(1, d // 2)]
+        u = rng.standard_normal(d)
+        after = u - 2.0 * (q @ (q.T @ u))
+        departure = float(np.linalg.norm(q.T @ q - np.eye(q.shape[1]), 2))
+        gain = _square(after) / _square(u) - 1
+        assert gain <= projector_bound(d, departure + 4 * d * 2.0**-53)
+
+
+def _square(x: np.ndarray) -> Fraction:
+    return sum((Fraction(float(entry)) ** 2 for entry in x), Fraction(0))
+
+
+def test_the_family_against_the_printed_formula_is_what_doubles_compute() -> None:
+    """The exact factors are those of numpy's own rounding of J Jᵀ."""
+    a, t = 1.0 - 2.0**-40, 2.0**-28
+    w = np.array([[1.0, a], [a, a * a + t * t]])
+    assert w[1, 1] == 1.0 - 2.0**-39
+    assert energy_factor(40) == (1 + Fraction(2) ** 25) ** 2
+    assert energy_factor_above_cutoff(19) > 1
