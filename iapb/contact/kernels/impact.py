@@ -71,17 +71,19 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
 
     Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u; returns (rank, clamp).
     Every row is an equality J v⁺ = −e J v⁻, whatever its sign; choosing the rows is the caller's.
+    A group smaller than its scratch uses the first d coordinates of it; what lies beyond is another group's.
     """
     d = v.shape[0]
-    to_whitened(lower, v, work.u)
-    whiten_columns(lower, work.columns, count)
-    unit_columns(work.columns, count, work.length)
+    columns, u, change = work.columns[:d], work.u[:d], work.change[:d]
+    to_whitened(lower, v, u)
+    whiten_columns(lower, columns, count)
+    unit_columns(columns, count, work.length)
     for k in range(d):
         for i in range(count):
-            work.rows[k, i] = work.columns[k, i]
-    rank = orthonormal_basis(work.columns, count, work.u, tolerance, budget, work.basis, work.closing, work.size,
+            work.rows[k, i] = columns[k, i]
+    rank = orthonormal_basis(columns, count, u, tolerance, budget, work.basis, work.closing, work.size,
                              work.overlap)
-    projected_change(work.basis, rank, work.u, 1.0 + restitution, work.change)
+    projected_change(work.basis, rank, u, 1.0 + restitution, change)
     clamp = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
     return rank, clamp
 
@@ -90,7 +92,7 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
 def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
     """v⁺ = v + α L⁻ᵀ Δu with the clamp's α; generalized impulse α L Δu. Returns α."""
     d = v.shape[0]
-    from_whitened(lower, work.change, work.v_change)
+    from_whitened(lower, work.change[:d], work.v_change[:d])
     alpha = 1.0
     moved = False
     for k in range(d):
@@ -100,5 +102,5 @@ def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
     for k in range(d):
         work.change[k] *= alpha
         v_plus[k] = v[k] + alpha * work.v_change[k]
-    to_momentum(lower, work.change, momentum)
+    to_momentum(lower, work.change[:d], momentum)
     return alpha

@@ -58,7 +58,7 @@ def _next_direction(columns, pivot, basis, rank):
     the residual is nearly orthogonal already, so the first pass almost always is the last.
     """
     d = columns.shape[0]
-    q = basis[rank]
+    q = basis[rank, :d]
     for k in range(d):
         q[k] = columns[k, pivot]
     _normalize(q)
@@ -119,7 +119,7 @@ def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size
     u : (d,) whitened velocity Lᵀ v.
     tolerance : a residual row is eligible only above `tolerance` × its unit row.
     budget : largest number of rows to use. Every truncation is passive.
-    basis : (≥d, d) output, rows 0 … rank − 1.
+    basis : (≥d, ≥d) output, rows 0 … rank − 1.
     closing, size, overlap : (≥count,) scratch.
     """
     d = u.shape[0]
@@ -138,7 +138,7 @@ def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size
         if not _next_direction(columns, pivot, basis, rank):
             size[pivot] = 0.0
             continue
-        q = basis[rank]
+        q = basis[rank, :d]
         along_q = 0.0
         for k in range(d):
             along_q += q[k] * u[k]

@@ -1,0 +1,78 @@
+"""The command `iapb`: every command is one file in reports/commands and one line here."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import typer
+
+from iapb.errors import IapbError
+
+# command -> module of reports.commands that holds a function of the same name
+COMMANDS = ("run", "effects", "inspect", "schema", "prove", "reproduce")
+
+app = typer.Typer(
+    name="iapb", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+    help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove and "
+         "test passivity, compare with complementarity, regenerate the paper's figures.",
+    epilog="Start with: iapb run peg_corner",
+)  # fmt: skip
+
+
+class _Options:
+    """Options before the command."""
+
+    debug = False
+
+
+@app.callback()
+def _before(debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error.")) -> None:
+    _Options.debug = debug
+
+
+def _register(name: str) -> None:
+    module = import_module(f"reports.commands.{name}")
+    command: Callable[..., Any] = getattr(module, name)
+    app.command(name)(command)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
+    for name in COMMANDS:
+        if name not in {command.name for command in app.registered_commands}:
+            _register(name)
+    try:
+        status = app(args=arguments, standalone_mode=False)
+    except KeyboardInterrupt:
+        print("iapb: stopped; what was finished is kept.", file=sys.stderr)
+        status = 130
+    except (IapbError, OSError) as error:
+        if _Options.debug:
+            raise
+        print(f"iapb: {error}", file=sys.stderr)
+        status = 1
+    except Exception as error:
+        status = _usage(error)
+    if arguments is None:
+        sys.exit(status or 0)
+    return status or 0
+
+
+def _usage(error: Exception) -> int:
+    """Print a mistake in the command line and return its status; anything else is a fault of ours."""
+    import click
+
+    if isinstance(error, click.exceptions.Abort):
+        print("iapb: stopped; what was finished is kept.", file=sys.stderr)
+        return 130
+    if isinstance(error, click.ClickException):
+        error.show(file=sys.stderr)
+        return error.exit_code
+    raise error
+
+
+if __name__ == "__main__":
+    main()

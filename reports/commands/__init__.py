@@ -1,0 +1,1 @@
+"""The commands of `iapb`, one file each; heavy imports wait inside the functions, so that --help is instant."""

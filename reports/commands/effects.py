@@ -1,0 +1,36 @@
+"""`iapb effects SCENE`: which effects a scene calls for, why, and what leaving one out would change."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def effects(
+    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    world: Annotated[str | None, typer.Option(
+        help="Decide for one world (ideal, IAPB, PB, CBuc); without it an effect is on if some world needs it.")] = None,
+    rendering: Annotated[str, typer.Option(help="full, saturate, scale or spread.")] = "full",
+) -> None:
+    """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from iapb import decide_effects, find_scene, load_scene
+
+    source = load_scene(find_scene(scene))
+    if world is None:
+        found = decide_effects(source)
+    else:
+        from reference.worlds import find_world
+
+        chosen = find_world(world, rendering)
+        found = decide_effects(source, chosen.law.name, chosen.coupling_in(source).name, rendering)
+    table = Table(title=f"Effects of {source.name}" + (f" in {world}" if world else ""), show_lines=True)
+    for heading in ("effect", "", "why", "left out, it would change"):
+        table.add_column(heading, overflow="fold")
+    for effect in sorted(found, key=lambda effect: not effect.active):
+        table.add_row(effect.name, "on" if effect.active else "off", effect.reason, effect.left_out)
+    Console().print(table)
+    print(f"{sum(effect.active for effect in found)} of {len(found)} effects are on; the others cost nothing.")

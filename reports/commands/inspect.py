@@ -1,0 +1,48 @@
+"""`iapb inspect FILE`: what a run file holds, from the file alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def inspect(
+    file: Annotated[Path, typer.Argument(help="A run file (.h5, or .h5.partial of an interrupted run).")],
+    impacts: Annotated[int, typer.Option(help="How many impacts to list.")] = 10,
+) -> None:
+    """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
+    from reports.commands.run import describe
+    from reports.store_read import read_head, read_provenance, read_run
+
+    run, head = read_run(file), read_head(file)
+    describe(run, existed=True)
+    print("Complete." if run.complete else "Partial: the simulation was interrupted after these steps.")
+    if impacts and len(run.impacts.step):
+        _list_impacts(run, impacts)
+    print("\nEnergy at the end [J] (iapb.mechanics.energy):")
+    for name, values in run.energy.items():
+        print(f"  {name:<22}{values[-1]: .6e}")
+    print("\nEffects that were on:")
+    for effect in run.effects:
+        if effect.active:
+            print(f"  {effect.name}: {effect.reason}")
+    print("\nProvenance:")
+    for name, text in read_provenance(file).items():
+        print(f"  {name}: {text.splitlines()[0] if text else ''}")
+    print(f"\nrun key      {head['run_key']}\ncontent hash {head['content_hash']}")
+
+
+def _list_impacts(run: object, count: int) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = run.impacts  # type: ignore[attr-defined]
+    shown = Table(title=f"The first {min(count, len(table.step))} of {len(table.step)} impacts")
+    for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp"):
+        shown.add_column(heading, justify="right")
+    for i in range(min(count, len(table.step))):
+        shown.add_row(f"{run.time[table.step[i]]:.5f}", str(table.rows[i]), str(table.rank[i]),  # type: ignore[attr-defined]
+                      f"{table.energy_lost[i]:.4e}", f"{table.scale[i]:.4f}", f"{table.clamp[i]:.6f}")
+    Console().print(shown)

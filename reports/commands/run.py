@@ -1,0 +1,77 @@
+"""`iapb run SCENE`: simulate a scene in one of the paper's worlds and keep the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from iapb.run import Run
+
+
+def run(
+    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI).")] = "IAPB",
+    rendering: Annotated[str, typer.Option(
+        help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")] = "full",
+    set_: Annotated[list[str] | None, typer.Option(
+        "--set", help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
+) -> None:
+    """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again."""
+    from iapb import find_scene, load_scene
+    from reports.commands.progress import step_progress
+    from reports.runner import Runner
+
+    source = load_scene(find_scene(scene)).with_values(parsed(set_)) if set_ else load_scene(find_scene(scene))
+    with step_progress(f"{source.name} in {world}") as progress:
+        runner = Runner(out, progress)
+        existed = runner.inputs(source, world, rendering) in runner.store
+        result = runner(source, world, rendering)
+        path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
+    describe(result, existed)
+    if result.complete:
+        print(f"Stored in {path}")
+    else:
+        print(f"Interrupted: the {result.steps} steps done are readable in {path}.partial")
+        raise typer.Exit(130)
+
+
+def parsed(assignments: list[str] | None) -> dict[str, Any]:
+    """Turn ``path=value`` into values by path; values are read as YAML."""
+    from iapb.errors import ArgumentError
+    from iapb.scene.document import DocumentError, read_document
+
+    values = {}
+    for text in assignments or []:
+        path, equals, value = text.partition("=")
+        if not equals or not path:
+            raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")
+        try:
+            values[path.strip()] = read_document(value)[0].value
+        except DocumentError as error:
+            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {error.expected}") from None
+    return values
+
+
+def describe(run: Run, existed: bool) -> None:
+    """Say in sentences what happened."""
+    import numpy as np
+
+    seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
+    how = "read from its file; it had taken" if existed else "computed in"
+    print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}.")
+    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {seconds:.3g} s ({seconds / steps * 1e6:.3g} µs a step).")
+    impacts = run.impacts
+    if len(impacts.step):
+        lost = float(np.sum(impacts.energy_lost))
+        print(f"{len(impacts.step)} collisions, the first at {run.time[impacts.step[0]]:.4f} s, up to "
+              f"{int(impacts.rows.max())} contacts at once; they took {lost:.4g} J.")
+    else:
+        print("No collision was resolved by an impulse.")
+    if len(run.contacts.gap):
+        print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
+    end = ", ".join(f"{name} {value:.6g}" for name, value in zip(run.coordinate_names, run.q[-1], strict=True))
+    print(f"At the end: {end}.")

@@ -1,0 +1,12 @@
+"""`iapb schema`: the JSON Schema of scene files, for editors."""
+
+from __future__ import annotations
+
+
+def schema() -> None:
+    """Print the JSON Schema of scene files (for completion and checks in an editor)."""
+    import json
+
+    from iapb.scene import scene_schema
+
+    print(json.dumps(scene_schema(), indent=2))

@@ -1,0 +1,51 @@
+"""Stage: the claims ledger, its trials as tables, and the maps of where a claim holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from reports.figures.condition_map import condition_map
+from reports.figures.figure import Figure, Numbers
+from reports.pages.records import Claim
+from reports.runner import Runner
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> tuple[Claim, ...]:
+    """Check every claim with runs from the store."""
+    from verification.claims import check_claims
+
+    results = check_claims(lambda scene, world, rendering: runner(scene, world, rendering, keep=False), depth,
+                           progress=lambda done, total, _: progress(done, total))
+    return tuple(as_record(result) for result in results)
+
+
+def as_record(result: Any) -> Claim:
+    """A ClaimResult as the page shows it."""
+    headline, table = "", result.table
+    if result.decided:
+        headline = f"holds in {result.held} of {result.decided} trials"
+    columns = tuple(column.heading for column in table.columns) + (("holds",) if table.holds else ())
+    words = {True: "yes", False: "no", None: "cannot tell"}
+    rows = tuple(
+        (*row, words[held]) for row, held in zip(table.rows, table.holds, strict=True)
+    ) if table.holds else table.rows  # fmt: skip
+    return Claim(
+        id=result.id, statement=result.statement, place=result.place, outcome=result.verdict,
+        headline=f"{result.finding} ({headline})" if headline else result.finding, quantity=result.quantity,
+        conditions=result.conditions, tolerance=result.tolerance, fails=result.fails,
+        numbers=Numbers(columns, rows), figure=_map(result),
+    )  # fmt: skip
+
+
+def _map(result: Any) -> Figure | None:
+    """Where the claim holds, over its two telling conditions; none where it holds everywhere."""
+    if result.map_axes is None or result.verdict == "reproduced" or not result.table.rows:
+        return None
+    units = {column.name: column.heading for column in result.table.columns}
+    x, y = result.map_axes
+    panels = result.table.column(result.map_panels) if result.map_panels else None
+    return condition_map(
+        f"map-{result.id}", f"Where {result.id} holds", f"Each mark is one simulated condition of {result.id}.",
+        (units[x], result.table.column(x)), (units[y], result.table.column(y)), result.table.holds, panels,
+    )  # fmt: skip

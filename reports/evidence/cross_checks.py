@@ -1,0 +1,96 @@
+"""Stage: the engine against independent answers: Pinocchio and complementarity solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from reports.evidence.runs import shipped_scene
+from reports.pages.records import CrossCheck
+
+_STATES = 100
+_SCENES = ("two_link_arm_a", "peg_corner")
+_EPS = float(np.finfo(float).eps)
+
+
+def compute(progress: Callable[[int, int], None]) -> tuple[CrossCheck, ...]:
+    """Mass matrices and Jacobians, impacts of independent rows, one contact by an LCP, redundant contacts."""
+    checks = [*_mechanisms(), *_impulse_dynamics(), *_complementarity()]
+    progress(1, 1)
+    return tuple(checks)
+
+
+def _check(quantity: str, against: str, values: list[float], tolerance: float, reason: str) -> CrossCheck:
+    worst = float(max(values))
+    return CrossCheck(quantity, against, len(values), worst, tolerance, bool(worst <= tolerance), reason)
+
+
+def _mechanisms() -> Iterator[CrossCheck]:
+    from iapb.scene_mechanism import mechanism_of
+    from reference.rigid_body import model_of
+
+    rng = np.random.default_rng(1)
+    for name in _SCENES:
+        mechanism = mechanism_of(shipped_scene(name))
+        model, mass, rows = model_of(mechanism), [], []
+        for _ in range(_STATES):
+            q, point = rng.normal(size=mechanism.nq), np.append(rng.normal(size=2), 0.0)
+            mass.append(_distance(mechanism.mass_matrix(q), model.mass_matrix(q)))
+            body = len(mechanism.names) - 1
+            rows.append(_distance(mechanism.point_jacobian(q, body, point), model.point_jacobian(
+                q, mechanism.names[body], point)))
+        reason = "1e-11 of the largest entry: a hundred roundings"
+        yield _check(f"mass matrix, {name}", "Pinocchio", mass, 1e-11, reason)
+        yield _check(f"contact-point Jacobian, {name}", "Pinocchio", rows, 1e-11, reason)
+
+
+def _distance(ours: np.ndarray, theirs: np.ndarray) -> float:
+    return float(np.max(np.abs(ours - theirs)) / max(1.0, float(np.max(np.abs(theirs)))))
+
+
+def _impulse_dynamics() -> Iterator[CrossCheck]:
+    from iapb import resolve_impact
+    from reference.rigid_body import impulse_dynamics
+
+    rng = np.random.default_rng(2)
+    ratio, easy = [], []
+    for _ in range(2000):
+        d = int(rng.integers(1, 13))
+        c = int(rng.integers(1, d + 1))
+        root = rng.normal(size=(d, d))
+        M = root @ root.T + 10.0 ** rng.uniform(-2, 1) * np.eye(d)
+        J, v, e = rng.normal(size=(c, d)), rng.normal(size=d), float(rng.uniform(-1, 1))
+        L = np.linalg.cholesky(M)
+        condition = float(np.linalg.cond(np.linalg.solve(L, J.T)))
+        if condition > 1e6:
+            continue
+        ours, theirs = resolve_impact(M, J, v, e).velocity, impulse_dynamics(M, J, v, e)
+        error = float(np.linalg.norm(L.T @ (ours - theirs)) / np.linalg.norm(L.T @ v))
+        ratio.append(error / (100.0 * _EPS * condition**2))
+        if condition <= 10.0:
+            easy.append(error)
+    yield _check("v⁺ of independent rows, as a share of 100 ε κ(A)²", "Pinocchio impulseDynamics", ratio, 1.0,
+                 "it forms the Delassus matrix, whose condition is κ(A)²")
+    yield _check("v⁺ where κ(A) ≤ 10, kinetic metric", "Pinocchio impulseDynamics", easy, 1e-12, "plain rounding")
+
+
+def _complementarity() -> Iterator[CrossCheck]:
+    from iapb import resolve_impact
+    from reference.complementarity import ImpactProblem, solve
+
+    rng = np.random.default_rng(3)
+    one: dict[str, list[float]] = {"cvxpy_clarabel": [], "lemke": [], "daqp": []}
+    for _ in range(60):
+        d = int(rng.integers(1, 9))
+        root = rng.normal(size=(d, d))
+        M, v, e = root @ root.T + np.eye(d), rng.normal(size=d), float(rng.uniform(0, 1))
+        J = rng.normal(size=(1, d))
+        J *= -np.sign(J @ v)  # approaching
+        L, ours = np.linalg.cholesky(M), resolve_impact(M, J, v, e).velocity
+        for name, errors in one.items():
+            theirs = solve(ImpactProblem.from_impact(M, J, v, e), name).velocity_plus
+            errors.append(float(np.linalg.norm(L.T @ (ours - theirs)) / np.linalg.norm(L.T @ v)))
+    for name, errors in one.items():
+        tolerance = 1e-6 if name.startswith("cvxpy") else 1e-12
+        yield _check("v⁺ of one contact (C05)", name, errors, tolerance, "the solver's own accuracy")

@@ -1,0 +1,75 @@
+"""All evidence of a report, stage by stage, and the sentence of the first page that each stage earns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from reports.evidence import claims, cross_checks, effects, proofs, properties, runs
+from reports.evidence.manifest import manifest
+from reports.evidence.stage import Stage
+from reports.evidence.verdicts import verdicts
+from reports.figures.figure import Numbers
+from reports.pages.records import Claim, CrossCheck, Evidence, Property, SceneEffect
+from reports.provenance import collect_provenance
+from reports.runner import Runner
+
+Progress = Callable[[str, int, int], None]
+
+SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
+
+
+def gather(out: Path, depth: str, progress: Progress) -> Evidence:
+    """Compute or read everything that the report shows; `out` receives runs/ and tables/."""
+    runner, kept = Runner(out / "runs"), _Kept(out / "tables", depth, progress)
+    scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
+    inputs: dict[str, Any] = dict(runs.figure_runs(runner, kept.of("runs of the figures")))
+    inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
+    inputs["arm_energies"] = _arm_energies()
+    from verification.proofs.statement import ProofRecord
+
+    ledger = kept.stage("claims", tuple[Claim, ...], lambda done: claims.compute(runner, depth, done))
+    proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
+    laws = kept.stage("properties", tuple[Property, ...], properties.compute)
+    bulk = kept.stage("bulk impacts", Numbers, lambda done: properties.bulk(depth, done))
+    checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
+    needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
+    evidence = Evidence(
+        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, cross_checks=checks,
+        effects=needed, provenance=collect_provenance(seeds=(properties.SEED,)),
+        manifest=manifest(runner, kept.paths, out), bulk=bulk,
+    )  # fmt: skip
+    return _with_verdicts(evidence)
+
+
+def _with_verdicts(evidence: Evidence) -> Evidence:
+    from dataclasses import replace
+
+    return replace(evidence, verdicts=verdicts(evidence))
+
+
+def _arm_energies() -> Mapping[str, Any]:
+    from reports.figures.fig03_energy_loss import arm_energies
+
+    return arm_energies()
+
+
+class _Kept:
+    """Stages of one folder and depth; remembers which files they used."""
+
+    def __init__(self, folder: Path, depth: str, progress: Progress) -> None:
+        self.folder, self.depth, self.progress = folder, depth, progress
+        self.paths: list[Path] = []
+
+    def of(self, title: str) -> Callable[[int, int], None]:
+        """Progress of one stage."""
+        return lambda done, total: self.progress(title, done, total)
+
+    def stage(self, name: str, kind: Any, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
+        """The records of a stage, computed if they are not there."""
+        stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth})
+        records = stage.get_or_compute(lambda: compute(self.of(name)))
+        self.progress(name, 1, 1)
+        self.paths.append(stage.path)
+        return records

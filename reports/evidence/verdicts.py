@@ -1,0 +1,76 @@
+"""The first page: one sentence per topic, made from the records, never typed in."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from reports.pages.records import LIMITED, OUTCOMES, REFUTED, REPRODUCED, Evidence, Verdict
+
+
+def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
+    """One verdict for each topic that was computed."""
+    return tuple([*_claims(evidence), *_passivity(evidence), *_proofs(evidence), *_laws(evidence),
+                  *_checks(evidence), *_hard_cases(evidence)])  # fmt: skip
+
+
+def _claims(evidence: Evidence) -> Iterator[Verdict]:
+    if not evidence.claims:
+        return
+    count = Counter(claim.outcome for claim in evidence.claims)
+    words = ", ".join(f"{count[outcome]} {outcome}" for outcome in OUTCOMES if count[outcome])
+    refuted = [claim.id for claim in evidence.claims if claim.outcome == REFUTED]
+    outcome = REPRODUCED if set(count) == {REPRODUCED} else LIMITED
+    tail = f" Refuted: {', '.join(refuted)}." if refuted else ""
+    yield Verdict("The paper's claims", outcome, f"Of {len(evidence.claims)} claims computed: {words}.{tail}", "claims")
+
+
+def _passivity(evidence: Evidence) -> Iterator[Verdict]:
+    if evidence.bulk is None:
+        return
+    totals = {row[0]: row for row in evidence.bulk.rows if row[1] == "all"}
+    ours, printed = totals["factored"], totals["gram_pinv, as printed"]
+    sentence = (f"In {ours[2]:,} random impacts the engine's largest relative energy gain is {ours[3]:.1e}, at most "
+                f"{ours[4]:.2g} of its bound 10 d ε √κ(M); the printed formula gains up to {printed[3]:.1e}.")
+    yield Verdict("Passive in floating point", REPRODUCED if ours[6] == 0 else REFUTED, sentence, "properties")
+
+
+def _proofs(evidence: Evidence) -> Iterator[Verdict]:
+    if not evidence.proofs:
+        return
+    proved = sum(proof.holds for proof in evidence.proofs)
+    twins = sum(len(proof.twins) for proof in evidence.proofs)
+    sentence = (f"{proved} of {len(evidence.proofs)} statements are proved by certificates that a machine expanded; "
+                f"{twins} wrong twins are refuted by exact counterexamples.")
+    yield Verdict("Proofs", REPRODUCED if proved == len(evidence.proofs) else REFUTED, sentence, "proofs")
+
+
+def _laws(evidence: Evidence) -> Iterator[Verdict]:
+    if not evidence.properties:
+        return
+    kept = sum(law.holds for law in evidence.properties)
+    planted = [law for law in evidence.properties if law.fault]
+    caught = sum(bool(law.fault_caught) for law in planted)
+    sentence = (f"{kept} of {len(evidence.properties)} laws hold on random and nasty impacts; {caught} of "
+                f"{len(planted)} planted faults are caught.")
+    good = kept == len(evidence.properties) and caught == len(planted)
+    yield Verdict("Properties", REPRODUCED if good else REFUTED, sentence, "properties")
+
+
+def _checks(evidence: Evidence) -> Iterator[Verdict]:
+    if not evidence.cross_checks:
+        return
+    agreed = sum(check.agrees for check in evidence.cross_checks)
+    sentence = (f"{agreed} of {len(evidence.cross_checks)} comparisons with Pinocchio and with complementarity "
+                "solvers agree to the stated tolerance.")
+    outcome = REPRODUCED if agreed == len(evidence.cross_checks) else REFUTED
+    yield Verdict("Independent answers", outcome, sentence, "cross-checks")
+
+
+def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
+    if not evidence.hard_cases:
+        return
+    ours = [result for case in evidence.hard_cases for result in case.results if result[0] == "factored"]
+    stable = sum(result[3].startswith("stable") for result in ours)
+    sentence = f"The engine is stable on {stable} of {len(ours)} hard cases with exact answers."
+    yield Verdict("Hard cases", REPRODUCED if stable == len(ours) else LIMITED, sentence, "hard-cases")
