@@ -64,14 +64,20 @@ class Attack:
         return self.worst_ratio <= 1.0
 
 
-def attack(resolve: BulkResolver, count: int = 10_000, seed: int = 1) -> Attack:
-    """Resolve `count` adversarial impacts and compare their exact energy gains with `gain_bound`.
+def attack(
+    resolve: BulkResolver,
+    count: int = 10_000,
+    seed: int = 1,
+    bound: Callable[[int, float], float] = gain_bound,
+) -> Attack:
+    """Resolve `count` adversarial impacts and compare their energy gains, in double-double, with a bound.
 
     Parameters
     ----------
     resolve : bulk resolver, (M (n,d,d), J (n,c,d), v (n,d), e (n,)) -> v⁺ (n,d).
     count : number of impacts.
     seed : of the generator; the same seed gives the same impacts.
+    bound : (d, κ(M)) -> largest relative gain allowed.
 
     Raises
     ------
@@ -84,7 +90,7 @@ def attack(resolve: BulkResolver, count: int = 10_000, seed: int = 1) -> Attack:
     by_family, by_decade = dict.fromkeys(FAMILIES, -np.inf), dict[int, float]()
     for batch in _batches(count, seed):
         gains, kappas = _judge(batch, resolve(*batch[1:]))
-        limits = np.array([gain_bound(batch.velocity.shape[1], kappa) for kappa in kappas])
+        limits = np.array([bound(batch.velocity.shape[1], kappa) for kappa in kappas])
         ratios = gains / limits
         by_family[batch.family] = max(by_family[batch.family], float(np.max(ratios)))
         for decade in np.unique(np.log10(kappas).astype(int)):

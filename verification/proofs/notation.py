@@ -34,34 +34,38 @@ def latex(value: Expression) -> str:
 
 def _sum(value: Expression, write) -> str:  # type: ignore[no-untyped-def]
     pieces: list[str] = []
+    unit = (
+        "" if value.rows in ("*", "1") else "I"
+    )  # a bare number among matrices is a multiple of the identity
     for term, coefficient in value.ordered():
         sign = "−" if coefficient < 0 else "+"
-        piece = write(term, abs(coefficient))
+        piece = write(term, abs(coefficient), unit)
         pieces.append(f" {sign} {piece}" if pieces else ("−" if sign == "−" else "") + piece)
     joined = "".join(pieces) or "0"
     return joined.replace("−", "-") if write is _latex_term else joined
 
 
-def _text_term(term: Term, coefficient: Fraction) -> str:
+def _text_term(term: Term, coefficient: Fraction, unit: str) -> str:
     scalars, word = term
     factors = [name + _raised(len(list(group))) for name, group in groupby(scalars)]
-    factors += [letter.name + ("ᵀ" if letter.flipped else "") for letter in word]
-    if not factors and coefficient == 1:
-        return "1" if not word else "I"
-    return " ".join(([] if coefficient == 1 else [str(coefficient)]) + factors)
+    factors += (
+        [letter.name + ("ᵀ" if letter.flipped else "") for letter in word] if word else [unit] * bool(unit)
+    )
+    number = [] if coefficient == 1 and factors else [str(coefficient)]
+    return " ".join(number + factors)
 
 
 def _raised(power: int) -> str:
     return "" if power == 1 else "".join("⁰¹²³⁴⁵⁶⁷⁸⁹"[int(digit)] for digit in str(power))
 
 
-def _latex_term(term: Term, coefficient: Fraction) -> str:
+def _latex_term(term: Term, coefficient: Fraction, unit: str) -> str:
     scalars, word = term
     factors = []
     for name, group in groupby(scalars):
         power = len(list(group))
         factors.append(latex_name(name) if power == 1 else f"{{{latex_name(name)}}}^{{{power}}}")
-    factors += [_latex_letter(letter) for letter in word]
+    factors += [_latex_letter(letter) for letter in word] if word else [unit] * bool(unit)
     number = [] if coefficient == 1 and factors else [latex_number(coefficient)]
     return r" \, ".join(number + factors)
 

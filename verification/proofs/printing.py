@@ -45,7 +45,7 @@ def plain(prose: str) -> str:
     }  # fmt: skip
     for mark in sorted(from_to, key=len, reverse=True):
         prose = prose.replace(mark, from_to[mark])
-    return re.sub(r"[\${}]", "", prose)
+    return re.sub(r"\\?[\${}]", "", prose)
 
 
 def _section(title: str, rows: Iterable[str]) -> list[str]:

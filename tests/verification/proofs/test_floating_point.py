@@ -58,6 +58,10 @@ def test_clamp_is_what_keeps_the_bound() -> None:
     assert not attack(engine_resolver("factored", clamp=False), 1_500, seed=4).holds
 
 
+def test_without_the_clamp_the_larger_bound_holds() -> None:
+    assert attack(engine_resolver("factored", clamp=False), 1_500, seed=4, bound=unclamped_bound).holds
+
+
 def test_printed_formula_breaks_the_bound() -> None:
     assert not attack(engine_resolver("gram_pinv"), 1_500, seed=4).holds
 
