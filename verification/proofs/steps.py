@@ -154,6 +154,10 @@ class Positivity:
                 raise Refused(f"'{self.claim.name}': the weight {term.weight} is not positive")
             if any(factor.value.rows != "*" for factor in term.factors):
                 raise Refused(f"'{self.claim.name}': a factor that is not a commuting scalar")
+            if isinstance(term.form, Pairing) and not term.form.value.is_scalar:
+                raise Refused(
+                    f"'{self.claim.name}': entrywise products only show that a number is not negative"
+                )
             for fact in term.facts:
                 known.require(fact)
             remainder = remainder - term.value

@@ -21,6 +21,7 @@ def test_statement_is_proved(name: str) -> None:
 def test_printed_proof_lists_every_hypothesis_and_certificate_line(name: str) -> None:
     record = check(name)
     text = record.as_text()
+    assert "\\" not in text, "LaTeX that a terminal cannot show"
     for line in (*record.hypotheses, *(row for step in record.steps for row in step.certificate)):
         assert line.words in text
         assert line.text in text

@@ -10,7 +10,7 @@ from verification.proofs import all_proofs, load
 from verification.proofs.algebra import matrix, scalar, vector
 from verification.proofs.checking import checked
 from verification.proofs.exact import FlintBackend, SympyBackend, evaluate, instance, signature_allows
-from verification.proofs.facts import Definite, NonNegative, equation
+from verification.proofs.facts import Definite, Entrywise, NonNegative, equation
 from verification.proofs.rewriting import identity
 from verification.proofs.statement import Statement
 from verification.proofs.steps import (
@@ -19,6 +19,7 @@ from verification.proofs.steps import (
     Exact,
     Identity,
     Known,
+    Pairing,
     Positivity,
     Refused,
     Square,
@@ -117,6 +118,14 @@ def test_a_matrix_may_not_serve_as_a_scalar_factor() -> None:
     claim = NonNegative("C C ⪰ 0", square * square)
     with pytest.raises(Refused, match="commuting scalar"):
         Positivity(claim, (Term(1, (fact, fact)),)).verify(Known([fact]))
+
+
+def test_entrywise_products_say_nothing_about_matrices() -> None:
+    """[0 1; 1 0] is entrywise non-negative but not positive semi-definite."""
+    square = Entrywise("C ≥ 0 entrywise", matrix("C", "n", "n"))
+    claim = NonNegative("Cᵀ C ⪰ 0", square.value.T * square.value)
+    with pytest.raises(Refused, match="entrywise"):
+        Positivity(claim, (Term(1, (), Pairing(square, square)),)).verify(Known([square]))
 
 
 def test_cancelling_needs_the_matching_square() -> None:
