@@ -13,6 +13,7 @@ from iapb.contact.kernels.cholesky import to_whitened, whiten_columns
 from iapb.contact.kernels.impact import (
     ImpactWork,
     apply_change,
+    apply_projected_change,
     factored_impact,
     make_impact_work,
     rank_tolerance,
@@ -171,7 +172,8 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
     rank = int(np.sum(singular_values > _tolerance(problem, tolerance)))
     work.basis[:rank] = right[:rank]
     work.change[:] = -(1.0 + problem.restitution) * (right[:rank].T @ (right[:rank] @ work.u))
-    clamp = apply_change(problem.mass_matrix, problem.lower, problem.velocity, clamped, work, v_plus, momentum)
+    clamp = apply_projected_change(problem.mass_matrix, problem.lower, problem.velocity, rank, clamped, work, v_plus,
+                                   momentum)
     return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp)
 
 

@@ -10,6 +10,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.contact.kernels.compensated import quadratic_forms
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
+from iapb.contact.kernels.refine import refine_change
 
 UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. Restitution is
@@ -30,8 +31,11 @@ class ImpactWork(NamedTuple):
     size: np.ndarray  # (c,)
     overlap: np.ndarray  # (c,)
     u: np.ndarray  # (d,) whitened velocity
-    change: np.ndarray  # (d,) Δu
+    change: np.ndarray  # (d,) Δu; after an impact L⁻¹ of the generalized impulse
     v_change: np.ndarray  # (d,) Δv
+    deviation: np.ndarray  # (d,)
+    along: np.ndarray  # (d,)
+    shifted: np.ndarray  # (d,)
 
 
 def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
@@ -39,7 +43,7 @@ def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
     d, c = coordinates, contacts
     wide, long, short = (d, c), (c,), (d,)
     return ImpactWork(np.zeros(wide), np.zeros(wide), np.zeros(long), np.zeros((d, d)), np.zeros(long),
-                      np.zeros(long), np.zeros(long), np.zeros(short), np.zeros(short), np.zeros(short))
+                      np.zeros(long), np.zeros(long), *(np.zeros(short) for _ in range(6)))
 
 
 @kernel
@@ -84,8 +88,19 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
     rank = orthonormal_basis(columns, count, u, tolerance, budget, work.basis, work.closing, work.size,
                              work.overlap)
     projected_change(work.basis, rank, u, 1.0 + restitution, change)
-    clamp = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
+    clamp = apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, momentum)
     return rank, clamp
+
+
+@kernel
+def apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, momentum):
+    """`apply_change` for a Δu in the span of the basis; where it is clamped, it is first made exact for M itself."""
+    d = v.shape[0]
+    from_whitened(lower, work.change[:d], work.v_change[:d])
+    if clamped:
+        refine_change(mass_matrix, lower, work.basis, rank, work.change[:d], work.v_change[:d], work.deviation[:d],
+                      work.along[:d], work.shifted[:d])
+    return _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum)
 
 
 @kernel
@@ -93,6 +108,13 @@ def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
     """v⁺ = v + α L⁻ᵀ Δu with the clamp's α; generalized impulse α L Δu. Returns α."""
     d = v.shape[0]
     from_whitened(lower, work.change[:d], work.v_change[:d])
+    return _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum)
+
+
+@kernel
+def _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum):
+    """v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change. Returns α."""
+    d = v.shape[0]
     alpha = 1.0
     moved = False
     for k in range(d):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from iapb import resolve_impact
 from iapb.contact.kernels.impact import energy_clamp
-from reference.exact import relative_energy_gain
+from reference.exact import exact_impact, relative_energy_gain
 
 NUMBERS = st.lists(st.integers(-8, 8).map(float), min_size=3, max_size=3)
 MASS = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
@@ -54,6 +54,27 @@ def test_with_the_clamp_the_gain_keeps_its_bound_without_it_not(exponent: int) -
     assert max(gains[True]) <= bound
     if exponent == 12:
         assert max(gains[False]) > bound
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_ill_conditioned_impact_is_exact_for_the_mass_matrix_itself(seed: int) -> None:
+    """κ(M) = 1e12: energy neither gained nor lost above the bound, restitution met, M Δv = Jᵀp in exact arithmetic.
+
+    Without the refinement the factor's L Lᵀ ≠ M costs 1e-5 of the energy either way, and the clamp restitution.
+    """
+    mass, v = light_direction(12, seed=seed)
+    rows = np.random.default_rng(seed + 100).normal(size=(3, 6)) @ np.linalg.cholesky(mass).T
+    impact = resolve_impact(mass, rows, v, 1.0)
+    bound = 10 * 6 * 2.0**-52 * 1e6
+    assert abs(relative_energy_gain(mass, v, impact.velocity)) <= bound
+    assert 1.0 - impact.clamp <= bound
+    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(mass), rows.T), axis=0)
+    assert (np.abs(rows @ (impact.velocity + v)) <= bound * length * np.sqrt(v @ mass @ v)).all()
+    truth = exact_impact(mass, rows, v, 1.0)
+    error = np.array([float(Fraction(a) - b) for a, b in zip(impact.velocity, truth.velocity, strict=True)])
+    assert np.sqrt(error @ mass @ error / (v @ mass @ v)) <= bound
+    momentum = np.array([float(f) for f in truth.generalized_impulse])
+    np.testing.assert_allclose(impact.generalized_impulse, momentum, atol=1e-8 * np.abs(momentum).max())
 
 
 def test_a_clamped_impulse_is_scaled_with_its_velocity() -> None:
