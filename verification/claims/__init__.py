@@ -17,7 +17,18 @@ _FILES = (
     "c03_rows_removed",
     "c04_elastic",
     "c05_complementarity",
+    "c06_coordinates",
+    "c07_plastic",
+    "c08_passive",
+    "c09_no_impulse",
     "c10_trajectory",
+    "c11_forces",
+    "c12_saturate_spread",
+    "c13_limited_trajectory",
+    "c14_limited_forces",
+    "c15_settling",
+    "c16_together",
+    "c17_energy_lost",
 )
 CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)

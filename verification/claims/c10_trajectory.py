@@ -33,7 +33,7 @@ CLAIM = Claim(
     statement="The device trajectory of IAPB is closest to ideal, ahead of PB and CBuc.",
     place="Section VI, Fig. 7",
     quantity="RMS distance of the device trajectory from the ideal world's, per coordinate, from the first contact "
-    "until the ideal peg has settled; the largest distance beside it.",
+    "until all four have settled, or to the end of the run; the largest distance beside it.",
     tolerance="Strictly the smallest of the three. Where all three are within 1e-7 of ideal the trial cannot tell.",
     measure=measure,
     holds=closest,

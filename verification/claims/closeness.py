@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.measures import largest_distance, root_mean_square
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import comparison_window, largest_distance, root_mean_square
 from verification.claims.table import Column, Row, Table
 from verification.claims.trace import COORDINATES
 
 if TYPE_CHECKING:
-    from verification.claims.conditions import Condition
     from verification.claims.study import Study
 
 COLUMNS = (
-    Column("tilt", "rad", condition=True),
-    Column("clearance", "m", condition=True),
-    Column("travel", "m", condition=True),
-    Column("friction", condition=True),
+    *columns("tilt", "clearance", "travel", "friction"),
     Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),
@@ -42,8 +39,9 @@ def distances(study: Study, condition: Condition, rendering: str) -> Iterator[di
         "PB": study.trace(condition, "PB"),
         "CBuc": study.trace(condition, "CBuc"),
     }
-    mean = {name: root_mean_square(trace, ideal) for name, trace in worlds.items()}
-    peak = {f"{name}, largest": largest_distance(trace, ideal) for name, trace in worlds.items()}
+    window = comparison_window([ideal, *worlds.values()])
+    mean = {name: root_mean_square(trace, ideal, window) for name, trace in worlds.items()}
+    peak = {f"{name}, largest": largest_distance(trace, ideal, window) for name, trace in worlds.items()}
     for i, coordinate in enumerate(COORDINATES):
         numbers = {name: float(values[i]) for name, values in (mean | peak).items()}
         yield condition.record() | {"coordinate": coordinate} | numbers

@@ -12,18 +12,21 @@ from typing import Any
 import numpy as np
 
 from iapb.scene import Scene
+from verification.claims.table import Column
 
+F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
 
 # Worlds without friction and penalties do not see these; one run of theirs serves all values.
-PENALTY_ONLY = ("friction", "stiffness", "damping")
+PENALTY_ONLY = ("friction", "stiffness", "damping", "force_limit")
 
 
 @dataclass(frozen=True)
 class Condition:
     """One variation of the peg scene; friction, stiffness and damping are those of the walls.
 
-    tilt [rad]; clearance to the wall and travel to the floor [m]; stiffness [N/m]; damping [N s/m]
+    tilt [rad]; clearance to the wall and travel to the floor [m]; stiffness [N/m]; damping [N s/m]; force_limit
+    of the device as a multiple of the paper's
     """
 
     tilt: float = 0.08
@@ -32,6 +35,7 @@ class Condition:
     friction: float = 0.0
     stiffness: float = 1000.0
     damping: float = 50.0
+    force_limit: float = 1.0
 
     def rigid(self) -> Condition:
         """The same trial as a world of rigid, frictionless contacts sees it."""
@@ -53,27 +57,35 @@ class Condition:
             "contact.friction": self.friction,
             "contact.stiffness": self.stiffness,
             "contact.damping": self.damping,
+            "device.force_limit": [self.force_limit * limit for limit in F_LIMIT],
         })  # fmt: skip
 
 
 TILTS = {
-    "quick": (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35),
-    "full": (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
+    "quick": (0.0, 0.01, 0.03, 0.1, 0.3),
+    "full": (0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
 FRICTIONS = (0.1, 0.3)
+FORCE_LIMITS = (1.0, 0.3)
 STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
 DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 
 
 def start_conditions(depth: str) -> tuple[Condition, ...]:
-    """Every tilt with every clearance, then other travels and frictions at three tilts."""
+    """Every tilt with every clearance, other travels at three tilts, other frictions at every tilt."""
     grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
-    few = (0.0, 0.02, 0.1)
+    few = (0.0, 0.03, 0.1)
     travels = [Condition(tilt, travel=travel) for tilt in few for travel in TRAVELS[depth]]
     frictions = [Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS]
     return tuple(dict.fromkeys(grid + travels + frictions))
+
+
+def limited_conditions(depth: str) -> tuple[Condition, ...]:
+    """The starting conditions with the paper's device limits, and with tighter ones (C12 to C14, C16)."""
+    starts = start_conditions(depth)
+    return tuple(replace(start, force_limit=limit) for limit in FORCE_LIMITS for start in starts)
 
 
 def wall_conditions() -> tuple[Condition, ...]:
@@ -84,7 +96,15 @@ def wall_conditions() -> tuple[Condition, ...]:
     )  # fmt: skip
 
 
+UNITS = {"tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
+         "force_limit": "F_limit"}  # fmt: skip
+
+
+def columns(*names: str) -> tuple[Column, ...]:
+    """Return the condition columns of these names."""
+    return tuple(Column(name, UNITS[name], condition=True) for name in names)
+
+
 def describe(condition: Condition) -> dict[str, Any]:
     """The condition with units, for a report."""
-    units = {"tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m"}
-    return {f"{name} [{units[name]}]" if units[name] else name: value for name, value in condition.record().items()}
+    return {column.heading: condition.record()[column.name] for column in columns(*UNITS)}

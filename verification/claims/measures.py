@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +16,10 @@ Floats = NDArray[np.float64]
 # contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
 SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
 
-# A corner has left its wall where it is further away than this [m]; it touches it again at zero. A twentieth of the
-# static sink F_h / K, above the flicker of resting contacts.
+# A corner has left its wall where it is further away than this [m]: a twentieth of the
+# static sink F_h / K, above the flicker of resting contacts
 LIFTED = 1e-5
+TOUCHING = 1e-6  # and touches it again below this [m]: rigid worlds keep contacts at zero up to rounding
 
 
 def settled_at(trace: Trace) -> int:
@@ -33,32 +36,30 @@ def settling_time(trace: Trace) -> float | None:
     return max(float(trace.time[state] - trace.time[min(trace.first_contact, len(trace.time) - 1)]), 0.0)
 
 
-def comparison_window(ideal: Trace) -> slice:
-    """States from the ideal world's first contact to its settling, or to the end where it does not settle."""
-    start = min(ideal.first_contact, len(ideal.time) - 2)
-    return slice(start, max(settled_at(ideal), start + 2))
+def comparison_window(traces: Sequence[Trace]) -> slice:
+    """States from the first contact in any of the worlds until all have settled, or to the end of the runs."""
+    length = len(traces[0].time)
+    start = min(min(trace.first_contact for trace in traces), length - 2)
+    return slice(start, max(start + 2, min(max(map(settled_at, traces)) + 1, length)))
 
 
-def root_mean_square(trace: Trace, ideal: Trace) -> Floats:
-    """Return the RMS distance of the two device trajectories per coordinate (3,) over the comparison window."""
-    window = comparison_window(ideal)
+def root_mean_square(trace: Trace, ideal: Trace, window: slice) -> Floats:
+    """Return the RMS distance of the two device trajectories per coordinate (3,)."""
     return np.sqrt(np.mean((trace.device[window] - ideal.device[window]) ** 2, axis=0))
 
 
-def largest_distance(trace: Trace, ideal: Trace) -> Floats:
-    """Return the largest distance of the two device trajectories per coordinate (3,) over the comparison window."""
-    window = comparison_window(ideal)
+def largest_distance(trace: Trace, ideal: Trace, window: slice) -> Floats:
+    """Return the largest distance of the two device trajectories per coordinate (3,)."""
     return np.max(np.abs(trace.device[window] - ideal.device[window]), axis=0)
 
 
-def momentum_distance(trace: Trace, ideal: Trace) -> Floats:
+def momentum_distance(trace: Trace, ideal: Trace, window: slice) -> Floats:
     """Return the RMS distance of the momenta that the actuators have given so far, per coordinate [N s, N m s].
 
     Forces are compared through their time integral: a spike of one step that comes one step later is then a small
     difference, where the force itself differs by all of its height.
     """
     given = np.cumsum(trace.device_force - ideal.device_force, axis=0) * ideal.dt
-    window = comparison_window(ideal)
     return np.sqrt(np.mean(given[window] ** 2, axis=0))
 
 
@@ -101,8 +102,8 @@ def corner_gaps(positions: Floats) -> list[Floats]:
 
 
 def _departures(gap: Floats) -> int:
-    """Times the gap goes above LIFTED after having been at or below zero."""
-    events = np.where(gap <= 0.0, 1, np.where(gap > LIFTED, -1, 0))
+    """Times the gap goes above LIFTED after having been below TOUCHING."""
+    events = np.where(gap <= TOUCHING, 1, np.where(gap > LIFTED, -1, 0))
     events = events[events != 0]
     return int(np.sum((events[:-1] == 1) & (events[1:] == -1)))
 

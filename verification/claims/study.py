@@ -9,14 +9,20 @@ Nothing is written here; whoever wants the runs kept passes a `run` that keeps t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from iapb.errors import ArgumentError
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.claims.claim import ClaimResult
-from verification.claims.conditions import Condition, describe, start_conditions, wall_conditions
+from verification.claims.conditions import (
+    Condition,
+    describe,
+    limited_conditions,
+    start_conditions,
+    wall_conditions,
+)
 from verification.claims.trace import Trace, trace_of
 
 Runner = Callable[[Scene, str, str], Run]
@@ -65,16 +71,23 @@ class Study:
         """The starting conditions of the peg at this depth."""
         return start_conditions(self.depth)
 
+    def limited(self) -> tuple[Condition, ...]:
+        """The starting conditions of the peg at this depth, with limits of the device."""
+        return limited_conditions(self.depth)
+
     def trace(self, condition: Condition, world: str, rendering: str = "full") -> Trace:
         """The peg under a condition in a world; rigid worlds see neither friction nor penalties."""
         seen = condition.rigid() if world in RIGID else condition
+        if world not in RIGID and rendering == "full":
+            seen = replace(seen, force_limit=Condition().force_limit)  # where nobody heeds it
         key = (seen, world, rendering)
         if key not in self._traces:
-            run = self.run(self._placed(seen), world, rendering)
+            run = self.run(self.place(seen), world, rendering)
             self._traces[key] = trace_of(run)
         return self._traces[key]
 
-    def _placed(self, condition: Condition) -> Scene:
+    def place(self, condition: Condition) -> Scene:
+        """The peg scene under a condition."""
         if condition not in self._scenes:
             self._scenes[condition] = condition.place(self.scene("peg_corner"))
         return self._scenes[condition]
@@ -123,4 +136,4 @@ def check_claims(
 
 def conditions(depth: str = "quick") -> tuple[dict[str, Any], ...]:
     """Every variation of the peg scene that the claims of this depth compute, for a report."""
-    return tuple(describe(condition) for condition in dict.fromkeys(start_conditions(depth) + wall_conditions()))
+    return tuple(describe(condition) for condition in dict.fromkeys(limited_conditions(depth) + wall_conditions()))

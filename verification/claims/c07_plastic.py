@@ -1,0 +1,115 @@
+"""C07: a plastic collision takes all or part of the kinetic energy, depending on geometry (Fig. 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from iapb import resolve_impact
+from verification.claims.claim import Claim
+from verification.claims.table import Column, Row, Table, table_of
+
+if TYPE_CHECKING:
+    from iapb.mechanics.mechanism import Mechanism
+    from verification.claims.study import Study
+
+COLUMNS = (
+    Column("reading", part=True),
+    Column("place along the second link", "m", condition=True),
+    Column("angle of the second link", "rad", condition=True),
+    Column("expected"),
+    Column("energy before", "J"),
+    Column("energy after", "J"),
+    Column("share lost"),
+)
+ALL, SOME = "all", "part"
+RODS, POINTS = "slender rods", "point masses at the tips"
+PLACE_A, PLACE_B = 0.7, 0.5
+ANGLES = (0.0, 0.5, 1.0, 2.0)
+PLACES = (0.1, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0)
+VELOCITY = np.array([1.0, 1.0])
+
+# A share below this is rounding of an energy of 2 J through one 2 x 2 factorization.
+ROUNDING = 1e-12
+
+
+def measure(study: Study) -> Table:
+    """The arm of Fig. 2 struck across its second link, at A and B, elsewhere, and with the elbow bent."""
+    return table_of(COLUMNS, _trials(study))
+
+
+def _trials(study: Study) -> Iterator[dict[str, Any]]:
+    for reading, at_b in ((RODS, ALL), (POINTS, SOME)):
+        arm = arm_of(study, reading)
+        for angle in ANGLES:
+            for place in PLACES:
+                expected = at_b if (angle, place) == (0.0, PLACE_B) and reading == RODS else SOME
+                if reading == POINTS and (angle, place) == (0.0, 1.0):
+                    continue
+                yield {"reading": reading, "place along the second link": place, "expected": expected,
+                       "angle of the second link": angle} | strike(arm, place, angle, 0.0)  # fmt: skip
+
+
+def arm_of(study: Study, reading: str) -> Mechanism:
+    """The mechanism of the arm: uniform rods as in the scene, or all of a link's mass at its end."""
+    from iapb.system import System
+
+    scene = study.scene("two_link_arm_a")
+    if reading == POINTS:
+        for name in ("upper_arm", "forearm"):
+            scene = scene.with_values({f"bodies.{name}.center_of_mass": [1.0, 0.0], f"bodies.{name}.inertia": 0.0})
+    return System(scene).mechanism
+
+
+def strike(arm: Mechanism, place: float, angle: float, restitution: float) -> dict[str, float]:
+    """Energies of one frictionless impact across the second link, `place` [m] from the elbow."""
+    q = np.array([0.5 * np.pi, angle])
+    along = np.array([np.cos(q.sum()), np.sin(q.sum()), 0.0])
+    across = np.array([-along[1], along[0], 0.0])
+    elbow = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
+    rows = (-across @ arm.point_jacobian(q, 1, elbow + place * along))[None, :]
+    mass = arm.mass_matrix(q)
+    before = 0.5 * float(VELOCITY @ mass @ VELOCITY)
+    after_velocity = resolve_impact(mass, rows, VELOCITY, restitution).velocity
+    after = 0.5 * float(after_velocity @ mass @ after_velocity)
+    return {"energy before": before, "energy after": after, "share lost": (before - after) / before}
+
+
+def holds(row: Row) -> bool | None:
+    """All of the energy where that is expected, some of it but not all elsewhere."""
+    share = row["share lost"]
+    if row["expected"] == ALL:
+        return bool(abs(share - 1.0) <= ROUNDING)
+    return bool(ROUNDING < share < 1.0 - ROUNDING)
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    straight = {"angle of the second link": 0.0}
+    texts = []
+    for reading in (RODS, POINTS):
+        ours = table.where(reading=reading, **straight)
+        a, b = (ours.where(**{"place along the second link": place}).records()[0] for place in (PLACE_A, PLACE_B))
+        texts.append(
+            f"{reading}: {a['energy before']:.4f} J before, {a['energy after']:.6f} J left at A, "
+            f"{b['energy after']:.1e} J at B"
+        )
+    shares = table.column("share lost")
+    span = f"{min(shares):.3f} to {max(shares):.3f}"
+    return f"As {'; as '.join(texts)}. Over all places and angles the share lost goes from {span}."
+
+
+CLAIM = Claim(
+    id="C07",
+    statement="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
+    place="Section V-A, Fig. 2 and 3",
+    quantity="Share of kinetic energy lost by the two-link arm in one frictionless collision with e = 0.",
+    tolerance="1e-12 of the energy counts as all or nothing: the rounding of one 2 x 2 factorization.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("place along the second link", "angle of the second link"),
+    map_panels="reading",
+)

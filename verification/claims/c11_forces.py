@@ -1,0 +1,94 @@
+"""C11: forces are large on new contact, balance the hand while in contact, and are closest to ideal (Fig. 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import count
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import comparison_window, momentum_distance, peak_force, resting_force
+from verification.claims.table import Column, Row, Table, table_of
+from verification.claims.trace import COORDINATES
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+LARGE, BALANCE, CLOSEST = "peak on new contact", "mean force after settling", "momentum given, distance to ideal"
+COLUMNS = (
+    Column("part", part=True),
+    *columns("tilt", "clearance", "travel", "friction"),
+    Column("coordinate", condition=True),
+    Column("IAPB"),
+    Column("PB"),
+    Column("CBuc"),
+    Column("hand"),
+)
+WORLDS = ("IAPB", "PB", "CBuc")
+
+# Slower than 1 mm/s the contact dampers still carry up to 50 N s/m x 1 mm/s = 0.05 N of the hand's 0.4 N.
+BALANCED = 0.05  # [N]
+# Peaks and momenta below this [N, N m, N s, N m s] are rounding: nothing pushed along this coordinate at all.
+NOTHING = 1e-9
+
+
+def measure(study: Study) -> Table:
+    """Every start; peaks, resting forces and the momentum given so far, per coordinate."""
+    return table_of(COLUMNS, (row for condition in study.starts() for row in _trials(study, condition)))
+
+
+def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    ideal = study.trace(condition, "ideal")
+    traces = {world: study.trace(condition, world) for world in WORLDS}
+    window = comparison_window([ideal, *traces.values()])
+    peaks = {world: peak_force(trace) for world, trace in traces.items()}
+    given = {world: momentum_distance(trace, ideal, window) for world, trace in traces.items()}
+    resting = {world: resting_force(trace) for world, trace in traces.items()}
+    for i, coordinate in enumerate(COORDINATES):
+        common = condition.record() | {"coordinate": coordinate, "hand": float(ideal.hand_force[-1, i])}
+        yield common | {"part": LARGE} | {world: float(peaks[world][i]) for world in WORLDS}
+        yield common | {"part": CLOSEST} | {world: float(given[world][i]) for world in WORLDS}
+        if coordinate != "theta":
+            found = {world: None if force is None else float(force[i]) for world, force in resting.items()}
+            yield common | {"part": BALANCE} | found
+
+
+def holds(row: Row) -> bool | None:
+    """Peak above PB's; resting force opposite to the hand's; momentum nearer to ideal than PB's and CBuc's."""
+    if row["part"] == BALANCE:
+        return None if row["IAPB"] is None else bool(abs(row["IAPB"] + row["hand"]) <= BALANCED)
+    if max(row[world] for world in WORLDS) < NOTHING:
+        return None
+    if row["part"] == LARGE:
+        return bool(row["IAPB"] > row["PB"])
+    return bool(row["IAPB"] < min(row["PB"], row["CBuc"]))
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    texts = []
+    for coordinate, unit in (("x", "N"), ("y", "N"), ("theta", "N m")):
+        trials = table.where(part=LARGE, coordinate=coordinate)
+        texts.append(f"{coordinate} {max(trials.column('IAPB')):.3g} {unit} (PB {max(trials.column('PB')):.3g})")
+    closest = "; ".join(f"{name}: {count(table.where(part=CLOSEST, coordinate=name))}" for name in COORDINATES)
+    return (
+        f"Largest forces: {', '.join(texts)}; above PB's in {count(table.where(part=LARGE))}. After settling they "
+        f"balance the hand in {count(table.where(part=BALANCE))}. The momentum given is closest to ideal in {closest}."
+    )
+
+
+CLAIM = Claim(
+    id="C11",
+    statement="Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
+    place="Section VI, Fig. 8",
+    quantity="Peak force of the device's actuators; their mean force after settling; RMS distance to ideal of the time "
+    "integral of the force, since a spike one step later must not count as its whole height.",
+    tolerance="Peak above PB's. Balance within 0.05 N, the damper's force at the speed that counts as settled. "
+    "Distance strictly the smallest; below 1e-9 everywhere the trial cannot tell.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("tilt", "clearance"),
+    map_panels="part",
+)

@@ -1,0 +1,81 @@
+"""C12: at a device of limited force, saturating the impulses loses most and spreading them loses least (Fig. 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import INDISTINGUISHABLE, count
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import comparison_window, root_mean_square, share_limited
+from verification.claims.table import Column, Row, Table, table_of
+from verification.claims.trace import COORDINATES
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+MOST, LEAST = "saturating loses most", "spreading loses least"
+RENDERINGS = ("saturate", "scale", "spread")
+COLUMNS = (
+    Column("part", part=True),
+    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    *(Column(rendering) for rendering in RENDERINGS),
+    Column("impacts limited"),
+)
+
+
+def measure(study: Study) -> Table:
+    """Every start with two device limits, in three renderings."""
+    return table_of(COLUMNS, (row for condition in study.limited() for row in _trials(study, condition)))
+
+
+def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    full = study.trace(condition, "IAPB")
+    traces = {rendering: study.trace(condition, "IAPB", rendering) for rendering in RENDERINGS}
+    window = comparison_window([full, *traces.values()])
+    lost = {rendering: root_mean_square(trace, full, window) for rendering, trace in traces.items()}
+    limited = share_limited(traces["scale"])
+    for i, coordinate in enumerate(COORDINATES):
+        numbers = {rendering: float(distance[i]) for rendering, distance in lost.items()}
+        for claimed in (MOST, LEAST):
+            part = f"{coordinate}: {claimed}"
+            yield condition.record() | numbers | {"part": part, "impacts limited": limited}
+
+
+def holds(row: Row) -> bool | None:
+    """Saturating strictly the worst, or spreading strictly the best; None where no limit was reached."""
+    lost = [row[rendering] for rendering in RENDERINGS]
+    if row["impacts limited"] == 0.0 or max(lost) < INDISTINGUISHABLE:
+        return None
+    if row["part"].endswith(MOST):
+        return bool(row["saturate"] > max(row["scale"], row["spread"]))
+    return bool(row["spread"] < min(row["saturate"], row["scale"]))
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    texts = []
+    for coordinate, unit, factor in (("x", "µm", 1e6), ("y", "µm", 1e6), ("theta", "mrad", 1e3)):
+        trials, other = (table.where(part=f"{coordinate}: {claimed}") for claimed in (MOST, LEAST))
+        medians = " / ".join(f"{factor * float(np.median(trials.column(name))):.3g}" for name in RENDERINGS)
+        counts = f"saturating worst in {count(trials)}, spreading best in {count(other)}"
+        texts.append(f"{coordinate}: {medians} {unit}, {counts}")
+    return f"Median distance to the unlimited device (saturated / scaled / spread) in {'; '.join(texts)}."
+
+
+CLAIM = Claim(
+    id="C12",
+    statement="Saturating the impulses at the device loses most performance, spreading them over steps loses least.",
+    place="Section VI, Fig. 9",
+    quantity="RMS distance of the device trajectory from that of a device without limits, per coordinate.",
+    tolerance="Strictly the largest, strictly the smallest of the three. Trials in which no impulse reached the limit, "
+    "or all are within 1e-7 of the unlimited device, cannot tell.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("tilt", "clearance"),
+    map_panels="part",
+)

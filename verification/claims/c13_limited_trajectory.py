@@ -1,0 +1,67 @@
+"""C13: with F_limit, IAPB (impulses spread) stays closest to ideal and penetrates less than PB (Fig. 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
+from verification.claims.closeness import by_coordinate, closest, count, distances
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import deepest_penetration
+from verification.claims.table import Row, Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+PENETRATION = "penetration"
+COLUMNS = (*columns("force_limit"), *DISTANCE_COLUMNS)
+
+
+def measure(study: Study) -> Table:
+    """Every start with two device limits; the impulses of IAPB spread over steps."""
+    return table_of(COLUMNS, (row for condition in study.limited() for row in _trials(study, condition)))
+
+
+def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    yield from distances(study, condition, "spread")
+    depths = {
+        "IAPB": deepest_penetration(study.trace(condition, "IAPB", "spread")),
+        "PB": deepest_penetration(study.trace(condition, "PB")),
+    }
+    yield condition.record() | {"coordinate": PENETRATION} | depths
+
+
+def holds(row: Row) -> bool | None:
+    """Nearest to ideal in this coordinate; or less deep than PB."""
+    if row["coordinate"] == PENETRATION:
+        return bool(row["IAPB"] < row["PB"])
+    return closest(row)
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    depths = table.where(coordinate=PENETRATION)
+    medians = [1e3 * float(np.median(depths.column(world))) for world in ("IAPB", "PB")]
+    return (
+        f"With limits IAPB is the closest in {by_coordinate(table)}. It penetrates less than PB in {count(depths)}: "
+        f"{medians[0]:.2f} mm against {medians[1]:.2f} mm in the median."
+    )
+
+
+CLAIM = Claim(
+    id="C13",
+    statement="With device limits, IAPB stays closest to ideal and penetrates less than PB.",
+    place="Section VI, Fig. 10",
+    quantity="As C10, with the impulses spread over steps at 1 and 0.3 times the paper's limits; deepest overlap of "
+    "tool and walls.",
+    tolerance="Strictly the smallest. Where all three are within 1e-7 of ideal the trial cannot tell.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("tilt", "clearance"),
+    map_panels="coordinate",
+)

@@ -1,0 +1,71 @@
+"""C14: impulses within the device's limits still exceed the penalty forces on contact (Fig. 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import count
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import peak_force
+from verification.claims.table import Column, Row, Table, table_of
+from verification.claims.trace import COORDINATES
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+COLUMNS = (
+    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    Column("coordinate", part=True),
+    Column("IAPB"),
+    Column("PB"),
+)
+
+# A hundredth of what a fingertip feels, about 0.05 N (and the same at the peg's half length, in N m) [N, N m].
+NOT_FELT = {"x": 5e-4, "y": 5e-4, "theta": 5e-6}
+
+
+def measure(study: Study) -> Table:
+    """Every start with two device limits; the impulses of IAPB spread over steps."""
+    return table_of(COLUMNS, (row for condition in study.limited() for row in _trials(study, condition)))
+
+
+def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    limited, penalty = peak_force(study.trace(condition, "IAPB", "spread")), peak_force(study.trace(condition, "PB"))
+    for i, coordinate in enumerate(COORDINATES):
+        yield condition.record() | {"coordinate": coordinate, "IAPB": float(limited[i]), "PB": float(penalty[i])}
+
+
+def holds(row: Row) -> bool | None:
+    """Above PB's peak; None where neither would be felt."""
+    if max(row["IAPB"], row["PB"]) < NOT_FELT[row["coordinate"]]:
+        return None
+    return bool(row["IAPB"] > row["PB"])
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    texts = []
+    for coordinate in COORDINATES:
+        trials = table.where(coordinate=coordinate)
+        felt = [row for row, held in zip(trials.records(), trials.holds, strict=True) if held is not None]
+        ratios = [row["IAPB"] / row["PB"] for row in felt if row["PB"] > 0.0]
+        texts.append(f"{coordinate} {np.median(ratios):.2g} times, least {min(ratios):.2g}, above in {count(trials)}")
+    return f"Limited peak force as a multiple of PB's: {'; '.join(texts)}."
+
+
+CLAIM = Claim(
+    id="C14",
+    statement="Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
+    place="Section VI, Fig. 11",
+    quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
+    tolerance="Strictly larger. Coordinates in which neither reaches a hundredth of what can be felt do not count.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("tilt", "force_limit"),
+    map_panels="coordinate",
+)

@@ -1,0 +1,73 @@
+"""C16: scaling and spreading keep tool and device together on impact, saturating does not (section VI)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from verification.claims.claim import Claim
+from verification.claims.closeness import count
+from verification.claims.conditions import Condition, columns
+from verification.claims.measures import largest_separation, share_limited
+from verification.claims.table import Column, Row, Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+RENDERINGS = ("saturate", "scale", "spread")
+COLUMNS = (
+    Column("rendering", part=True),
+    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    Column("distance", "m"),
+    Column("angle", "rad"),
+    Column("impacts limited"),
+)
+
+# Tool and device start alike and get the same forces: what remains is rounding over 1536 steps. A micrometre (or
+# microradian) is a thousand times more, and a hundredth of what saturation leaves.
+TOGETHER, APART = 1e-9, 1e-6
+
+
+def measure(study: Study) -> Table:
+    """Every start with two device limits, in three renderings."""
+    return table_of(COLUMNS, (row for condition in study.limited() for row in _trials(study, condition)))
+
+
+def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    limited = share_limited(study.trace(condition, "IAPB", "scale"))
+    for rendering in RENDERINGS:
+        x, y, theta = map(float, largest_separation(study.trace(condition, "IAPB", rendering)))
+        yield condition.record() | {"rendering": rendering, "distance": max(x, y), "angle": theta,
+                                    "impacts limited": limited}  # fmt: skip
+
+
+def holds(row: Row) -> bool | None:
+    """Together to rounding, or, saturated, visibly apart; None where no impulse reached the limit."""
+    if row["impacts limited"] == 0.0:
+        return None
+    apart = max(row["distance"], row["angle"])
+    return bool(apart > APART) if row["rendering"] == "saturate" else bool(apart <= TOGETHER)
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    texts = []
+    for rendering in RENDERINGS:
+        trials = table.where(rendering=rendering)
+        distance, angle = max(trials.column("distance")), max(trials.column("angle"))
+        texts.append(f"{rendering} up to {distance:.1e} m and {angle:.1e} rad (as claimed in {count(trials)})")
+    return f"Largest separation of tool and device: {'; '.join(texts)}."
+
+
+CLAIM = Claim(
+    id="C16",
+    statement="Scaling and spreading keep tool and device together on impact; saturating does not.",
+    place="Section VI",
+    quantity="Largest difference of tool and device over the run, in position and angle.",
+    tolerance="Together: 1e-9 m and rad, rounding over 1536 steps. Apart: more than 1e-6.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("tilt", "force_limit"),
+    map_panels="rendering",
+)
