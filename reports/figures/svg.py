@@ -14,6 +14,7 @@ from reports.figures.style import VARIABLES
 
 LARGEST_ENLARGEMENT = 1.35  # beyond, the lettering would shout
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
 _FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
 _HEX = re.compile("|".join(VARIABLES))
@@ -29,8 +30,12 @@ def to_svg(drawing: Any, key: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.S)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.S)
     text = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", text, flags=re.S)  # would leak into the page
-    text = _NUMBER.sub(lambda match: f"{float(match.group()):.2f}".rstrip("0").rstrip("."), text)
+    text = _TAG.sub(lambda match: _NUMBER.sub(_rounded, match.group()), text)
     return _themed(_fitted(_own_identifiers(text, key))).strip()
+
+
+def _rounded(number: re.Match[str]) -> str:
+    return f"{float(number.group()):.2f}".rstrip("0").rstrip(".")
 
 
 def _fitted(text: str) -> str:

@@ -15,23 +15,33 @@ from reports.pages.formulas import formula, prose
 from reports.pages.legend import swatch
 from reports.pages.records import OUTCOMES, Claim, Evidence, Verdict
 from reports.pages.sections import SECTIONS
+from reports.pages.verdicts import verdicts
 
 # The mark that goes with each outcome: shape as well as colour.
 OUTCOME_MARKS = dict(zip(OUTCOMES, ("✓", "≈", "✕", "○", "…"), strict=True))
 OUTCOME_CLASSES = dict(zip(OUTCOMES, ("good", "limited", "bad", "open", "absent"), strict=True))
+# The same outcomes in the words of a check that is not a claim of the paper.
+FINDINGS = dict(zip(OUTCOMES, ("holds", "holds within limits", "fails", "cannot tell", "not computed"), strict=True))
 
 
 def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     """Return the report as one HTML document."""
-    drawn = [(recipe.section, draw(recipe, evidence.inputs)) for recipe in recipes]
+    inputs = figure_inputs(evidence)
+    drawn = [(recipe.section, draw(recipe, inputs)) for recipe in recipes]
     figures: dict[str, list[Figure | NotComputed]] = {}
     for section, figure in drawn:
         figures.setdefault(section, []).append(figure)
     page = _environment().get_template("page.html.j2")
     return page.render(
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
-        counts=count_outcomes(evidence.claims), outcomes=OUTCOMES,
+        subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
     )
+
+
+def figure_inputs(evidence: Evidence) -> dict[str, Any]:
+    """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
+    scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
+    return {**scenes, "energy_gains": evidence.bulk, **evidence.inputs}
 
 
 def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
@@ -48,6 +58,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
+        as_finding=FINDINGS.__getitem__,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

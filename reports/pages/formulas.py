@@ -8,6 +8,7 @@ from markupsafe import Markup, escape
 
 _INLINE = re.compile(r"\$([^$]+)\$")
 _POWER = re.compile(r"(?<![\w.])(-?\d(?:\.\d+)?)e([+-]?\d{1,3})(?!\w)")
+_NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
 
 def formula(latex: str, display: str = "block") -> Markup:
@@ -26,8 +27,8 @@ def prose(text: str) -> Markup:
 
 
 def _powers(text: str) -> Markup:
-    """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶."""
-    return Markup(_POWER.sub(_power, str(escape(text))))
+    """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶ and -1 has a true minus sign."""
+    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, str(escape(text)))))
 
 
 def _power(match: re.Match[str]) -> str:

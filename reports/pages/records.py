@@ -113,6 +113,7 @@ class Evidence:
     ask for (`needs` of each recipe)."""
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
+    scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name
     verdicts: tuple[Verdict, ...] = ()
     claims: tuple[Claim, ...] = ()
     proofs: tuple[ProofRecord, ...] = ()

@@ -17,7 +17,7 @@ SUBJECTS = (
     ("Coming to rest", ("C15",)),
 )
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
-_SENTENCE_END = re.compile(r"(?<=[^\d][.;])\s|(?<=\d\.)\s(?=[A-Z])")
+_SENTENCE_END = re.compile(r"(?<=\.)\s(?=[A-Z])")
 
 
 def verdicts(claims: Sequence[Claim]) -> tuple[Verdict, ...]:
@@ -35,5 +35,5 @@ def _verdict(subject: str, members: Sequence[Claim]) -> Verdict:
 
 
 def first_sentence(text: str) -> str:
-    """Return the first sentence of a text; a point inside a number does not end it."""
-    return _SENTENCE_END.split(text, maxsplit=1)[0].rstrip(";")
+    """Return the first sentence of a text: up to a point before a capital."""
+    return _SENTENCE_END.split(text, maxsplit=1)[0]
