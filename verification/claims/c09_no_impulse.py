@@ -24,7 +24,7 @@ TRAJECTORY = "trajectory with e = -1"
 ALMOST = "trajectory with e one rounding above -1"
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
     Column("contacts", condition=True),
     Column("impacts"),
     Column("error"),

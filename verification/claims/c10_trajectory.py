@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from verification.claims.claim import Claim
-from verification.claims.closeness import COLUMNS, by_coordinate, closest, distances, median_ratio
+from verification.claims.closeness import (
+    COLUMNS,
+    by_approach_velocity,
+    by_coordinate,
+    closest,
+    distances,
+    median_ratio,
+)
 from verification.claims.table import Table, table_of
 
 if TYPE_CHECKING:
@@ -24,7 +31,8 @@ def finding(table: Table) -> str:
     )
     return (
         f"IAPB is the closest in {by_coordinate(table)}. Its distance to ideal is, in the median, this multiple of "
-        f"PB's: {ratios}."
+        f"PB's: {ratios}. By the speed from which on a contact takes part in a collision: "
+        f"{by_approach_velocity(table)}."
     )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LARGE, BALANCE, CLOSEST = "peak on new contact", "mean force after settling", "momentum given, distance to ideal"
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
     Column("coordinate", condition=True),
     Column("IAPB"),
     Column("PB"),

@@ -21,7 +21,7 @@ MOST, LEAST = "saturating loses most", "spreading loses least"
 RENDERINGS = ("saturate", "scale", "spread")
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
     *(Column(rendering) for rendering in RENDERINGS),
     Column("impacts limited"),
 )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from verification.claims.study import Study
 
 COLUMNS = (
-    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
     Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BOUNCES, SETTLES = "bounces less", "settles sooner"
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
     Column("rendering", condition=True),
     Column("IAPB"),
     Column("PB"),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 RENDERINGS = ("saturate", "scale", "spread")
 COLUMNS = (
     Column("rendering", part=True),
-    *columns("tilt", "clearance", "travel", "friction", "force_limit"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
     Column("distance", "m"),
     Column("angle", "rad"),
     Column("impacts limited"),

@@ -1,6 +1,7 @@
 """Claim and ClaimResult: what is claimed, how a trial decides, and what came of it.
 
-The verdict follows from the trials by one rule, for every claim alike (`verdict_of`): nobody types it in.
+The verdict follows from the trials by one rule, for every claim alike (`verdict_of` and `overall`): nobody types
+it in.
 """
 
 from __future__ import annotations
@@ -60,10 +61,21 @@ class Claim:
 
     def conclude(self, table: Table) -> ClaimResult:
         """Return the record of a judged table."""
+        parts = parts_of(table)
         return ClaimResult(
-            self.id, self.statement, self.place, self.quantity, self.tolerance, verdict_of(table.holds),
-            self.finding(table), ranges(table), _where_it_fails(table), table, self.map_axes, self.map_panels,
+            self.id, self.statement, self.place, self.quantity, self.tolerance, overall(parts), self.finding(table),
+            ranges(table), _where_it_fails(table), parts, table, self.map_axes, self.map_panels,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a claim that is judged by itself: in how many of the trials that could tell it held."""
+
+    name: str
+    verdict: str
+    held: int
+    decided: int
 
 
 @dataclass(frozen=True)
@@ -71,6 +83,7 @@ class ClaimResult:
     """What came of a claim: plain data for a report.
 
     conditions : the range over which it was computed; fails : where it does not hold, empty if nowhere
+    parts : the verdict of each part of the claim, one of no name where it has no parts
     """
 
     id: str
@@ -82,6 +95,7 @@ class ClaimResult:
     finding: str
     conditions: str
     fails: str
+    parts: tuple[Part, ...]
     table: Table
     map_axes: tuple[str, str] | None = None
     map_panels: str | None = None
@@ -89,16 +103,40 @@ class ClaimResult:
     @property
     def held(self) -> int:
         """Trials in which the claim held."""
-        return sum(outcome is True for outcome in self.table.holds)
+        return sum(part.held for part in self.parts)
 
     @property
     def decided(self) -> int:
         """Trials that could tell."""
-        return sum(outcome is not None for outcome in self.table.holds)
+        return sum(part.decided for part in self.parts)
+
+
+def overall(parts: Sequence[Part]) -> str:
+    """Return the verdict of a claim from those of its parts: that of all, or limited where they differ."""
+    verdicts = {part.verdict for part in parts if part.verdict != NOT_TESTABLE}
+    if not verdicts:
+        return NOT_TESTABLE
+    return verdicts.pop() if len(verdicts) == 1 else LIMITED
+
+
+def parts_of(table: Table) -> tuple[Part, ...]:
+    """Return the parts of a claim with their verdicts."""
+    return tuple(
+        Part(name, verdict_of(trials.holds), sum(h is True for h in trials.holds),
+             sum(h is not None for h in trials.holds))
+        for name, trials in _by_part(table).items()
+    )  # fmt: skip
+
+
+def _by_part(table: Table) -> dict[str, Table]:
+    names = [column.name for column in table.columns if column.part]
+    if not names:
+        return {"": table}
+    return {part: table.where(**{names[0]: part}) for part in dict.fromkeys(table.column(names[0]))}
 
 
 def verdict_of(holds: Sequence[bool | None]) -> str:
-    """Return the verdict of a claim from the outcomes of its trials.
+    """Return the verdict on one part of a claim from the outcomes of its trials.
 
     All that can tell hold: reproduced. At least LEAST_SHARE of them: reproduced within stated limits. Fewer:
     refuted. None can tell: not testable here.
@@ -123,12 +161,8 @@ def ranges(table: Table) -> str:
 
 def _where_it_fails(table: Table) -> str:
     """In how many trials, and where; apart for each part of the claim."""
-    names = [column.name for column in table.columns if column.part]
-    if not names:
-        return _failures(table)
-    parts = dict.fromkeys(table.column(names[0]))
-    failures = {part: _failures(table.where(**{names[0]: part})) for part in parts}
-    return "; ".join(f"{part}: {text}" for part, text in failures.items() if text)
+    failures = {part: _failures(trials) for part, trials in _by_part(table).items()}
+    return "; ".join(f"{part}: {text}" if part else text for part, text in failures.items() if text)
 
 
 def _failures(table: Table) -> str:

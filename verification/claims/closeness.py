@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from verification.claims.study import Study
 
 COLUMNS = (
-    *columns("tilt", "clearance", "travel", "friction"),
+    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
     Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),
@@ -66,6 +66,16 @@ def by_coordinate(table: Table) -> str:
     for coordinate in COORDINATES:
         trials = table.where(coordinate=coordinate)
         parts.append(f"{coordinate}: {count(trials)}{_reach(trials)}")
+    return "; ".join(parts)
+
+
+def by_approach_velocity(table: Table) -> str:
+    """Return in how many trials the claim holds, per approach velocity and coordinate."""
+    parts = []
+    for speed in sorted(set(table.column("approach_velocity"))):
+        trials = table.where(approach_velocity=speed)
+        counts = ", ".join(f"{name} {count(trials.where(coordinate=name))}" for name in COORDINATES)
+        parts.append(f"from {speed:g} m/s on: {counts}")
     return "; ".join(parts)
 
 

@@ -3,16 +3,41 @@
 import numpy as np
 import pytest
 
-from verification.claims import CLAIMS
+from verification.claims import CLAIMS, c11_forces, c12_saturate_spread, c13_limited_trajectory
 from verification.claims.claim import REFUTED, REPRODUCED
 from verification.claims.table import Column, table_of
 
+RENDERED = {"saturate": 3e-3, "scale": 2e-3, "spread": 1e-3}
 NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]
 
 # id -> (a trial that agrees, a trial that contradicts)
 PLANTED = {
     **{name: ({"error": 1e-15, "bound": 1e-12}, {"error": 0.13, "bound": 1e-12}) for name in ("C01", "C02")},
     **{name: ({"error": 1e-15, "bound": 1e-12}, {"error": np.inf, "bound": 1e-12}) for name in ("C03", "C04")},
+    **{name: ({"error": 0.0, "bound": 0.0}, {"error": 1e-3, "bound": 0.0}) for name in ("C06", "C08", "C09")},
+    "C07": ({"expected": "all", "share lost": 1.0 - 1e-15}, {"expected": "all", "share lost": 0.9}),
+    "C11": (
+        {"part": c11_forces.CLOSEST, "IAPB": NEAR, "PB": FAR, "CBuc": FAR},
+        {"part": c11_forces.CLOSEST, "IAPB": FAR, "PB": FAR, "CBuc": NEAR},
+    ),
+    "C12": (
+        {"part": f"x: {c12_saturate_spread.LEAST}", "impacts limited": 0.5} | RENDERED,
+        {"part": f"x: {c12_saturate_spread.MOST}", "impacts limited": 0.5} | RENDERED | {"scale": 1.0},
+    ),
+    "C13": (
+        {"coordinate": c13_limited_trajectory.PENETRATION, "IAPB": NEAR, "PB": FAR},
+        {"coordinate": c13_limited_trajectory.PENETRATION, "IAPB": FAR, "PB": NEAR},
+    ),
+    "C14": ({"coordinate": "x", "IAPB": 15.0, "PB": 5.0}, {"coordinate": "x", "IAPB": 4.0, "PB": 5.0}),
+    "C15": ({"IAPB": 0.5, "PB": np.inf}, {"IAPB": np.inf, "PB": 2.0}),
+    "C16": (
+        {"rendering": "spread", "distance": 0.0, "angle": 1e-15, "impacts limited": 1.0},
+        {"rendering": "saturate", "distance": 0.0, "angle": 1e-15, "impacts limited": 1.0},
+    ),
+    "C17": (
+        {"lost on first impact": 3e-3, "of the reference": 3e-3},
+        {"lost on first impact": 3.1e-3, "of the reference": 3e-3},
+    ),
     "C05": ({"error": 0.0, "bound": 0.0}, {"error": np.nan, "bound": 1.0}),
     "C10": ({"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
 }
@@ -34,6 +59,35 @@ def test_judge_confirms_and_refutes(name):
     agrees, contradicts = PLANTED[name]
     assert verdict_of(judged(CLAIMS[name], agrees).holds) == REPRODUCED
     assert verdict_of(judged(CLAIMS[name], contradicts).holds) == REFUTED
+
+
+@pytest.mark.parametrize(
+    ("name", "trial"),
+    [
+        ("C07", {"expected": "part", "share lost": 1.0}),
+        ("C07", {"expected": "part", "share lost": 0.0}),
+        ("C11", {"part": c11_forces.LARGE, "IAPB": 5.0, "PB": 8.0, "CBuc": 8.0}),
+        ("C11", {"part": c11_forces.BALANCE, "IAPB": 0.1, "hand": -0.32}),
+        ("C13", {"coordinate": "x", "IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
+        ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 1.0}),
+    ],
+)
+def test_every_part_of_a_claim_can_fail(name, trial):
+    assert CLAIMS[name].holds(trial) is False
+
+
+@pytest.mark.parametrize(
+    ("name", "trial"),
+    [
+        ("C11", {"part": c11_forces.BALANCE, "IAPB": None, "hand": -0.32}),
+        ("C12", {"part": "x", "impacts limited": 0.0} | RENDERED),
+        ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}),
+        ("C15", {"IAPB": 0, "PB": 0}),
+        ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 0.0}),
+    ],
+)
+def test_a_trial_that_cannot_tell_says_so(name, trial):
+    assert CLAIMS[name].holds(trial) is None
 
 
 def test_a_coordinate_that_nobody_moves_cannot_tell():

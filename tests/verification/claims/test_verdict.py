@@ -2,7 +2,16 @@
 
 import pytest
 
-from verification.claims.claim import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Claim, verdict_of
+from verification.claims.claim import (
+    LIMITED,
+    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
+    Claim,
+    Part,
+    overall,
+    verdict_of,
+)
 from verification.claims.table import Column, table_of
 
 
@@ -20,6 +29,20 @@ from verification.claims.table import Column, table_of
 )
 def test_verdict_follows_from_the_trials(holds, verdict):
     assert verdict_of(holds) == verdict
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "verdict"),
+    [
+        ([REPRODUCED, REPRODUCED, NOT_TESTABLE], REPRODUCED),
+        ([REPRODUCED, REFUTED], LIMITED),
+        ([LIMITED, REPRODUCED], LIMITED),
+        ([REFUTED, REFUTED], REFUTED),
+        ([NOT_TESTABLE], NOT_TESTABLE),
+    ],
+)
+def test_a_claim_is_refuted_only_where_no_part_of_it_stands(verdicts, verdict):
+    assert overall([Part("", one, 0, 0) for one in verdicts]) == verdict
 
 
 COLUMNS = (Column("part", part=True), Column("tilt", "rad", condition=True), Column("error"))
@@ -40,6 +63,7 @@ def test_failures_are_told_apart_by_part_with_their_conditions():
     assert result.fails == "x: in 1 of 2 trials, with tilt 0.3 rad"
     assert result.conditions == "tilt 0, 0.3 rad"
     assert (result.held, result.decided) == (3, 4)
+    assert result.parts == (Part("x", LIMITED, 1, 2), Part("y", REPRODUCED, 2, 2))
 
 
 def test_a_part_that_never_holds_says_so():

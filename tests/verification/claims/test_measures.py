@@ -1,0 +1,115 @@
+"""Measures of trajectories, on traces written by hand whose answers are known."""
+
+import numpy as np
+import pytest
+
+from verification.claims.conditions import Condition, limited_conditions, start_conditions
+from verification.claims.measures import (
+    bounces,
+    comparison_window,
+    corner_gaps,
+    largest_distance,
+    largest_separation,
+    momentum_distance,
+    peak_force,
+    resting_force,
+    root_mean_square,
+    settling_time,
+)
+from verification.claims.study import conditions
+from verification.claims.trace import Trace
+
+STEPS, DT = 100, 0.01
+
+
+def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
+    states, steps = np.zeros((STEPS + 1, 3)), np.zeros((STEPS, 3))
+    new = np.zeros(STEPS, bool)
+    new[contact_at] = True
+    device = states if device is None else device
+    return Trace(
+        np.arange(STEPS + 1) * DT, device, device if tool is None else tool, states if velocity is None else velocity,
+        steps if force is None else force, steps + [-0.32, 0.4, 0.0], np.zeros(STEPS), new, np.array([contact_at]),
+        np.array([1e-3]), np.array([1.0]), np.zeros(STEPS + 1),
+    )  # fmt: skip
+
+
+def column(values, index):
+    out = np.zeros((len(values), 3))
+    out[:, index] = values
+    return out
+
+
+def test_distances_are_taken_in_the_window():
+    late = np.where(np.arange(STEPS + 1) >= 20, 2e-3, 0.0)
+    ours, ideal = trace(device=column(late, 1)), trace()
+    assert root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
+    assert root_mean_square(ours, ideal, slice(0, 40)) == pytest.approx([0.0, 2e-3 / np.sqrt(2), 0.0])
+    assert largest_distance(ours, ideal, slice(0, 21)) == pytest.approx([0.0, 2e-3, 0.0])
+
+
+def test_window_goes_from_the_first_contact_to_the_last_settling():
+    moving = column(np.where(np.arange(STEPS + 1) <= 50, 0.1, 0.0), 0)
+    window = comparison_window([trace(contact_at=12), trace(velocity=moving, contact_at=15)])
+    assert (window.start, window.stop) == (12, 52)
+
+
+def test_window_ends_with_the_run_where_a_world_never_settles():
+    forever = column(np.full(STEPS + 1, 0.1), 2)
+    assert comparison_window([trace(), trace(velocity=forever)]).stop == STEPS + 1
+
+
+def test_settling_counts_from_the_first_contact():
+    moving = column(np.where(np.arange(STEPS + 1) <= 50, 0.1, 0.0), 0)
+    assert settling_time(trace(velocity=moving, contact_at=10)) == pytest.approx(0.41)
+    assert settling_time(trace(velocity=column(np.full(STEPS + 1, 0.1), 0))) is None
+
+
+def test_a_spike_one_step_later_is_a_small_difference_of_momentum():
+    early, late = column(np.eye(1, STEPS, 30)[0] * 60.0, 0), column(np.eye(1, STEPS, 31)[0] * 60.0, 0)
+    distance = momentum_distance(trace(force=late), trace(force=early), slice(0, STEPS))
+    assert distance[0] == pytest.approx(60.0 * DT / np.sqrt(STEPS))
+    assert peak_force(trace(force=late))[0] == 60.0
+
+
+def test_resting_force_is_the_mean_after_settling():
+    force = column(np.where(np.arange(STEPS) < 51, 9.0, -0.4), 1)
+    moving = column(np.where(np.arange(STEPS + 1) <= 50, 0.1, 0.0), 0)
+    assert resting_force(trace(force=force, velocity=moving)) == pytest.approx([0.0, -0.4, 0.0])
+    assert resting_force(trace(velocity=column(np.full(STEPS + 1, 0.1), 0))) is None
+
+
+def test_separation_is_that_of_tool_and_device():
+    tool = column(np.linspace(0.0, 5e-3, STEPS + 1), 0)
+    assert largest_separation(trace(tool=tool)) == pytest.approx([5e-3, 0.0, 0.0])
+
+
+def test_a_flat_peg_that_hops_once_lifts_both_corners():
+    height = np.full(STEPS + 1, 0.0)
+    height[30:40] = 1e-3
+    device = np.column_stack([np.full(STEPS + 1, 0.05), -0.00525 - height, np.zeros(STEPS + 1)])
+    assert bounces(trace(device=device)) == 2
+
+
+@pytest.mark.parametrize("height", [0.0, 5e-6, -2e-4])
+def test_flicker_and_overlap_are_no_bounces(height):
+    lifted = np.where(np.arange(STEPS + 1) % 2, height, 0.0)
+    device = np.column_stack([np.full(STEPS + 1, 0.05), -0.00525 - lifted, np.zeros(STEPS + 1)])
+    assert bounces(trace(device=device)) == 0
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2, -0.3])
+def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
+    from iapb import find_scene, load_scene
+
+    placed = Condition(tilt, clearance=0.012, travel=0.007).place(load_scene(find_scene("peg_corner")))
+    gaps = [gap[0] for gap in corner_gaps(np.array([placed.bodies[0].position]))]
+    assert min(gaps[0::2]) == pytest.approx(0.012)
+    assert min(gaps[1::2]) == pytest.approx(0.007)
+
+
+def test_conditions_cover_what_the_paper_leaves_open():
+    listed = conditions("quick")
+    for name in ("tilt [rad]", "clearance [m]", "travel [m]", "friction", "force_limit [F_limit]"):
+        assert len({condition[name] for condition in listed}) > 1
+    assert set(start_conditions("quick")) <= set(limited_conditions("quick"))
