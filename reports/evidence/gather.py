@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.evidence import claims, cross_checks, effects, proofs, properties, runs
+from reports.evidence import accuracy, claims, cross_checks, effects, hard_cases, proofs, properties, runs
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage
 from reports.evidence.verdicts import verdicts
 from reports.figures.figure import Numbers
-from reports.pages.records import Claim, CrossCheck, Evidence, Property, SceneEffect
+from reports.pages.records import Claim, CrossCheck, Evidence, HardCase, Property, SceneEffect
 from reports.provenance import collect_provenance
 from reports.runner import Runner
 
@@ -34,10 +34,13 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     bulk = kept.stage("bulk impacts", Numbers, lambda done: properties.bulk(depth, done))
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
+    hard = kept.stage("hard cases", tuple[HardCase, ...], hard_cases.compute)
+    timed = kept.stage("accuracy", Numbers, accuracy.compute)
+    inputs |= {"work_precision": timed, "energy_gains": bulk}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, cross_checks=checks,
-        effects=needed, provenance=collect_provenance(seeds=(properties.SEED,)),
+        hard_cases=hard, effects=needed, provenance=collect_provenance(seeds=(properties.SEED,)),
         manifest=manifest(runner, kept.paths, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)

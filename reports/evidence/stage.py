@@ -7,6 +7,7 @@ references and the verification. So a changed line of theirs makes the stage run
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -54,14 +55,14 @@ class Stage:
 
         adapter = TypeAdapter(self._kind)
         if self.path.is_file():
-            return adapter.validate_json(read_table(self.path, _RECORDS)["json"][0])
+            return adapter.validate_python(json.loads(read_table(self.path, _RECORDS)["json"][0]))
         records = compute()
-        text = adapter.dump_json(adapter.validate_python(plain_records(records))).decode()
+        text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
         title = f"Records of the stage {self.name}"
         table = Table(_RECORDS, (Column("json", (text,), "1", "the records as JSON"),), title, command="iapb reproduce")
         self.path.parent.mkdir(parents=True, exist_ok=True)
         write_tables(self.path, (table, *numbers_tables(records)))
-        return adapter.validate_json(text)
+        return adapter.validate_python(json.loads(text))
 
 
 def plain_records(records: Any) -> Any:
