@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import resolve_impact as resolve_impact
+    from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
+    from iapb.contact.impact_laws import resolve_frictional_impact as resolve_frictional_impact
     from iapb.effects import Effect as Effect
     from iapb.effects import decide_effects as decide_effects
     from iapb.errors import ArgumentError as ArgumentError
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "iapb.contact.impact": ("Impact", "resolve_impact"),
+    "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
     "iapb.effects": ("Effect", "decide_effects"),
     "iapb.errors": (
         "ArgumentError",

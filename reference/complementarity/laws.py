@@ -78,6 +78,18 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
     return Outcome(_known(problem.velocity) + change, impulse, residual)
 
 
+def coulomb_ncp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
+    """K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus with E gamma_minus added to its normals."""
+    impulse, residual = _solved(replace(problem, relaxed=False), solver)
+    return Outcome(problem.velocity_plus(impulse), impulse, residual)
+
+
+def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
+    """K ∋ p ⟂ u ∈ K*: Coulomb's law without the shift, a convex program."""
+    impulse, residual = _solved(replace(problem, relaxed=True), solver)
+    return Outcome(problem.velocity_plus(impulse), impulse, residual)
+
+
 def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
     """Rows of (13)-(14): nᵀJ_a and nᵀJ_b apart (each (c, d)), where (12) has their difference; zero rows left out."""
     stacked = np.vstack([np.asarray(jacobian_a, np.float64), np.asarray(jacobian_b, np.float64)])
@@ -147,6 +159,22 @@ LAWS: dict[str, Law] = {
             "one e for all contacts; momentum is not conserved at self-collisions",
             True,
             newton_equality,
+        ),
+        Law(
+            "coulomb_ncp",
+            "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
+            "Moreau 1988; de Saxcé and Feng 1998",
+            "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)",
+            True,
+            coulomb_ncp,
+        ),
+        Law(
+            "coulomb_ccp",
+            "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
+            "Anitescu and Tasora 2010",
+            "e = 0; with e > 0 it can gain energy",
+            True,
+            coulomb_ccp,
         ),
     )
 }

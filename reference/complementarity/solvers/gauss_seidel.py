@@ -16,6 +16,8 @@ from reference.complementarity.solution import velocity_scale
 from reference.complementarity.solvers.answer import Answer
 
 _SWEEPS = 20_000
+_WORK = 1e9  # multiplications, about two seconds: fewer sweeps for larger problems, never fewer than _LEAST_SWEEPS
+_LEAST_SWEEPS = 500
 _STILL = 1e-14  # a sweep that moves no contact velocity by more than this share of the scale is the last one
 
 
@@ -47,7 +49,8 @@ def solve(problem: ImpactProblem) -> Answer:
         raise SolverError("refused: W has a negative diagonal entry")
     p = np.zeros(problem.size)
     still = _STILL * velocity_scale(problem)
+    sweeps = max(_LEAST_SWEEPS, min(_SWEEPS, int(_WORK / problem.size**2)))
     done = _sweep_until_still(
-        np.ascontiguousarray(problem.delassus), problem.offset, problem.two_sided, p, _SWEEPS, still
+        np.ascontiguousarray(problem.delassus), problem.offset, problem.two_sided, p, sweeps, still
     )
-    return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {_SWEEPS} sweeps")
+    return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {sweeps} sweeps")

@@ -1,0 +1,218 @@
+"""C22: what one impact costs by each solver, beside IAPB, in one run.
+
+Timed is the whole way from M, J, v to v⁺: for the references that includes forming W or its factor, for IAPB the
+checks of `resolve_impact`; `IAPB kernel` is the compiled kernel alone, called from compiled code as in the engine's
+step. Every solver is warmed first (imports, compiling), then all take turns, so that a busy moment of the machine hits
+them alike; linear algebra runs on one thread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verification.comparison.cases import ImpactCase
+
+Floats = NDArray[np.float64]
+Call = Callable[[], Floats]
+
+CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
+SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
+IAPB, KERNEL, PRINTED = "IAPB", "IAPB kernel", "IAPB printed formula"
+REPEATS = 5
+# A solver that needs longer than this for one impact is not asked for a larger one; the row says so.
+LONGEST = 2.0
+_SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
+# |v⁺ − v⁺_reference| in the kinetic metric below which an impact counts as solved; first-order solvers reach 1e-6.
+_SOLVED = 1e-5
+
+
+@dataclass(frozen=True)
+class CostRow:
+    """Seconds per impact of one solver on one problem: median, least and largest of `repeats` samples.
+
+    distance : of v⁺ from daqp's (from IAPB's for IAPB's own methods), kinetic metric, relative; NaN without v⁺
+    verdict : "solved", "failed", "missing" or "left out" (slower than LONGEST before)
+    """
+
+    family: str
+    contacts: int
+    coordinates: int
+    solver: str
+    verdict: str
+    median: float
+    least: float
+    largest: float
+    repeats: int
+    distance: float
+    note: str = ""
+
+
+def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """A box in space lands on `contacts` points of its lower face, slightly turning: d = 6, rank at most 3."""
+    points = np.column_stack([rng.uniform(-1.0, 1.0, (contacts, 2)), -0.5 * np.ones(contacts)])
+    up = np.array([0.0, 0.0, 1.0])
+    rows = np.column_stack([np.tile(up, (contacts, 1)), np.cross(points, up)])
+    velocity = np.array([0.3, 0.1, -1.0, *rng.uniform(-0.2, 0.2, 3)])
+    return ImpactCase("patch", np.diag([2.0, 2.0, 2.0, 0.5, 0.5, 0.8]), rows, velocity, 0.0)
+
+
+def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """Planar boxes in a stack, two contacts at each joint, every joint closing: three coordinates per two contacts."""
+    boxes = (contacts + 1) // 2
+    rows = np.zeros((contacts, 3 * boxes))
+    for i in range(contacts):
+        box, arm = i // 2, 1.0 if i % 2 else -1.0
+        rows[i, 3 * box + 1 : 3 * box + 3] = 1.0, arm
+        if box > 0:
+            rows[i, 3 * box - 2 : 3 * box] = -1.0, -arm
+    velocity = np.zeros(3 * boxes)
+    velocity[1::3] = -np.cumsum(rng.uniform(0.5, 1.0, boxes))
+    velocity[2::3] = rng.uniform(-0.1, 0.1, boxes)
+    return ImpactCase("pile", np.diag(np.tile([1.0, 1.0, 2.0 / 3.0], boxes)), rows, velocity, 0.0)
+
+
+def impact_cost(
+    contacts: Sequence[int] = CONTACTS,
+    solvers: Sequence[str] = SOLVERS,
+    repeats: int = REPEATS,
+    seed: int = 22,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> tuple[CostRow, ...]:
+    """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
+    from threadpoolctl import threadpool_limits
+
+    rows: list[CostRow] = []
+    too_slow: dict[tuple[str, str], float] = {}
+    for done, count in enumerate(contacts):
+        for make in (patch, pile):
+            case = make(count, np.random.default_rng([seed, count]))
+            with threadpool_limits(1):
+                rows += _time_case(case, solvers, max(3, repeats), too_slow)
+        if progress is not None:
+            progress("time per impact", done + 1, len(contacts))
+    return tuple(rows)
+
+
+def _time_case(
+    case: ImpactCase, solvers: Sequence[str], repeats: int, too_slow: dict[tuple[str, str], float]
+) -> list[CostRow]:
+    calls, answers, notes = _warm(case, solvers, too_slow)
+    samples: dict[str, list[float]] = {name: [] for name in calls}
+    inner = {name: _repetitions(call) for name, call in calls.items()}
+    names = list(calls)
+    for turn in range(repeats):
+        for name in names[turn % len(names) :] + names[: turn % len(names)]:
+            samples[name].append(_seconds(calls[name], inner[name]))
+    for name, times in samples.items():
+        if np.median(times) > LONGEST:
+            too_slow[case.family, name] = float(np.median(times))
+    return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, *solvers)]
+
+
+def _warm(
+    case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float]
+) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
+    """The calls that work, their v⁺, and for the others why not."""
+    from iapb.errors import MissingDependencyError
+
+    calls: dict[str, Call] = {KERNEL: _KernelCall(case), IAPB: _engine_call(case, "factored"),
+                              PRINTED: _engine_call(case, "gram_pinv")}  # fmt: skip
+    answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()
+    for name in solvers:
+        if (case.family, name) in too_slow:
+            notes[name] = f"left out: {too_slow[case.family, name]:.3g} s for fewer contacts"
+            continue
+        call = _solver_call(case, name)
+        try:
+            answers[name] = call()
+        except MissingDependencyError as error:
+            notes[name] = f"missing: {error}"
+            continue
+        calls[name] = call
+    return calls, answers, notes
+
+
+def _repetitions(call: Call) -> int:
+    """Calls in one sample, so that it lasts long enough for the clock."""
+    times = 1
+    while _seconds(call, times) * times < _SHORTEST_SAMPLE:
+        times *= 4
+    return times
+
+
+def _seconds(call: Call, times: int) -> float:
+    """Seconds per call; the kernel repeats itself in compiled code, so that no call from Python is counted."""
+    repeated = getattr(call, "repeated", None)
+    started = time.perf_counter()
+    if repeated is not None:
+        repeated(times)
+    else:
+        for _ in range(times):
+            call()
+    return (time.perf_counter() - started) / times
+
+
+def _row(
+    case: ImpactCase, name: str, samples: dict[str, list[float]], answers: dict[str, Floats], notes: dict[str, str]
+) -> CostRow:
+    size = (case.family, case.contacts, len(case.velocity), name)
+    if name not in samples:
+        verdict = notes[name].split(":")[0]
+        return CostRow(*size, verdict, np.nan, np.nan, np.nan, 0, np.nan, notes[name])
+    reference = answers[IAPB] if name in (IAPB, KERNEL, PRINTED) else answers.get("daqp", answers[name])
+    upper = np.linalg.cholesky(case.mass_matrix).T
+    speed = float(np.linalg.norm(upper @ case.velocity))
+    distance = float(np.linalg.norm(upper @ (answers[name] - reference))) / speed
+    verdict = "solved" if distance <= _SOLVED else "failed"
+    times = np.array(samples[name])
+    return CostRow(*size, verdict, float(np.median(times)), float(times.min()), float(times.max()), len(times), distance)
+
+
+def _engine_call(case: ImpactCase, method: str) -> Call:
+    from iapb import resolve_impact
+
+    return lambda: resolve_impact(
+        case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, method=method
+    ).velocity
+
+
+class _KernelCall:
+    """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
+
+    def __init__(self, case: ImpactCase) -> None:
+        from iapb.compiled import block
+        from iapb.contact.kernels.impact import make_impact_work
+
+        self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
+        self.columns, self.restitution = np.ascontiguousarray(case.contact_jacobian.T), case.restitution
+        d, c = len(self.v), case.contacts
+        self.lower, self.v_plus, self.momentum = np.zeros((d, d)), np.zeros(d), np.zeros(d)
+        self.work = block(make_impact_work(d, c))
+
+    def repeated(self, times: int) -> None:
+        """Resolve the impact `times` times."""
+        from verification.comparison.kernels import repeat_impact
+
+        repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.work, self.v_plus,
+                      self.momentum, times)
+
+    def __call__(self) -> Floats:
+        """v⁺ (d,)."""
+        self.repeated(1)
+        return self.v_plus
+
+
+def _solver_call(case: ImpactCase, name: str) -> Call:
+    from reference.complementarity.problem import ImpactProblem
+    from reference.complementarity.solvers import solve
+
+    def call() -> Floats:
+        problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+        return solve(problem, name).velocity_plus
+
+    return call

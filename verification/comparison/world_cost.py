@@ -1,0 +1,72 @@
+"""C22 in the loop: seconds per step of each world on the project's scenes, taking turns.
+
+The rigid worlds run a QP per step from Python, the engine's worlds are compiled; so IAPB is timed in both ways, as
+the loop runs it and one step at a time from Python. Both differences are shown, neither is hidden in the other.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+SCENES = ("peg_corner", "peg_hole")
+WAYS = ("IAPB, compiled loop", "IAPB, step by step", "PB, compiled loop", "ideal (QP per step)", "CBuc (QP per step)")
+STEPS = 256  # half a second of the peg: free, colliding and resting steps
+
+
+@dataclass(frozen=True)
+class StepCostRow:
+    """Seconds per step of one world on one scene: median, least and largest of `repeats` runs of `steps` steps."""
+
+    scene: str
+    way: str
+    median: float
+    least: float
+    largest: float
+    repeats: int
+    steps: int
+
+
+def world_cost(
+    scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> tuple[StepCostRow, ...]:
+    """Time every world on every scene; the first run of each, which compiles, is not counted."""
+    from threadpoolctl import threadpool_limits
+
+    rows: list[StepCostRow] = []
+    for done, name in enumerate(scenes):
+        samples: dict[str, list[float]] = {way: [] for way in WAYS}
+        with threadpool_limits(1):
+            for turn in range(max(3, repeats) + 1):
+                for way in WAYS:
+                    seconds = _seconds_per_step(name, way, steps)
+                    if turn > 0:
+                        samples[way].append(seconds)
+        rows += [
+            StepCostRow(name, way, float(np.median(s)), min(s), max(s), len(s), steps) for way, s in samples.items()
+        ]
+        if progress is not None:
+            progress("time per step", done + 1, len(scenes))
+    return tuple(rows)
+
+
+def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:
+    from iapb.scene import load_scene
+    from iapb.scene_files import find_scene
+    from iapb.simulation import Simulation
+    from reference.worlds import find_world, run_world
+
+    scene, world = load_scene(find_scene(scene_name)), way.split(",")[0].split(" ")[0]
+    if way != WAYS[1]:
+        return float(np.sum(run_world(scene, world, steps=steps).chunk_seconds)) / steps
+    found = find_world(world)
+    simulation = Simulation(scene, found.law, found.coupling_in(scene))
+    simulation.step()
+    started = time.perf_counter()
+    for _ in range(steps):
+        simulation.step()
+    return (time.perf_counter() - started) / steps
