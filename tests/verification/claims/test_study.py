@@ -1,0 +1,71 @@
+"""The study: runs are injected, shared and sorted by what a world can see; swapped worlds refute the claims."""
+
+import pytest
+
+from iapb import find_scene, load_scene
+from iapb.errors import ArgumentError
+from verification.claims import Study, check_claims, study
+from verification.claims.claim import NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.claims.conditions import Condition
+from verification.claims.study import run_directly
+
+FEW = (Condition(0.0), Condition(0.1, friction=0.1))
+SWAPPED = {"IAPB": "PB", "PB": "IAPB"}
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Two starts only, one device limit, worlds that are compiled: a second, not a minute."""
+    monkeypatch.setattr(study, "start_conditions", lambda depth: FEW)
+    monkeypatch.setattr(study, "limited_conditions", lambda depth: FEW)
+
+
+def swapped(scene, world, rendering):
+    return run_directly(scene, SWAPPED[world], "full")
+
+
+def test_each_simulation_is_run_once(few):
+    calls = []
+
+    def run(scene, world, rendering):
+        calls.append((scene.source_text, world, rendering))
+        return run_directly(scene, world, rendering)
+
+    check_claims(run=run, ids=["C14", "C15", "C16"])
+    assert calls and len(calls) == len(set(calls))
+
+
+def test_rigid_worlds_do_not_see_friction_or_penalties():
+    seen = []
+    run = run_directly(load_scene(find_scene("peg_corner")), "PB", "full")
+
+    def remember(scene, world, rendering):
+        seen.append((world, scene.contact.friction, scene.contact.stiffness))
+        return run
+
+    asked = Study(remember)
+    for condition in (Condition(friction=0.3), Condition(stiffness=250.0), Condition()):
+        asked.trace(condition, "ideal")
+    asked.trace(Condition(friction=0.3), "PB")
+    assert seen == [("ideal", 0.0, 1000.0), ("PB", 0.3, 1000.0)]
+
+
+def test_worlds_under_the_wrong_name_are_found_out(few):
+    right = {result.id: result for result in check_claims(ids=["C14", "C15"])}
+    wrong = {result.id: result for result in check_claims(run=swapped, ids=["C14", "C15", "C16"])}
+    assert {result.verdict for result in right.values()} == {REPRODUCED}
+    assert (wrong["C14"].verdict, wrong["C15"].verdict) == (REFUTED, REFUTED)
+    assert wrong["C16"].verdict == NOT_TESTABLE  # a world without impulses reaches no limit
+
+
+def test_progress_names_every_claim():
+    said = []
+    check_claims(ids=["C07"], progress=lambda done, total, name: said.append((done, total, name)))
+    assert said == [(0, 1, "C07"), (1, 1, "")]
+
+
+def test_unknown_claims_and_depths_are_refused():
+    with pytest.raises(ArgumentError, match="C99"):
+        check_claims(ids=["C99"])
+    with pytest.raises(ArgumentError, match="depth"):
+        check_claims(depth="deep")
