@@ -1,0 +1,85 @@
+"""Time of the compiled factored impact beside the printed formula (21) in numpy, no public call around them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verification.accuracy_time.measure import Quartiles, one_thread
+
+Floats = NDArray[Any]
+
+SIZES = ((3, 4), (12, 60), (12, 300))  # (d, c): the peg on four corners, an arm on boxes, the same on meshes
+_CALLS = 50  # calls per sample of the compiled kernel, so that the clock and the Python call do not count
+
+
+@dataclass(frozen=True)
+class KernelTime:
+    """Time of one impact of d coordinates and c contacts of rank two thirds of d."""
+
+    coordinates: int
+    contacts: int
+    factored: Quartiles
+    printed: Quartiles
+
+    @property
+    def ratio(self) -> float:
+        """How many times longer the printed formula takes (medians)."""
+        return self.printed.median / self.factored.median
+
+
+def kernel_times(sizes: tuple[tuple[int, int], ...] = SIZES, rounds: int = 40, seed: int = 0) -> tuple[KernelTime, ...]:
+    """Return the times at each (d, c), sampled in turn."""
+    with one_thread():
+        return tuple(_time_size(d, c, rounds, np.random.default_rng([seed, d, c])) for d, c in sizes)
+
+
+def _time_size(d: int, c: int, rounds: int, rng: np.random.Generator) -> KernelTime:
+    rank = max(1, (2 * d) // 3)
+    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    mass, v = root @ root.T + np.eye(d), rng.normal(size=d)
+    factored = _factored_loop(mass, rows, v)
+    factored()
+    _printed(mass, rows, v)
+    compiled, printed = [], []
+    for _ in range(rounds):
+        started = time.perf_counter()
+        factored()
+        compiled.append((time.perf_counter() - started) / _CALLS)
+        started = time.perf_counter()
+        _printed(mass, rows, v)
+        printed.append(time.perf_counter() - started)
+    return KernelTime(d, c, _quartiles(compiled), _quartiles(printed))
+
+
+def _printed(mass: Floats, rows: Floats, v: Floats) -> Floats:
+    """(21) to the letter with e = 0.5."""
+    solved = np.linalg.solve(mass, rows.T)
+    return v - 1.5 * (solved @ (np.linalg.pinv(rows @ solved) @ (rows @ v)))
+
+
+def _factored_loop(mass: Floats, rows: Floats, v: Floats) -> Callable[[], None]:
+    """A call that resolves the impact _CALLS times in compiled code."""
+    from iapb.contact.kernels.cholesky import cholesky
+    from iapb.contact.kernels.impact import make_impact_work, rank_tolerance
+    from verification.accuracy_time.kernel_loop import repeat_factored
+
+    (c, d), lower = rows.shape, np.zeros_like(mass)
+    cholesky(mass, lower)
+    work, v_plus, momentum = make_impact_work(d, c), np.zeros(d), np.zeros(d)
+    columns, tolerance = np.ascontiguousarray(rows.T), float(rank_tolerance(lower))
+
+    def loop() -> None:
+        repeat_factored(mass, lower, v, 0.5, columns, tolerance, work, v_plus, momentum, _CALLS)
+
+    return loop
+
+
+def _quartiles(samples: list[float]) -> Quartiles:
+    lower, median, upper = np.percentile(samples, [25, 50, 75])
+    return Quartiles(float(lower), float(median), float(upper), len(samples))

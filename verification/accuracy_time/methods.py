@@ -1,0 +1,45 @@
+"""The methods that are measured, as functions problem -> v⁺. To add one: a line in METHODS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from iapb.errors import SolverError
+from verification.accuracy_time.problems import Floats, TimedProblem
+
+TimedMethod = Callable[[TimedProblem], Floats]
+
+
+def _engine(method: str, budget: int | None = None) -> TimedMethod:
+    def call(problem: TimedProblem) -> Floats:
+        from iapb import resolve_impact
+
+        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
+        return resolve_impact(*given, method=method, budget=budget).velocity
+
+    return call
+
+
+def cvxpy_qp(problem: TimedProblem) -> Floats:
+    """The impact as a convex program over p ≥ 0, modelled by cvxpy and solved by Clarabel."""
+    from reference.complementarity import ImpactProblem, solve
+
+    given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
+    solution = solve(ImpactProblem.from_impact(*given), "cvxpy_clarabel")
+    if solution.impulse is None:
+        raise SolverError(f"cvxpy gave no impulse: {solution.note}")
+    return solution.velocity_plus
+
+
+METHODS: dict[str, TimedMethod] = {
+    "factored": _engine("factored"),
+    "gram_pinv": _engine("gram_pinv"),
+    "gram_cholesky": _engine("gram_cholesky"),
+    "damped": _engine("damped"),
+    "svd": _engine("svd"),
+    "cvxpy QP": cvxpy_qp,
+    # the anytime form: what a budget of rows buys
+    "factored, 1 row": _engine("factored", 1),
+    "factored, 2 rows": _engine("factored", 2),
+    "factored, 4 rows": _engine("factored", 4),
+}
