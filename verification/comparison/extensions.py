@@ -33,7 +33,7 @@ RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
 class FrictionCell:
     """All impacts with one e and one μ; counts of impacts, energies as shares of KE⁻.
 
-    pushing : every contact pushes and friction was not reduced; same : of these, the motion is the NCP's
+    pushing : every contact pushes (with and without friction), nothing was reduced; same : of these, the motion is the NCP's
     reduced : friction reduced so that no energy is gained; ncp_gains, ccp_gains : impacts in which that law gains
     unsolved : impacts that NSGS or the engine's limits left unconverged, compared by energy only
     """
@@ -131,7 +131,7 @@ def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
             unsolved += 1
             continue
         distances.append(impact.distance(ours.velocity, ncp))
-        if _pushes(ours):
+        if _pushes(impact, e, ours):
             pushing += 1
             same += distances[-1] <= SAME_WITH_FRICTION
     return FrictionCell(
@@ -142,9 +142,12 @@ def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
     )  # fmt: skip
 
 
-def _pushes(ours: FrictionalImpact) -> bool:
-    """Every contact pushes, with friction not reduced and limits that μ p sets (a contact at rest at zero pulls)."""
-    return bool(ours.friction_share == 1.0 and ours.impulses.min(initial=0.0) >= 0.0)
+def _pushes(impact: _Impact, e: float, ours: FrictionalImpact) -> bool:
+    """Every contact pushes, with friction and without it, and friction was not reduced."""
+    from iapb import resolve_impact
+
+    without = resolve_impact(impact.mass, impact.rows, impact.velocity, e).impulses
+    return bool(ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0)
 
 
 def _counterparts(impact: _Impact, e: float, mu: float) -> tuple[Floats | None, Floats | None]:

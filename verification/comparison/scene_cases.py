@@ -71,15 +71,31 @@ def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = No
 
 
 def _rows_of_step(run: Run, mechanism: Mechanism, step: int, group: int) -> Floats:
-    """nᵀ(J_a − J_b) of the step's contacts whose bodies move in the impact's group (zero velocity elsewhere)."""
+    """nᵀ(J_a − J_b) (k, d) of the step's contacts that belong to the impact's contact group."""
     table, q = run.contacts, run.q[step]
-    chosen = range(int(table.offsets[step]), int(table.offsets[step + 1]))
+    chosen = [
+        m for m in range(int(table.offsets[step]), int(table.offsets[step + 1]))
+        if mechanism.tree_of_body[table.body_a[m]] in _trees_of_group(run, mechanism, step, group)
+    ]  # fmt: skip
     rows = np.zeros((len(chosen), mechanism.nv))
     for i, m in enumerate(chosen):
         rows[i] = table.normal[m] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
         if table.body_b[m] >= 0:
             rows[i] -= table.normal[m] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
     return rows
+
+
+def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> set[int]:
+    """Trees that a chain of contacts between moving bodies links to tree `group` (paper, section III)."""
+    table, trees = run.contacts, {group}
+    links = [
+        {int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}
+        for m in range(int(table.offsets[step]), int(table.offsets[step + 1]))
+        if table.body_b[m] >= 0
+    ]
+    while any(link & trees and not link <= trees for link in links):
+        trees |= set().union(*(link for link in links if link & trees))
+    return trees
 
 
 def _check(case: ImpactCase, run: Run, k: int) -> None:

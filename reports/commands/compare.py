@@ -1,0 +1,125 @@
+"""`iapb compare`: IAPB beside complementarity, on random impacts, the project's scenes and problem files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from verification.comparison.problem_study import ProblemStudy
+    from verification.comparison.study import ComparisonStudy
+
+
+def compare(
+    problems: Annotated[list[Path] | None, typer.Option(
+        help="A folder of problem files (LCP, MLCP, FCLIB) for every solver. Repeatable.")] = None,
+    only_problems: Annotated[bool, typer.Option(
+        "--only-problems", help="Only the problem files, not the comparison on impacts.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="Ten times the impacts, more repeats.")] = False,
+) -> None:
+    """Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem files."""
+    from rich.console import Console
+
+    from reports.commands.progress import stage_progress
+    from verification.comparison import sentences
+    from verification.comparison.problem_study import study_problems
+    from verification.comparison.study import compare as study_all
+
+    if only_problems and not problems:
+        raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
+    console = Console()
+    with stage_progress() as progress:
+        if only_problems:
+            studies = [study_problems(folder, progress=progress) for folder in problems or ()]
+            found = [text for study in studies for text in sentences.problems(study)]
+            tables = [table for study in studies for table in _problem_tables(study)]
+        else:
+            study = study_all("full" if full else "quick", problems or (), progress=progress)
+            found, tables = list(sentences.sentences(study)), _tables(study)
+    for table in tables:
+        console.print(table)
+    for text in found:
+        console.print(f"• {text}", highlight=False)
+
+
+def _tables(study: ComparisonStudy) -> list[Table]:
+    tables = [_map_table(study), _friction_table(study), _cost_table(study)]
+    return tables + [table for each in study.problems for table in _problem_tables(each)]
+
+
+def _table(title: str, *headings: str) -> Table:
+    from rich.table import Table
+
+    table = Table(title=title)
+    for i, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if i == 0 else "right", overflow="fold")
+    return table
+
+
+def _map_table(study: ComparisonStudy) -> Table:
+    table = _table("IAPB and the Newton LCP (distances in the kinetic metric, of |v⁻|)", "impacts", "e", "redundant",
+                   "cases", "agree", "pull", "artefact", "negative p", "typical", "largest", "extra loss")  # fmt: skip
+    for cell in study.cells + study.scenes:
+        typical = "" if cell.agree == 1.0 else f"{cell.typical:.2g}"
+        table.add_row(cell.family, f"{cell.restitution:g}", str(cell.redundancy), str(cell.cases), _share(cell.agree),
+                      _share(cell.adhesive), _share(cell.artefact), _share(cell.adhesive_share), typical,
+                      f"{cell.farthest:.2g}", f"{max(cell.extra_loss, 0.0):.2g}")  # fmt: skip
+    return table
+
+
+def _friction_table(study: ComparisonStudy) -> Table:
+    table = _table("Friction in the impact: IAPB, Coulomb's NCP, its relaxation CCP (energies of KE⁻)", "e", "μ", "cases",
+                   "all push", "as NCP", "reduced", "unsolved", "NCP gains", "CCP gains", "most, IAPB", "most, NCP",
+                   "most, CCP")  # fmt: skip
+    for c in study.friction:
+        table.add_row(f"{c.restitution:g}", f"{c.friction:g}", *(str(n) for n in (
+            c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains)),
+            f"{c.largest_gain:.0e}", f"{c.largest_gain_ncp:.2g}", f"{c.largest_gain_ccp:.2g}")  # fmt: skip
+    return table
+
+
+def _cost_table(study: ComparisonStudy) -> Table:
+    solvers = list(dict.fromkeys(row.solver for row in study.impact_costs))
+    table = _table("Time per impact [µs]: median (least to largest)", "impacts", "contacts", *solvers)
+    cells = {(row.family, row.contacts, row.solver): row for row in study.impact_costs}
+    for family, contacts in sorted({(row.family, row.contacts) for row in study.impact_costs}):
+        rows = [cells[family, contacts, solver] for solver in solvers]
+        table.add_row(family, str(contacts), *(
+            f"{r.median * 1e6:.3g} ({r.least * 1e6:.3g} to {r.largest * 1e6:.3g}){'' if r.verdict == 'solved' else ' ' + r.verdict}"
+            if r.repeats else r.verdict for r in rows))  # fmt: skip
+    return table
+
+
+def _problem_tables(study: ProblemStudy) -> list[Table]:
+    verdicts = _table(f"{study.folder}: every solver on every problem", "problem", "unknowns", "rank", "asymmetry",
+                      *study.solvers, "spread")  # fmt: skip
+    for line in study.lines:
+        by = dict(line.verdicts)
+        skew = f"{line.asymmetry:.1g}" if line.asymmetry else ""
+        verdicts.add_row(line.problem, str(line.unknowns), str(line.rank), skew, *(by.get(s, "") for s in study.solvers),
+                         f"{line.spread:.0e}")  # fmt: skip
+    for file in study.unread:
+        verdicts.add_row(file.file, "", "", "", *("not read" for _ in study.solvers), "")
+    return [verdicts, _profile_table(study)]
+
+
+def _profile_table(study: ProblemStudy) -> Table:
+    import numpy as np
+
+    from verification.comparison.problem_study import FACTORS
+
+    shown = [1.0, 3.0, 10.0, 100.0, 1e5]
+    table = _table("Performance profile (Dolan and Moré): share solved within a factor of the fastest", "kind", "solver",
+                   *(f"{factor:g}" for factor in shown))  # fmt: skip
+    for kind, solver, share in study.profile:
+        at = [share[np.searchsorted(FACTORS, factor, side="right") - 1] for factor in shown]
+        table.add_row(kind, solver, *(_share(float(value)) for value in at))
+    return table
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %"

@@ -1,0 +1,177 @@
+"""What a comparison found, in sentences with their numbers; each is made from the record, none is typed in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from verification.comparison.agreement_map import MapCell
+from verification.comparison.problem_study import ProblemStudy
+from verification.comparison.step_cost import IAPB, KERNEL, CostRow
+from verification.comparison.study import ComparisonStudy
+
+C05_TOLERANCE = 1e-12
+
+
+def sentences(study: ComparisonStudy) -> tuple[str, ...]:
+    """The verdicts of a study, most important first."""
+    found = [single_contact(study), wider_class(study), two_contacts(study), difference(study), energy(study)]
+    found += [scenes(study), touching(study), friction(study), unequal(study), cost(study), steps(study)]
+    found += [text for each in study.problems for text in problems(each)]
+    return tuple(text for text in found if text)
+
+
+def single_contact(study: ComparisonStudy) -> str:
+    """C05."""
+    worst = max(c.distance for c in study.single)
+    verdict = "reproduced" if worst <= C05_TOLERANCE else "refuted"
+    return (f"C05 {verdict}: at one contact IAPB and the Newton LCP give the same motion in all {len(study.single)} "
+            f"impacts, to {worst:.1e} of |v⁻| in the kinetic metric (asked: {C05_TOLERANCE:.0e}).")
+
+
+def wider_class(study: ComparisonStudy) -> str:
+    """Equality = LCP if and only if some p >= 0 gives its motion."""
+    cells = study.cells + study.scenes
+    cases, against = sum(c.cases for c in cells), sum(c.contradictions for c in cells)
+    whole = sorted({c.family for c in study.cells if _always(study.cells, c.family)})
+    return (f"The wider class: with one e the two agree if and only if some p >= 0 gives IAPB's motion; {against} of "
+            f"{cases} impacts speak against it. They always agreed for: {', '.join(whole)}.")
+
+
+def _always(cells: Sequence[MapCell], family: str) -> bool:
+    return all(c.agree == 1.0 for c in cells if c.family == family)
+
+
+def two_contacts(study: ComparisonStudy) -> str:
+    """The border r = c."""
+    right = sum(c.predicted == c.found for c in study.two_contacts)
+    return (f"Two contacts whose rows have the cosine c in the kinetic metric and close at speeds 1 and r agree exactly "
+            f"where r >= c: {right} of {len(study.two_contacts)} grid points.")
+
+
+def difference(study: ComparisonStudy) -> str:
+    """By how much, and against what."""
+    cells = [c for c in study.cells if c.agree < 1.0]
+    if not cells:
+        return ""
+    defect = max(c.defect for c in study.cells + study.scenes)
+    by_redundancy = ", ".join(
+        f"{r}: {100 * (1 - np.mean([c.agree for c in cells if c.redundancy == r])):.0f} %"
+        for r in sorted({c.redundancy for c in cells})
+    )
+    return (f"Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses (defect at most "
+            f"{defect:.0e}), up to {max(c.farthest for c in cells):.2g} |v⁻|. It grows with 1 + e, which moves no impact "
+            f"across the border. Impacts that differ, by redundant rows, {by_redundancy}.")
+
+
+def energy(study: ComparisonStudy) -> str:
+    """Extra loss."""
+    cells = study.cells + study.scenes
+    return (f"IAPB never keeps more energy than the LCP: it loses ½ (1−e)/(1+e) · distance² more, up to "
+            f"{100 * max(c.extra_loss for c in cells):.0f} % of KE⁻, nothing at e = 1. Momentum changes lie in range(Jᵀ) "
+            f"to {max(c.momentum for c in cells):.0e}.")
+
+
+def scenes(study: ComparisonStudy) -> str:
+    """The project's scenes."""
+    cases = sum(c.cases for c in study.scenes)
+    if not cases:
+        return ""
+    apart = sorted({c.family.removeprefix("scene ") for c in study.scenes if c.agree < 1.0})
+    pulling = sum(round(c.adhesive * c.cases) for c in study.scenes)
+    artefacts = sum(round(c.artefact * c.cases) for c in study.scenes)
+    where = f"they differ in {', '.join(apart)}" if apart else "they agree in all"
+    return (f"Impacts of the project's scenes: {cases}; {where}. {pulling} pull truly (no p >= 0 gives their motion), "
+            f"{artefacts} only in the least-norm p; {study.left_out} are left out (per-body rows or device limits).")
+
+
+def touching(study: ComparisonStudy) -> str:
+    """Erratum 4: contacts that did not approach."""
+    cells = [c for c in study.cells if c.family == "with a neighbour"]
+    if not cells:
+        return ""
+    ours, theirs = (float(np.mean([getattr(c, n) for c in cells])) for n in ("left_approaching", "left_approaching_law"))
+    return (f"A touching contact that is not given a row is left approaching in {100 * ours:.0f} % of such impacts by "
+            f"IAPB and in {100 * theirs:.0f} % by the LCP on the same rows.")
+
+
+def friction(study: ComparisonStudy) -> str:
+    """The extension by dry friction."""
+    cells = study.friction
+    pushing, same = sum(c.pushing for c in cells), sum(c.same for c in cells)
+    gains = {name: max(getattr(c, name) for c in cells) for name in
+             ("largest_gain", "largest_gain_ncp", "largest_gain_ccp")}  # fmt: skip
+    elastic = [c for c in cells if c.restitution > 0.0]
+    share = 100 * sum(c.ncp_gains for c in elastic) / max(1, sum(c.cases for c in elastic))
+    return (f"Friction in the impact: where every contact pushes, IAPB's motion is Coulomb's NCP in {same} of {pushing} "
+            f"impacts. With e > 0 the NCP gains energy in {share:.0f} % (up to {gains['largest_gain_ncp']:.2g} KE⁻, the CCP "
+            f"up to {gains['largest_gain_ccp']:.2g}); IAPB never (largest change {gains['largest_gain']:.0e} KE⁻).")
+
+
+def unequal(study: ComparisonStudy) -> str:
+    """The extension by unequal restitution."""
+    distance = max(c.distance for c in study.unequal)
+    gains = {name: max(getattr(c, name) for c in study.unequal) for name in ("gain", "gain_equality")}
+    mixed = max(c.gain_newton_lcp for c in study.unequal)
+    return (f"Unequal restitution: the engine's two LCPs are the reference's to {distance:.0e} and gain at most "
+            f"{gains['gain']:.0e} KE⁻; equalities gain up to {gains['gain_equality']:.2g}, the Newton LCP up to {mixed:.2g} "
+            f"where some contacts separate. On the struck bar (0.5 J): equalities {study.bar['newton_equality']:.4g} J, "
+            f"IAPB {study.bar['IAPB, unequal restitution']:.4g} J.")
+
+
+def cost(study: ComparisonStudy) -> str:
+    """C22, per impact."""
+    rows = study.impact_costs
+    largest = max(row.contacts for row in rows)
+    parts = []
+    for family in dict.fromkeys(row.family for row in rows):
+        for contacts in sorted({min(row.contacts for row in rows), largest}):
+            parts.append(_cost_part(rows, family, contacts))
+    return "C22, time per impact (medians): " + "; ".join(parts) + "."
+
+
+def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
+    here = {row.solver: row for row in rows if row.family == family and row.contacts == contacts}
+    others = [row for name, row in here.items() if not name.startswith("IAPB") and row.verdict == "solved"]
+    text = f"{family} of {contacts}: IAPB {_seconds(here[KERNEL].median)} compiled, {_seconds(here[IAPB].median)} from Python"
+    if not others:
+        return text + ", no LCP solver solved it"
+    best = min(others, key=lambda row: row.median)
+    return text + f", fastest LCP solver {best.solver} {_seconds(best.median)}"
+
+
+def steps(study: ComparisonStudy) -> str:
+    """C22, per step."""
+    parts = []
+    for scene in dict.fromkeys(row.scene for row in study.step_costs):
+        here = {row.way: row.median for row in study.step_costs if row.scene == scene}
+        parts.append(f"{scene}: " + ", ".join(f"{way} {_seconds(value)}" for way, value in here.items()))
+    return "C22, time per step: " + "; ".join(parts) + "." if parts else ""
+
+
+def problems(study: ProblemStudy) -> tuple[str, ...]:
+    """One folder of problem files."""
+    counts = ", ".join(
+        f"{name} {study.count(name, 'solved')}/{study.count(name, 'refused')}/{study.count(name, 'failed')}"
+        for name in study.solvers
+    )
+    skew = [f"{line.problem} ({line.asymmetry:.1g})" for line in study.lines if line.asymmetry > 0.0]
+    unsolved = [line.problem for line in study.lines if all(verdict != "solved" for _, verdict in line.verdicts)]
+    spread = np.nanmax([line.spread for line in study.lines], initial=0.0)
+    found = [
+        f"{study.folder}: {len(study.lines)} problems read, {len(study.unread)} files not. Solved/refused/failed by "
+        f"recomputed residuals: {counts}.",
+        f"Solved by nobody: {', '.join(unsolved) or 'none'}. Those who solve a problem agree on its contact velocities "
+        f"to {spread:.0e} (impulses are not compared: they are not unique).",
+    ]
+    if skew:
+        found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
+    return tuple(found)
+
+
+def _seconds(value: float) -> str:
+    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if value * factor >= 1.0 or unit == "µs":
+            return f"{value * factor:.3g} {unit}"
+    return f"{value:.3g} s"

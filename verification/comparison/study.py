@@ -1,0 +1,140 @@
+"""The whole comparison as one record: `compare()`; what it means in sentences is in `sentences`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from iapb.errors import ArgumentError
+from iapb.run import Run
+from iapb.scene import Scene
+from verification.comparison.agreement import Comparison, compare_case, compare_cases
+from verification.comparison.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
+from verification.comparison.cases import random_cases
+from verification.comparison.extensions import (
+    FrictionCell,
+    UnequalCell,
+    compare_friction,
+    compare_unequal,
+    struck_bar,
+)
+from verification.comparison.problem_study import ProblemStudy, study_problems
+from verification.comparison.scene_cases import impacts_of_run, scene_impacts
+from verification.comparison.step_cost import CONTACTS, CostRow, impact_cost
+from verification.comparison.world_cost import StepCostRow, world_cost
+
+Progress = Callable[[str, int, int], None]
+
+SCENE_RESTITUTIONS = (None, 0.5)  # as the scene says, and half elastic: more impacts, and some that differ
+
+
+@dataclass(frozen=True)
+class Depth:
+    """How much is computed: impacts per cell of the map, friction impacts, sizes and repeats of the timings."""
+
+    cases: int
+    frictional: int
+    unequal: int
+    contacts: tuple[int, ...]
+    repeats: int
+
+
+DEPTHS = {
+    "quick": Depth(25, 40, 100, CONTACTS, 3),
+    "full": Depth(250, 300, 1000, CONTACTS, 7),
+}
+
+
+@dataclass(frozen=True)
+class ComparisonStudy:
+    """Everything that `iapb compare` found.
+
+    single : C05, one contact (family "one contact" without redundancy) and law "newton_lcp"
+    cells : the map over random families; two_contacts : the exact border of two contacts
+    scenes : the map over impacts of the project's scenes; left_out : scene impacts that cannot be compared
+    friction, unequal, bar : the engine's extensions beside their complementarity counterparts
+    impact_costs, step_costs : C22; problems : folders of problem files
+    """
+
+    depth: str
+    single: tuple[Comparison, ...]
+    cells: tuple[MapCell, ...]
+    two_contacts: tuple[TwoContactCell, ...]
+    scenes: tuple[MapCell, ...]
+    left_out: int
+    friction: tuple[FrictionCell, ...]
+    unequal: tuple[UnequalCell, ...]
+    bar: Mapping[str, float]
+    impact_costs: tuple[CostRow, ...]
+    step_costs: tuple[StepCostRow, ...]
+    problems: tuple[ProblemStudy, ...] = ()
+
+
+def compare(
+    depth: str = "quick",
+    folders: Iterable[Path | str] = (),
+    scenes: Iterable[str] | None = None,
+    progress: Progress | None = None,
+) -> ComparisonStudy:
+    """Compare IAPB with complementarity: random families, scenes, extensions, cost, and folders of problem files.
+
+    Parameters
+    ----------
+    depth : "quick" (a minute or two) or "full"
+    folders : folders of problem files (LCP, MLCP, FCLIB)
+    scenes : names of the project's scenes; default all
+    progress : called as progress(stage, done, total)
+
+    Raises
+    ------
+    ArgumentError
+        An unknown depth, or a folder that does not exist.
+    """
+    if depth not in DEPTHS:
+        raise ArgumentError("depth", depth, "one of " + ", ".join(DEPTHS))
+    size, say = DEPTHS[depth], progress or (lambda stage, done, total: None)
+    comparisons = _random_comparisons(size.cases, say)
+    scene_cells, left_out = compare_scenes(scenes, say)
+    return ComparisonStudy(
+        depth,
+        single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy and c.law == "newton_lcp"),
+        cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
+        friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
+        bar=struck_bar(), impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
+        step_costs=world_cost(repeats=size.repeats, progress=say),
+        problems=tuple(study_problems(folder, progress=say) for folder in folders),
+    )  # fmt: skip
+
+
+def _random_comparisons(count: int, say: Progress) -> tuple[Comparison, ...]:
+    cases = list(random_cases(count))
+    found = []
+    for done, case in enumerate(cases):
+        found.append(compare_case(case))
+        if done % 50 == 0:
+            say("random impacts", done, len(cases))
+    say("random impacts", len(cases), len(cases))
+    return tuple(found)
+
+
+def compare_scenes(
+    scenes: Iterable[str] | None = None, progress: Progress | None = None
+) -> tuple[tuple[MapCell, ...], int]:
+    """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
+    from iapb.scene_files import scene_names
+
+    names, found, left_out = list(scene_names() if scenes is None else scenes), [], 0
+    for done, name in enumerate(names):
+        for restitution in SCENE_RESTITUTIONS:
+            impacts = scene_impacts(name, restitution=restitution)
+            found += compare_cases(impacts.cases)
+            left_out += impacts.left_out
+        if progress is not None:
+            progress("impacts of scenes", done + 1, len(names))
+    return agreement_map(found), left_out
+
+
+def compare_run(run: Run, scene: Scene) -> tuple[Comparison, ...]:
+    """Compare on the impacts of one recorded run."""
+    return compare_cases(impacts_of_run(run, scene).cases)
