@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,30 @@ def shown(value: Any) -> str:
 
 
 class IapbError(Exception):
-    """Root of every error that iapb raises on purpose."""
+    """Root of every error that iapb raises on purpose.
+
+    Errors travel between processes with message and attributes; an attribute that cannot be pickled travels as
+    its text.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Rebuild from message and attributes: the arguments of a child's __init__ are not in `args`."""
+        attributes = {name: _portable(value) for name, value in vars(self).items()}
+        return _restored, (type(self), self.args, attributes)
+
+
+def _portable(value: Any) -> Any:
+    try:
+        pickle.dumps(value)
+    except Exception:  # pickle raises whatever a value's own __reduce__ raises
+        return shown(value)
+    return value
+
+
+def _restored(kind: type[IapbError], args: tuple[Any, ...], attributes: dict[str, Any]) -> IapbError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(attributes)
+    return error
 
 
 class ArgumentError(IapbError, ValueError):

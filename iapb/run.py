@@ -77,8 +77,11 @@ class Run:
     complete: bool  # False: interrupted, the arrays end at the last step done
     coordinate_names: tuple[str, ...]  # (nq,)
     coordinate_units: tuple[str, ...]  # (nq,)
+    velocity_names: tuple[str, ...]  # (d,) of each entry of v, and of generalized forces and impulses
+    velocity_units: tuple[str, ...]  # (d,) m/s or rad/s: a force has N, N m, an impulse N s, N m s
     body_names: tuple[str, ...]
-    tool_dofs: tuple[int, int]  # start, stop of the tool's coordinates in v; (0, 0) without a hand
+    tool_dofs: tuple[int, int]  # start, stop of the tool in v; (0, 0) without a hand
+    tool_coordinates: tuple[int, int]  # the same in q: quaternions are longer than their velocities
 
     time: Floats  # (n + 1,) [s]
     q: Floats  # (n + 1, nq)

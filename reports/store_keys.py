@@ -81,7 +81,7 @@ def add_array(digest: Any, name: str, array: Any) -> None:
 def content_hash(run: Run) -> str:
     """Return sha256 of the results alone: no timings, no provenance; equal bit for bit on a repeat."""
     digest = hashlib.sha256()
-    head = [run.dt, run.complete, run.tool_dofs, run.coordinate_names, run.body_names]
+    head = [run.dt, run.complete, run.tool_dofs, run.coordinate_names, run.velocity_names, run.body_names]
     digest.update(canonical_json(head).encode())
     add_array(digest, "time", run.time)
     for group in RESULT_GROUPS:

@@ -24,20 +24,21 @@ from numpy.typing import NDArray
 from iapb.run import STATE_NAMES, Run
 
 FORMAT = "iapb run"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 2: names and units of velocities, which quaternions need
 
-# Units of generalized quantities follow the unit of their coordinate.
-VELOCITY = {"m": "m/s", "rad": "rad/s"}
-FORCE = {"m": "N", "rad": "N m"}
-IMPULSE = {"m": "N s", "rad": "N m s"}
-POSITION = {"m": "m", "rad": "rad"}
+# Units of generalized quantities follow the unit of their coordinate or of their velocity.
+POSITION = {"m": "m", "rad": "rad", "1": "1"}
+VELOCITY = {"m/s": "m/s", "rad/s": "rad/s"}
+FORCE = {"m/s": "N", "rad/s": "N m"}
+IMPULSE = {"m/s": "N s", "rad/s": "N m s"}
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One dataset: its name (also the attribute of the record), dimensions, unit and meaning.
 
-    A `unit` that is a mapping belongs to a generalized quantity: the unit for each unit of coordinate.
+    A `unit` that is a mapping belongs to a generalized quantity: the unit for each unit of coordinate
+    or, along velocities, of velocity.
     """
 
     name: str
@@ -136,10 +137,7 @@ def unit_of(quantity: Quantity, run: Run) -> str:
     """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
     if isinstance(quantity.unit, str):
         return quantity.unit
-    if run.q.shape[1] != run.v.shape[1]:  # quaternions and the like: no column of v has its coordinate
-        return " or ".join(dict.fromkeys(quantity.unit.values()))
-    start, stop = run.tool_dofs if quantity.dimensions[1].startswith("device") else (0, run.v.shape[1])
-    units = [quantity.unit.get(unit, "1") for unit in run.coordinate_units[start:stop]]
+    units = [quantity.unit[unit] for unit in _along(run, quantity.dimensions[1])[1]]
     return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
 
 
@@ -147,14 +145,18 @@ def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] 
     """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
     if dimension == "time":
         return np.asarray(run.time, np.float64), "s"
-    start, stop = run.tool_dofs
-    labels = {
-        "axis": ("x", "y", "z"),
-        "coordinate": run.coordinate_names,
-        "velocity": run.coordinate_names,
-        "device_coordinate": run.coordinate_names[start:stop],
-        "device_velocity": run.coordinate_names[start:stop],
-    }.get(dimension, ())
+    labels = ("x", "y", "z") if dimension == "axis" else _along(run, dimension)[0]
     if labels and len(labels) == length:
         return labels, "1"
     return np.arange(length, dtype=np.int64), "1"
+
+
+def _along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units along a dimension of generalized quantities; none along others."""
+    q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
+    return {
+        "coordinate": (run.coordinate_names, run.coordinate_units),
+        "velocity": (run.velocity_names, run.velocity_units),
+        "device_coordinate": (run.coordinate_names[q], run.coordinate_units[q]),
+        "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
+    }.get(dimension, ((), ()))

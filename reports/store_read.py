@@ -91,11 +91,11 @@ def _texts(file: Any, path: Path | str) -> dict[str, Any]:
 
 
 def _head(file: Any) -> dict[str, Any]:
-    start, stop = file.attrs["tool_dofs"]
+    ranges = {name: tuple(int(end) for end in file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
     return {
         "dt": float(file.attrs["dt"]),
         "complete": file.attrs["status"] == "complete",
-        "tool_dofs": (int(start), int(stop)),
+        **ranges,
     }
 
 
@@ -110,6 +110,8 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
     return {
         "coordinate_names": read_values(file["mechanism"], "coordinate", place),
         "coordinate_units": read_values(file["mechanism"], "coordinate_unit", place),
+        "velocity_names": read_values(file["mechanism"], "velocity", place),
+        "velocity_units": read_values(file["mechanism"], "velocity_unit", place),
         "body_names": read_values(file["mechanism"], "body", place),
         "time": read_values(file["trajectory"], "time", place),
         "contacts": ContactTable(**contacts),

@@ -79,12 +79,15 @@ def _write_head(file: Any, run: Run, key: str) -> None:
     file.attrs["content_hash"] = content_hash(run)
     file.attrs["dt"] = float(run.dt)
     file.attrs["tool_dofs"] = run.tool_dofs
+    file.attrs["tool_coordinates"] = run.tool_coordinates
 
 
 def _write_names(file: Any, run: Run) -> None:
     group = file.create_group("mechanism")
     write_scale(group, "coordinate", run.coordinate_names, "1")
     write_quantity(group, "coordinate_unit", run.coordinate_units, ("coordinate",), "1", "unit of each coordinate")
+    write_scale(group, "velocity", run.velocity_names, "1")
+    write_quantity(group, "velocity_unit", run.velocity_units, ("velocity",), "1", "unit of each velocity")
     write_scale(group, "body", run.body_names, "1")
 
 

@@ -33,7 +33,8 @@ class JointKind:
     name: str
     code: int
     coordinates: tuple[tuple[str, str], ...]  # (suffix, unit) of each entry of q
-    velocity_units: tuple[str, ...]  # unit of each entry of v
+    velocities: tuple[str, ...]  # suffix of each entry of v
+    velocity_units: tuple[str, ...]  # its unit
     neutral: tuple[float, ...]  # q of the joint at rest
     rotating: tuple[bool, ...]  # for each entry of v: rotation (True) or translation along its axis
 
@@ -54,19 +55,21 @@ _UNIT_CIRCLE = (("cos", "1"), ("sin", "1"))
 _PLACE_2D = (("x", "m"), ("y", "m"))
 _PLACE_3D = (*_PLACE_2D, ("z", "m"))
 _QUATERNION = (("qx", "1"), ("qy", "1"), ("qz", "1"), ("qw", "1"))
+_TURNS_3D = ("rx", "ry", "rz")
 _METRES, _RADIANS = ("m/s",), ("rad/s",)
 
 KINDS: dict[str, JointKind] = {
     kind.name: kind
     for kind in (
-        JointKind("fixed", FIXED, (), (), (), ()),
-        JointKind("revolute", REVOLUTE, _TURN, _RADIANS, (0.0,), (True,)),
-        JointKind("continuous", CONTINUOUS, _UNIT_CIRCLE, _RADIANS, (1.0, 0.0), (True,)),
-        JointKind("prismatic", PRISMATIC, _SLIDE, _METRES, (0.0,), (False,)),
+        JointKind("fixed", FIXED, (), (), (), (), ()),
+        JointKind("revolute", REVOLUTE, _TURN, ("angle",), _RADIANS, (0.0,), (True,)),
+        JointKind("continuous", CONTINUOUS, _UNIT_CIRCLE, ("angle",), _RADIANS, (1.0, 0.0), (True,)),
+        JointKind("prismatic", PRISMATIC, _SLIDE, ("position",), _METRES, (0.0,), (False,)),
         JointKind(
             "planar",
             PLANAR,
             (*_PLACE_2D, ("theta", "rad")),
+            ("x", "y", "theta"),
             _METRES * 2 + _RADIANS,
             (0.0,) * 3,
             (False, False, True),
@@ -75,15 +78,19 @@ KINDS: dict[str, JointKind] = {
             "planar_se2",
             PLANAR_SE2,
             _PLACE_2D + _UNIT_CIRCLE,
+            ("x", "y", "theta"),
             _METRES * 2 + _RADIANS,
             (0.0, 0.0, 1.0, 0.0),
             (False, False, True),
         ),
-        JointKind("spherical", SPHERICAL, _QUATERNION, _RADIANS * 3, (0.0, 0.0, 0.0, 1.0), (True,) * 3),
+        JointKind(
+            "spherical", SPHERICAL, _QUATERNION, _TURNS_3D, _RADIANS * 3, (0.0, 0.0, 0.0, 1.0), (True,) * 3
+        ),
         JointKind(
             "free_flyer",
             FREE_FLYER,
             _PLACE_3D + _QUATERNION,
+            ("x", "y", "z", *_TURNS_3D),
             _METRES * 3 + _RADIANS * 3,
             (0.0,) * 6 + (1.0,),
             (False,) * 3 + (True,) * 3,

@@ -95,6 +95,11 @@ class Mechanism:
         return tuple(unit for b in self.bodies for _, unit in b.joint.layout.coordinates)
 
     @property
+    def velocity_names(self) -> tuple[str, ...]:
+        """Name of each entry of v (and of a generalized force): body.suffix, turns about x, y, z as rx, ry, rz."""
+        return tuple(f"{b.name}.{suffix}" for b in self.bodies for suffix in b.joint.layout.velocities)
+
+    @property
     def velocity_units(self) -> tuple[str, ...]:
         """Unit of each entry of v: m/s or rad/s."""
         return tuple(unit for b in self.bodies for unit in b.joint.layout.velocity_units)

@@ -16,7 +16,7 @@ SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
 
 def tool_positions(run: Run) -> Floats:
     """Return the tool's coordinates (n + 1, d_t); planar and one-dof joints have as many as they have velocities."""
-    return run.q[:, slice(*run.tool_dofs)]
+    return run.q[:, slice(*run.tool_coordinates)]
 
 
 def device_positions(run: Run) -> Floats:

@@ -66,11 +66,15 @@ def test_a_run_comes_back_bit_for_bit(tmp_path: Path, make_run: MakeRun, shape: 
 def test_a_configuration_may_be_longer_than_a_velocity(tmp_path: Path, make_run: MakeRun) -> None:
     names, units = ("base.w", "base.x", "base.y", "base.z"), ("1", "1", "1", "1")
     q = np.tile([1.0, 0.0, 0.0, 0.0], (21, 1))
-    run = make_run(coordinate_names=names, coordinate_units=units, q=q, device_q=q)
+    turns = {"velocity_names": ("base.rx", "base.ry", "base.rz"), "velocity_units": ("rad/s",) * 3}
+    place = {"coordinate_names": names, "coordinate_units": units, "tool_coordinates": (0, 4)}
+    run = make_run(q=q, device_q=q, **place, **turns)
     path = write_run(tmp_path / "run.h5", run)
     assert_same(read_run(path), run)
     with xarray.open_dataset(path, engine="h5netcdf", group="trajectory") as dataset:
-        assert dataset["device_q"].shape == (21, 4) and dataset["v"].attrs["units"] == "m/s or rad/s"
+        assert dataset["device_q"].shape == (21, 4) and dataset["device_q"].attrs["units"] == "1"
+        assert dataset["v"].attrs["units"] == "rad/s"
+        assert list(dataset["device_velocity"].values) == ["base.rx", "base.ry", "base.rz"]
 
 
 def test_special_values_survive(tmp_path: Path, make_run: MakeRun) -> None:

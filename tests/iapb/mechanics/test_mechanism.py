@@ -171,6 +171,7 @@ def test_names_units_and_layout():
     assert mechanism.coordinate_names[-2:] == ("wheel.cos", "wheel.sin")
     assert mechanism.coordinate_units == ("m",) * 3 + ("1",) * 6
     assert mechanism.velocity_units == ("m/s",) * 3 + ("rad/s",) * 4
+    assert mechanism.velocity_names == (*(f"ball.{turn}" for turn in ("x", "y", "z", "rx", "ry", "rz")), "wheel.angle")
     assert mechanism.tree_dofs == [(0, 7), (7, 7)] and list(mechanism.tree_of_body) == [0, 0, 1]
     np.testing.assert_array_equal(mechanism.neutral(), [0, 0, 0, 0, 0, 0, 1, 1, 0])
 

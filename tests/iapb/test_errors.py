@@ -1,0 +1,56 @@
+"""Errors cross processes: a pool's worker pickles what it raises."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from iapb.errors import (
+    ArgumentError,
+    IapbError,
+    MissingDependencyError,
+    Mistake,
+    RangeError,
+    RunFileError,
+    SceneError,
+    SolverError,
+)
+
+ERRORS = [
+    ArgumentError("mass", -1.0, "at least 0 kg"),
+    ArgumentError("q", np.arange(3), "finite numbers"),
+    RangeError("energy", "too large"),
+    SceneError([Mistake("peg.yaml", 3, 5, "bodies[0].mass", "-1", "at least 0 kg")]),
+    MissingDependencyError("drake", "This comparison", "pip install drake"),
+    RunFileError("damaged"),
+    SolverError("refused"),
+]
+
+
+def _all_children(kind: type[IapbError]) -> set[type[IapbError]]:
+    return {kind}.union(*(_all_children(child) for child in kind.__subclasses__()))
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_an_error_survives_the_way_between_processes(error: IapbError) -> None:
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is type(error) and str(copy) == str(error) and copy.args == error.args
+    assert set(vars(copy)) == set(vars(error))
+    assert repr(vars(copy)) == repr(vars(error))
+
+
+def test_every_error_of_the_engine_is_tried() -> None:
+    engine = {kind for kind in _all_children(IapbError) if kind.__module__ == "iapb.errors"}
+    assert {type(error) for error in ERRORS} == engine - {IapbError}
+
+
+def test_a_value_that_cannot_travel_travels_as_text() -> None:
+    copy = pickle.loads(pickle.dumps(ArgumentError("law", lambda: None, "a contact law")))
+    assert copy.argument == "law" and "lambda" in copy.value and copy.expected == "a contact law"
+
+
+def test_an_error_that_is_raised_elsewhere_is_caught_by_its_kind() -> None:
+    with pytest.raises(ValueError, match="mass = -1"):
+        raise pickle.loads(pickle.dumps(ERRORS[0]))
