@@ -117,11 +117,13 @@ def trajectory_numbers(runs: Mapping[str, Run], reference: str | None = "ideal")
     """Return the table under a trajectory figure; distances are from the curve `reference`, if there is one."""
     apart = ("from ideal x [mm]", "y [mm]", "θ [°]") if reference else ()
     columns = ("world", *apart, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
-    return Numbers(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=_NOTE)
+    return Numbers(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3,
+                   note=_FROM_IDEAL + _SETTLED if reference else _SETTLED)
 
 
-_NOTE = ("Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "
-         "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run.")
+_FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "
+_SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
+_DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
 
 def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[object, ...]:
@@ -130,7 +132,7 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
     if reference:
         distance = distance_between(run, runs[reference])
         apart = tuple(float(distance[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
-    return (curve, *apart, MILLI * deepest_penetration(run), MILLI * float(np.hypot(*widest_separation(run)[:2])),
+    return (curve, *apart, round(MILLI * deepest_penetration(run), _DIGITS), round(MILLI * float(np.hypot(*widest_separation(run)[:2])), _DIGITS),
             len(run.impacts.step), settling_time(run))
 
 
