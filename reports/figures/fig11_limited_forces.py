@@ -14,7 +14,7 @@ from reports.figures.worlds import LIMITED, legend_of, runs_of
 
 KEY, NUMBER, TITLE = "fig11", "Figure 11", "Forces with a limited device"
 CAPTION = (
-    "As Figure 8 with spread impulses. Compare the first contact of IAPB, now cut at the limit of the device, with "
+    "As Figure 8 with spread impulses. Compare the first contact of IAPB, now spread over steps, with "
     "the slow rise of the penalty force."
 )
 

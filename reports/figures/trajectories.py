@@ -132,8 +132,9 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
     if reference:
         distance = distance_between(run, runs[reference])
         apart = tuple(float(distance[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
-    return (curve, *apart, round(MILLI * deepest_penetration(run), _DIGITS), round(MILLI * float(np.hypot(*widest_separation(run)[:2])), _DIGITS),
-            len(run.impacts.step), settling_time(run))
+    lengths = (deepest_penetration(run), float(np.hypot(*widest_separation(run)[:2])))
+    return (curve, *apart, *(round(MILLI * length, _DIGITS) for length in lengths), len(run.impacts.step),
+            settling_time(run))
 
 
 def _ends(runs: Mapping[str, Run]) -> str:

@@ -41,7 +41,7 @@ def _marks(numbers: Numbers, methods: tuple[str, ...], column: str) -> str:
         axes = drawing.add_subplot()
         for number, method in enumerate(methods):
             points = [(float(row[at]), max(float(row[of]), _SMALLEST)) for row in numbers.rows
-                      if row[where] == method and row[of] is not None]
+                      if row[where] == method and None not in (row[at], row[of])]
             look = {**line_arguments(CYCLE[number % len(CYCLE)]), "linestyle": "none", "markersize": 6}
             axes.plot(*zip(*points, strict=True), **look) if points else None
         axes.set(xscale="log", yscale="log", xlabel=TIME, ylabel=column)
