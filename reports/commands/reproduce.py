@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,12 +22,12 @@ def reproduce(
     from reports.evidence.gather import gather
     from reports.report import build_report, write_report
 
+    if figure is not None:
+        _write_figure(figure, out, "full" if full else "quick")
+        return
     started = time.perf_counter()
     with stage_progress() as progress:
         evidence = gather(out, "full" if full else "quick", progress)
-    if figure is not None:
-        _write_figure(figure, evidence.inputs, out)
-        return
     path = write_report(out / "report.html", build_report(evidence))
     for verdict in evidence.verdicts:
         print(f"{verdict.topic}: {verdict.sentence}")
@@ -34,18 +35,41 @@ def reproduce(
     print(f"\n{path} ({size:.1f} MB, from {files} run and table files) in {time.perf_counter() - started:.0f} s.")
 
 
-def _write_figure(key: str, inputs: object, out: Path) -> None:
+def _write_figure(key: str, out: Path, depth: str) -> None:
+    """Write a figure's panels, and all of them with their legend in one file; compute only what it needs."""
     from iapb.errors import ArgumentError
     from reports.figures import RECIPES
     from reports.figures.figure import Figure, draw
+    from reports.figures.standalone import standalone
 
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         raise ArgumentError("--figure", key, "one of " + ", ".join(recipes))
-    drawn = draw(recipes[key], inputs)  # type: ignore[arg-type]
+    drawn = draw(recipes[key], _inputs(recipes[key].needs, out, depth))
     if not isinstance(drawn, Figure):
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
-    for number, panel in enumerate(drawn.panels):
-        path = out / f"{key}-{number}.svg"
-        path.write_text(panel.svg, encoding="utf-8")
-        print(f"{path}: {panel.label or drawn.title}")
+    out.mkdir(parents=True, exist_ok=True)
+    pictures = {f"{key}-{number}.svg": (panel.svg, panel.label) for number, panel in enumerate(drawn.panels)}
+    for name, (svg, label) in {**pictures, f"{key}.svg": (standalone(drawn), "all of it")}.items():
+        (out / name).write_text(svg, encoding="utf-8")
+        print(f"{out / name}: {label or drawn.title}")
+
+
+def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
+    """What a figure asks for: a few runs and scenes, or else all evidence."""
+    from reports.commands.progress import stage_progress
+    from reports.evidence.gather import gather
+    from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+    from reports.runner import Runner
+
+    if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
+        with stage_progress() as progress:
+            return gather(out, depth, progress).inputs
+    runner, found = Runner(out / "runs"), {}
+    for name in needs:
+        if name in FIGURE_RUNS:
+            scene, values, world, rendering = FIGURE_RUNS[name]
+            found[name] = runner(shipped_scene(scene, values), world, rendering)
+        else:
+            found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
+    return found

@@ -1,0 +1,91 @@
+"""Performs the blocks of one document in a process of its own: `python performing.py BLOCKS.json ANSWERS.json`.
+
+The working directory is where files are written; in documents that add to the project it holds a copy of it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shlex
+import sys
+import traceback
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+
+def perform(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Do every block; a failure is recorded, and the blocks after it are still tried."""
+    namespace: dict[str, Any] = {"__name__": "document"}
+    answers = []
+    for block in blocks:
+        out, failure = io.StringIO(), ""
+        try:
+            with redirect_stdout(out), redirect_stderr(out):
+                _perform(block, namespace)
+        except BaseException:  # whatever a documented line does is the finding
+            failure = traceback.format_exc()
+        answers.append({"output": out.getvalue(), "failure": failure})
+    return answers
+
+
+def _perform(block: dict[str, Any], namespace: dict[str, Any]) -> None:
+    if block["kind"] == "file":
+        path = Path(block["path"])
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(block["source"], encoding="utf-8")
+    elif block["kind"] == "diff":
+        apply_diff(Path(block["path"]), block["source"])
+    elif block["kind"] == "python":
+        exec(compile(block["source"], f"{block['document']}:{block['line']}", "exec"), namespace)
+    elif block["kind"] == "command":
+        _command(shlex.split(block["source"]))
+
+
+def _command(words: list[str]) -> None:
+    """The commands that documents use, in this process: a start of Python for each would take most of the time."""
+    if words[0] == "iapb":
+        from reports.cli import main
+
+        main(words[1:])
+    elif words[0] == "cat":
+        print(Path(words[1]).read_text(encoding="utf-8"), end="")
+    elif words[0] == "pytest":
+        import pytest
+
+        pytest.main(["-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", *words[1:]])
+    else:
+        raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
+
+
+def apply_diff(path: Path, text: str) -> None:
+    """Insert the lines with "+" beside the lines with " ", each of which must be in the file exactly once."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    waiting: list[str] = []
+    place: int | None = None
+    for line in text.splitlines():
+        sign, content = line[:1], line[1:]
+        if sign == "+" and place is None:
+            waiting.append(content)
+        elif sign == "+":
+            lines.insert(place, content)
+            place += 1
+        elif content.strip() == "…" or not line:
+            place = None
+        else:
+            if lines.count(content) != 1:
+                raise ValueError(f"{path} has the line {content!r} {lines.count(content)} times, not once")
+            place = lines.index(content)
+            lines[place:place] = waiting
+            place += len(waiting) + 1
+            waiting = []
+    if waiting:
+        raise ValueError(f"{path}: no line says where {waiting[0]!r} goes")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, ".")
+    asked = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    Path(sys.argv[2]).write_text(json.dumps(perform(asked)), encoding="utf-8")
