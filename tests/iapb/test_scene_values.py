@@ -23,7 +23,7 @@ def test_values_are_set_by_name_and_by_number_and_the_scene_itself_stays() -> No
     assert changed.contact.friction == 0.3
     assert changed.bodies[0].position == (*PEG.bodies[0].position[:2], 0.1)
     assert changed.walls[1].point == (0.0, 1.0)  # type: ignore[union-attr]
-    assert PEG.contact.friction == 0.1
+    assert PEG.contact.friction == 0.0
 
 
 def test_numpy_values_are_taken() -> None:

@@ -29,7 +29,7 @@ class Condition:
     approach_velocity from which on a contact collides [m/s]; force_limit of the device, multiple of the paper's
     """
 
-    tilt: float = 0.08
+    tilt: float = 0.015
     clearance: float = 0.010
     travel: float = 0.008
     friction: float = 0.0
@@ -64,8 +64,8 @@ class Condition:
 
 
 TILTS = {
-    "quick": (0.0, 0.01, 0.03, 0.1, 0.3),
-    "full": (0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
+    "quick": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.1, 0.3),
+    "full": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
