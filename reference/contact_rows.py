@@ -49,15 +49,30 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
 def contact_jacobian(
     mechanism: Any, q: Floats, origins: Floats, geometry: ContactBuffer, count: int
 ) -> Floats:
-    """Rows nᵀ(J_a − J_b) (c, d), zero where they are only rounding; `origins` (nb, 3) of the bodies.
+    """Rows nᵀ(J_a − J_b) (c, d), zero where they are only rounding; `origins` (nb, 3) of the bodies."""
+    return _rows_along(geometry.normal[:count], mechanism, q, origins, geometry)
+
+
+def tangent_rows(mechanism: Any, q: Floats, found: ContactRows) -> Floats:
+    """Rows tᵀ(J_a − J_b) (c, d) along t = z × n: the one tangent of a contact in the plane."""
+    normals = found.geometry.normal[: len(found.gap)]
+    tangents = np.cross([0.0, 0.0, 1.0], normals)
+    return _rows_along(tangents, mechanism, q, mechanism.placements(q)[1], found.geometry)
+
+
+def _rows_along(
+    directions: Floats, mechanism: Any, q: Floats, origins: Floats, geometry: ContactBuffer
+) -> Floats:
+    """Velocity of a against b at each contact along its direction n (c, 3).
 
     With the body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
     """
+    count = len(directions)
     rows, sizes = np.zeros((count, mechanism.nv)), np.zeros(count)
     for bodies, sign in ((geometry.body_a[:count], 1.0), (geometry.body_b[:count], -1.0)):
         for body in {int(b) for b in bodies} - {WORLD}:
             mine = np.flatnonzero(bodies == body)
-            frame, normals = mechanism.frame_jacobian(q, body), geometry.normal[mine]
+            frame, normals = mechanism.frame_jacobian(q, body), directions[mine]
             arms = geometry.point[mine] - origins[body]
             rows[mine] += sign * (normals @ frame[:3] + np.cross(arms, normals) @ frame[3:])
             reach = np.linalg.norm(arms, axis=1) + np.linalg.norm(geometry.point[mine], axis=1)
@@ -67,8 +82,13 @@ def contact_jacobian(
     return rows
 
 
-def write_contacts(state: Any, found: ContactRows, impulse: Floats, forced: Floats, dt: float) -> None:
-    """Record in `state` the contacts that touch or carry an impulse; `forced` marks p as a force, not a blow."""
+def write_contacts(
+    state: Any, found: ContactRows, impulse: Floats, friction: Floats, forced: Floats, dt: float
+) -> None:
+    """Record in `state` the contacts that touch or carry an impulse; `forced` marks p as a force, not a blow.
+
+    friction : (c,) tangential impulses along z × n, recorded as forces where `forced`
+    """
     kept = np.flatnonzero((found.gap <= 0.0) | (impulse > 0.0))
     was = _identities(state.contacts, range(int(state.count[0])))
     identity = _identities(found.geometry, kept)
@@ -76,7 +96,8 @@ def write_contacts(state: Any, found: ContactRows, impulse: Floats, forced: Floa
         getattr(state.contacts, name)[: len(kept)] = getattr(found.geometry, name)[kept]
     state.contacts.normal_velocity[: len(kept)] = found.gamma[kept]
     state.contacts.normal_force[: len(kept)] = np.where(forced, impulse, 0.0)[kept] / dt
-    state.contacts.friction_force[: len(kept)] = 0.0
+    along = np.cross([0.0, 0.0, 1.0], found.geometry.normal[kept])
+    state.contacts.friction_force[: len(kept)] = np.where(forced, friction, 0.0)[kept, None] * along / dt
     state.contacts.is_new[: len(kept)] = [name not in was for name in identity]
     state.contact_impulse[: len(kept)] = np.where(forced, 0.0, impulse)[kept]
     state.count[1], state.count[0] = state.count[0], len(kept)

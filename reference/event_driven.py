@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.errors import ArgumentError
 from reference.complementarity.laws import Outcome, newton_lcp
 from reference.complementarity.problem import ImpactProblem
-from reference.time_stepping import nearest_velocity
+from reference.rigid_step import nearest_velocity
 
 Floats = NDArray[np.float64]
 

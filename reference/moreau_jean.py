@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.errors import ArgumentError
-from reference.time_stepping import nearest_velocity
+from reference.rigid_step import nearest_velocity
 
 Floats = NDArray[np.float64]
 

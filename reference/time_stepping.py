@@ -1,16 +1,7 @@
 """Rigid contacts at velocity level, one QP per step: the law of the "ideal" world and of CBuc.
 
-One step of length dt from velocity v, with generalized force f and contact rows J:
-
-    v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the multipliers,
-
-    b_i = −gap_i/dt         open contact (gap > 0), e = 0: it may close, not pass (Stewart-Trinkle, Anitescu)
-    b_i = −inf              open contact, e > 0: nothing happens before it closes (Moreau)
-    b_i = −e gamma_minus_i  closed contact that approaches
-    b_i = 0                 closed contact that does not; `stabilization` adds a share of −gap_i/dt where gap < 0
-
-Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
-(1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
+The step itself is `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson), with dry friction
+`reference.rigid_friction`; here it becomes a contact law that runs on every scene.
 """
 
 from __future__ import annotations
@@ -22,49 +13,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.laws import StepResult
-from iapb.errors import ArgumentError, SolverError
+from iapb.errors import ArgumentError
 from iapb.run import COLLIDING, FREE, RESTING
-from reference.complementarity.solvers import daqp_qp, quadprog_qp
-from reference.contact_rows import ContactRows, find_rows, write_contacts, write_impact
+from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
+from reference.rigid_friction import FRICTION_LAWS, friction_step
+from reference.rigid_step import SCHEMES, nearest_velocity, rigid_step, velocity_bounds
+
+__all__ = ["RigidConstraints", "nearest_velocity", "rigid_step", "velocity_bounds"]
 
 Floats = NDArray[np.float64]
 
-# Active-set answers carry a few hundred roundings of the velocities involved; anything above is a wrong active set.
-STEP_TOLERANCE = 1e-10
 
-
-class RigidStep(NamedTuple):
-    """Outcome of one rigid step.
-
-    velocity : (d,) v⁺
-    impulse : (c,) p >= 0 [N s], zeros for contacts left out; not unique where contacts are redundant
-    residual : natural-map residual of the step's LCP, recomputed, relative to the velocities involved
-    """
+class _Solved(NamedTuple):
+    """Velocity (d,), normal and tangential impulses (c,), tangential rows (c, d)."""
 
     velocity: Floats
-    impulse: Floats
-    residual: float
+    normal: Floats
+    tangential: Floats
+    tangents: Floats
 
 
 @dataclass(frozen=True)
 class RigidConstraints:
-    """The law of the rigid worlds: frictionless contacts that no step ends by violating.
+    """The law of the rigid worlds: contacts that no step ends by violating.
 
     Parameters
     ----------
     margin : contacts with gap <= margin [m] are given to the step; infinity takes every candidate pair, a
         finite margin must exceed the largest speed times the step
     stabilization : share of an overlap removed in each step, 0 for none
+    scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
+    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient; planar scenes
+
+    Restitution is Newton's; Poisson's in "stewart-trinkle" with e > 0, and in steps where Newton's law has no solution.
     """
 
     margin: float = np.inf
     stabilization: float = 0.0
+    scheme: str = "automatic"
+    friction: str = "none"
     name = "rigid constraints"
+
+    def __post_init__(self) -> None:
+        for argument, value, known in (("scheme", self.scheme, SCHEMES), ("friction", self.friction, FRICTION_LAWS)):
+            if value not in known:
+                raise ArgumentError(argument, value, "one of " + ", ".join(known))
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Margin and stabilization; the restitution is the scene's."""
-        return {"margin": self.margin, "stabilization": self.stabilization}
+        """Everything that determines a step besides the scene, whose restitution and friction coefficient count."""
+        return {
+            "margin": self.margin,
+            "stabilization": self.stabilization,
+            "scheme": self.scheme,
+            "friction": self.friction,
+            "restitution where Newton's law has no solution": "Poisson",
+        }
 
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """One step (see `iapb.contact.laws.ContactLaw`).
@@ -76,16 +80,32 @@ class RigidConstraints:
         mass = mechanism.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
         force = applied_force - _inner_forces(system, q, v)
-        e = system.scene.contact.restitution
-        step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization)
-        blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.impulse > 0.0)
-        impulse = found.jacobian[blows].T @ step.impulse[blows]
-        pressing = found.jacobian[~blows].T @ step.impulse[~blows] / dt
-        write_contacts(state, found, step.impulse, ~blows, dt)
+        step = self._solve(system, mass, q, v, force, dt, found)
+        blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.normal > 0.0)
+        normal, tangential = found.jacobian.T * step.normal, step.tangents.T * step.tangential
+        impulse = (normal + tangential)[:, blows].sum(axis=1)
+        pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, tangential))
+        write_contacts(state, found, step.normal, step.tangential, ~blows, dt)
         write_impact(state, system, v, np.linalg.solve(mass, impulse), impulse, found.jacobian[blows])
         q_plus = mechanism.integrate(q, step.velocity, dt)
-        contact_state = _contact_state(found, step.impulse, blows)
-        return StepResult(q_plus, step.velocity, pressing, np.zeros_like(v), impulse, contact_state)
+        contact_state = _contact_state(found, step.normal, blows)
+        return StepResult(q_plus, step.velocity, pressing, dragging, impulse, contact_state)
+
+    def _solve(
+        self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float, found: ContactRows
+    ) -> _Solved:
+        e, mu = system.scene.contact.restitution, 0.0 if self.friction == "none" else system.scene.contact.friction
+        if mu == 0.0:
+            step = rigid_step(
+                mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization, self.scheme
+            )
+            still = np.zeros_like(found.jacobian)
+            return _Solved(step.velocity, step.impulse, np.zeros_like(found.gap), still)
+        bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
+        tangents = tangent_rows(system.mechanism, q, found)
+        v_free = v + dt * np.linalg.solve(mass, force)
+        relaxed = self.friction == "relaxed"
+        return _Solved(*friction_step(mass, v_free, found.jacobian, tangents, bound, mu, relaxed), tangents)
 
 
 def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:
@@ -102,87 +122,3 @@ def _contact_state(found: ContactRows, impulse: Floats, blows: NDArray[np.bool_]
     if blows.any():
         return COLLIDING
     return RESTING if ((found.gap <= 0.0) | (impulse > 0.0)).any() else FREE
-
-
-def rigid_step(
-    mass_matrix: Floats,
-    velocity: Floats,
-    force: Floats,
-    dt: float,
-    contact_jacobian: Floats,
-    gap: Floats,
-    gamma_minus: Floats,
-    restitution: float,
-    stabilization: float = 0.0,
-) -> RigidStep:
-    """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
-
-    Parameters
-    ----------
-    contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
-    restitution : Newton's e in [0, 1], one for all contacts
-    stabilization : share in [0, 1] of an overlap that is removed in this step (0: none, as Moreau's step)
-
-    Raises
-    ------
-    SolverError
-        where no velocity satisfies all contacts (two closed contacts that face each other, e > 0), or no
-        solver reaches a residual of STEP_TOLERANCE
-    """
-    bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization)
-    v_free = velocity + dt * np.linalg.solve(mass_matrix, force)
-    return nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
-
-
-def nearest_velocity(
-    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
-) -> RigidStep:
-    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf leaves a row out."""
-    impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
-    offset = contact_jacobian[kept] @ v_free - bound[kept]
-    if (offset >= 0.0).all():  # nothing is touched: the common step of free motion
-        return RigidStep(v_free, impulse, 0.0)
-    cholesky = np.linalg.cholesky(mass_matrix)
-    rows = np.linalg.solve(cholesky, contact_jacobian[kept].T).T
-    scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
-    impulse[kept], residual = _solve_step(rows, offset, scale)
-    return RigidStep(v_free + np.linalg.solve(cholesky.T, rows.T @ impulse[kept]), impulse, residual)
-
-
-def velocity_bounds(
-    gap: Floats, gamma_minus: Floats, restitution: float, dt: float, stabilization: float = 0.0
-) -> Floats:
-    """Return b (c,) of J v⁺ >= b [m/s]; −inf marks contacts that the step leaves out."""
-    if not 0.0 <= restitution <= 1.0:
-        raise ArgumentError("restitution", restitution, "a value in [0, 1]")
-    if not 0.0 <= stabilization <= 1.0:
-        raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
-    when_open = -gap / dt if restitution == 0.0 else np.full_like(gap, -np.inf)
-    when_closed = restitution * np.maximum(-gamma_minus, 0.0)
-    push_out = stabilization * np.maximum(-gap, 0.0) / dt
-    return np.where(gap > 0.0, when_open, np.maximum(when_closed, push_out))
-
-
-def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
-    """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE."""
-    said = []
-    for solver in (daqp_qp, quadprog_qp):
-        try:
-            impulse = solver.multipliers(rows, offset)
-        except SolverError as error:
-            said.append(str(error))
-            continue
-        residual = step_residual(rows, offset, impulse) / scale
-        if residual <= STEP_TOLERANCE:
-            return impulse, residual
-        said.append(f"{solver.__name__.rsplit('.', 1)[-1]}: residual {residual:.1e}")
-    raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
-
-
-def step_residual(rows: Floats, offset: Floats, impulse: Floats) -> float:
-    """Largest |min(W_ii p_i, w_i)| [m/s] of  0 <= p ⟂ w = A Aᵀ p + offset >= 0; infinite where p is not finite."""
-    if not np.isfinite(impulse).all():
-        return np.inf
-    w = rows @ (rows.T @ impulse) + offset
-    inertia = np.einsum("ij,ij->i", rows, rows)
-    return float(np.abs(np.minimum(inertia * impulse, w)).max(initial=0.0))

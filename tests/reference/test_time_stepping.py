@@ -20,8 +20,9 @@ from iapb.contact.geometry import (
 from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.run import COLLIDING, FREE, RESTING
-from reference import time_stepping
-from reference.time_stepping import RigidConstraints, rigid_step, velocity_bounds
+from reference import rigid_step as stepping
+from reference.rigid_step import NEWTON, POISSON, rigid_step, velocity_bounds
+from reference.time_stepping import RigidConstraints
 
 DT = 1.0 / 512
 
@@ -85,21 +86,35 @@ def test_every_step_satisfies_its_conditions(seed: int) -> None:
         np.abs(mass @ (result.velocity - v) - rows.T @ result.impulse).max()
         <= 1e-9 * scale * np.abs(mass).max()
     )
-    assert result.residual <= time_stepping.STEP_TOLERANCE
+    assert result.residual <= stepping.STEP_TOLERANCE
     if gap.max() <= 0.0:
         assert result.velocity @ mass @ result.velocity <= (1.0 + 1e-12) * (v @ mass @ v)
 
 
-def test_facing_contacts_with_restitution_have_no_velocity_and_say_so() -> None:
-    with pytest.raises(SolverError, match="no accepted solution"):
-        step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 0.0], 0.5)
+def test_facing_contacts_with_restitution_step_by_poisson_and_say_so() -> None:
+    """A mass between two closed walls: no velocity obeys Newton at both; Poisson's step stops it."""
+    result = step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 0.0], 0.5)
+    assert result.restitution_law == POISSON
+    assert result.velocity[0] == pytest.approx(0.0, abs=1e-15)
+    assert result.impulse == pytest.approx([1.5, 0.5])
+    assert step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 1.0], 0.5).restitution_law == NEWTON
+
+
+def test_stewart_trinkle_with_restitution_is_poisson_and_bounces_before_it_passes() -> None:
+    rows, v, gap = np.array([[1.0]]), np.array([-1.0]), np.array([1e-4])
+    found = rigid_step(np.eye(1), v, np.zeros(1), DT, rows, gap, rows @ v, 0.5, scheme="stewart-trinkle")
+    assert found.restitution_law == POISSON and gap[0] + DT * found.velocity[0] >= 0.0
+    closed = rigid_step(np.eye(1), v, np.zeros(1), DT, rows, 0.0 * gap, rows @ v, 0.5, scheme="stewart-trinkle")
+    assert closed.velocity[0] == pytest.approx(0.5)
+    left_alone = rigid_step(np.eye(1), v, np.zeros(1), DT, rows, gap, rows @ v, 0.0, scheme="moreau")
+    assert left_alone.velocity[0] == -1.0
 
 
 def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = lambda rows, offset: np.full(len(offset), 0.123)  # noqa: E731
-    monkeypatch.setattr(time_stepping.daqp_qp, "multipliers", wrong)
+    monkeypatch.setattr(stepping.daqp_qp, "multipliers", wrong)
     assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # quadprog
-    monkeypatch.setattr(time_stepping.quadprog_qp, "multipliers", wrong)
+    monkeypatch.setattr(stepping.quadprog_qp, "multipliers", wrong)
     with pytest.raises(SolverError, match="residual"):
         step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
 

@@ -15,7 +15,7 @@ from reference.complementarity import ImpactProblem
 from reference.complementarity.laws import Outcome, poisson
 from reference.event_driven import LinearSystem, event_driven
 from reference.moreau_jean import moreau_jean
-from reference.time_stepping import rigid_step
+from reference.rigid_step import rigid_step
 
 PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
 

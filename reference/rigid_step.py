@@ -1,0 +1,164 @@
+"""One step with rigid contacts at velocity level: a QP, or two where the law of restitution is Poisson's.
+
+One step of length dt from velocity v, with generalized force f and contact rows J:
+
+    v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the multipliers,
+
+    b_i = −gap_i/dt         open contact (gap > 0) that may close, not pass (Stewart-Trinkle, Anitescu)
+    b_i = −inf              open contact that is left alone (Moreau): nothing happens before it closes
+    b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in Poisson's step
+    b_i = 0                 closed contact that does not; `stabilization` adds a share of −gap_i/dt where gap < 0
+
+Poisson's step adds e p to the contacts that approached, and solves once more with the same b: it has a solution where
+Newton's law has none (closed contacts that face each other, e > 0).
+Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
+(1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError, SolverError
+from reference.complementarity.solvers import daqp_qp, quadprog_qp
+
+Floats = NDArray[np.float64]
+
+# Active-set answers carry a few hundred roundings of the velocities involved; anything above is a wrong active set.
+STEP_TOLERANCE = 1e-10
+
+SCHEMES = ("automatic", "moreau", "stewart-trinkle")
+NEWTON, POISSON = "Newton", "Poisson"
+
+
+class RigidStep(NamedTuple):
+    """Outcome of one rigid step.
+
+    velocity : (d,) v⁺
+    impulse : (c,) p >= 0 [N s], zeros for contacts left out; not unique where contacts are redundant
+    residual : natural-map residual of the step's LCP, recomputed, relative to the velocities involved
+    restitution_law : "Newton" or "Poisson", whichever the step obeys
+    """
+
+    velocity: Floats
+    impulse: Floats
+    residual: float
+    restitution_law: str = NEWTON
+
+
+def rigid_step(
+    mass_matrix: Floats,
+    velocity: Floats,
+    force: Floats,
+    dt: float,
+    contact_jacobian: Floats,
+    gap: Floats,
+    gamma_minus: Floats,
+    restitution: float,
+    stabilization: float = 0.0,
+    scheme: str = "automatic",
+) -> RigidStep:
+    """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
+
+    Parameters
+    ----------
+    contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
+    restitution : e in [0, 1], one for all contacts
+    stabilization : share in [0, 1] of an overlap that is removed in this step (0: none, as Moreau's step)
+    scheme : "moreau" leaves open contacts alone; "stewart-trinkle" keeps them from passing, by Poisson's law where
+        e > 0; "automatic" is Stewart-Trinkle's step where e = 0 and Moreau's where e > 0
+
+    Where Newton's law has no solution (closed contacts that face each other, e > 0) the step is Poisson's, and says so.
+
+    Raises
+    ------
+    SolverError
+        where no solver reaches a residual of STEP_TOLERANCE
+    """
+    bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
+    v_free = velocity + dt * np.linalg.solve(mass_matrix, force)
+    poisson = scheme == "stewart-trinkle" and restitution > 0.0
+    if not poisson:
+        try:
+            return nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
+        except SolverError:
+            if restitution == 0.0 or np.count_nonzero(gap <= 0.0) < 2:
+                raise
+    compression = velocity_bounds(gap, gamma_minus, 0.0, dt, 0.0 if not poisson else stabilization, scheme)
+    compression = np.where(np.isfinite(bound), compression, -np.inf)
+    returning = np.where(gamma_minus < 0.0, restitution, 0.0)
+    return poisson_step(mass_matrix, v_free, contact_jacobian, compression, returning)
+
+
+def poisson_step(
+    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats, restitution: Floats
+) -> RigidStep:
+    """Compress to J v >= b, return e_i of each impulse (c,), and keep J v >= b once more."""
+    compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
+    returned = restitution * compressed.impulse
+    bounced = compressed.velocity + np.linalg.solve(mass_matrix, contact_jacobian.T @ returned)
+    kept = nearest_velocity(mass_matrix, bounced, contact_jacobian, bound)
+    impulse = compressed.impulse + returned + kept.impulse
+    return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual), POISSON)
+
+
+def nearest_velocity(
+    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
+) -> RigidStep:
+    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf leaves a row out."""
+    impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
+    offset = contact_jacobian[kept] @ v_free - bound[kept]
+    if (offset >= 0.0).all():  # nothing is touched: the common step of free motion
+        return RigidStep(v_free, impulse, 0.0)
+    cholesky = np.linalg.cholesky(mass_matrix)
+    rows = np.linalg.solve(cholesky, contact_jacobian[kept].T).T
+    scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
+    impulse[kept], residual = _solve_step(rows, offset, scale)
+    return RigidStep(v_free + np.linalg.solve(cholesky.T, rows.T @ impulse[kept]), impulse, residual)
+
+
+def velocity_bounds(
+    gap: Floats, gamma_minus: Floats, restitution: float, dt: float, stabilization: float = 0.0,
+    scheme: str = "automatic",
+) -> Floats:
+    """Return b (c,) of J v⁺ >= b [m/s]; −inf marks contacts that the step leaves out."""
+    if not 0.0 <= restitution <= 1.0:
+        raise ArgumentError("restitution", restitution, "a value in [0, 1]")
+    if not 0.0 <= stabilization <= 1.0:
+        raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
+    if scheme not in SCHEMES:
+        raise ArgumentError("scheme", scheme, "one of " + ", ".join(SCHEMES))
+    may_close = scheme == "stewart-trinkle" or (scheme == "automatic" and restitution == 0.0)
+    when_open = -gap / dt if may_close else np.full_like(gap, -np.inf)
+    newton = 0.0 if scheme == "stewart-trinkle" else restitution
+    when_closed = newton * np.maximum(-gamma_minus, 0.0)
+    push_out = stabilization * np.maximum(-gap, 0.0) / dt
+    return np.where(gap > 0.0, when_open, np.maximum(when_closed, push_out))
+
+
+def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
+    """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE."""
+    said = []
+    for solver in (daqp_qp, quadprog_qp):
+        try:
+            impulse = solver.multipliers(rows, offset)
+        except SolverError as error:
+            said.append(str(error))
+            continue
+        residual = step_residual(rows, offset, impulse) / scale
+        if residual <= STEP_TOLERANCE:
+            return impulse, residual
+        said.append(f"{solver.__name__.rsplit('.', 1)[-1]}: residual {residual:.1e}")
+    raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
+
+
+def step_residual(rows: Floats, offset: Floats, impulse: Floats) -> float:
+    """Largest |min(W_ii p_i, w_i)| [m/s] of  0 <= p ⟂ w = A Aᵀ p + offset >= 0; infinite where p is not finite."""
+    if not np.isfinite(impulse).all():
+        return np.inf
+    w = rows @ (rows.T @ impulse) + offset
+    inertia = np.einsum("ij,ij->i", rows, rows)
+    return float(np.abs(np.minimum(inertia * impulse, w)).max(initial=0.0))
