@@ -55,14 +55,14 @@ def _curves(numbers: Numbers, column: str, methods: tuple[str, ...], label: str,
 
 def plain_powers(axes: Any) -> None:
     """Label logarithmic axes with powers of ten as plain text (mathematical text is no text in an SVG)."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     from reports.figures.numbers import power_of_ten
 
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(numticks=7))
         axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        axis.set_minor_locator(LogLocator(numticks=1))
+        axis.set_minor_locator(NullLocator())
 
 
 def _words(numbers: Numbers) -> str:

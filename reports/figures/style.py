@@ -62,7 +62,8 @@ STYLES: dict[str, LineStyle] = {
 CYCLE = (
     LineStyle(BLUE, "o"), LineStyle(VERMILION, "s", (5, 1.6)), LineStyle(GREEN, "^", (1.4, 1.4)),
     LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6)), LineStyle(AMBER, "v"), LineStyle(SKY, "P", (3, 1.2)),
-    LineStyle(INK, "X", (1, 1)), LineStyle(MUTED, "*", (4, 1, 1, 1)),
+    LineStyle(INK, "X", (1, 1)), LineStyle(MUTED, "*", (4, 1, 1, 1)), LineStyle(GREEN, "<", (8, 2)),
+    LineStyle(PURPLE, ">", (8, 2, 1, 2)),
 )
 
 _PARAMETERS: Any = {

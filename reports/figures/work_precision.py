@@ -16,22 +16,35 @@ from reports.figures.svg import to_svg
 
 KEY, TITLE = "work-precision", "What a microsecond buys"
 INPUT = "work_precision"
-METHOD, PROBLEM, TIME, ERROR, GAIN = "method", "problem", "time [µs]", "relative error", "relative energy gain"
+METHOD, PROBLEM, TIME = "method", "problem", "time [µs]"
+ERROR, RESIDUAL, GAIN = "relative error", "restitution residual", "relative energy gain"
 CAPTION = (
-    "Each mark is one method on one problem; lower left is better. A method that gains energy (second picture) is not "
-    "safe to hold, however fast or accurate it is. Marks at the very bottom mean none that double precision can show."
+    "Each mark is one method on one problem; lower left is better. Marks at the very bottom mean none that double "
+    "precision can show. "
 )
+NO_GAIN = "No method gained energy on these problems."
+SOME_GAIN = "A method that gains energy is not safe to hold, however fast or accurate it is."
 _SMALLEST = 1e-18
 _SIZE = (4.1, 3.2)
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
-    """Draw error and energy gain against time."""
+    """Draw error, residual and energy gain against time."""
     numbers: Numbers = inputs[INPUT]
     methods = tuple(dict.fromkeys(row[numbers.columns.index(METHOD)] for row in numbers.rows))
+    shown = tuple(column for column in (ERROR, RESIDUAL, GAIN) if _any_positive(numbers, column))
     panels = tuple(Panel(_marks(numbers, methods, column), f"{column} against time for {', '.join(methods)}.", column)
-                   for column in (ERROR, GAIN))
-    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, series_legend(methods, line=False), (INPUT,))
+                   for column in shown)
+    caption = CAPTION + (SOME_GAIN if GAIN in shown else NO_GAIN)
+    return Figure(KEY, "", TITLE, caption, panels, numbers, series_legend(methods, line=False), (INPUT,))
+
+
+def _any_positive(numbers: Numbers, column: str) -> bool:
+    """Tell whether a column is there and has something to draw."""
+    if column not in numbers.columns:
+        return False
+    at = numbers.columns.index(column)
+    return any(row[at] is not None and row[at] > 0.0 for row in numbers.rows)
 
 
 def _marks(numbers: Numbers, methods: tuple[str, ...], column: str) -> str:
@@ -46,7 +59,7 @@ def _marks(numbers: Numbers, methods: tuple[str, ...], column: str) -> str:
             axes.plot(*zip(*points, strict=True), **look) if points else None
         axes.set(xscale="log", yscale="log", xlabel=TIME, ylabel=column)
         plain_powers(axes)
-        return to_svg(drawing, f"{KEY}-{'error' if column == ERROR else 'gain'}")
+        return to_svg(drawing, f"{KEY}-{column.split()[-1]}")
 
 
 RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="accuracy")

@@ -13,7 +13,7 @@ from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.legend import swatch
-from reports.pages.records import OUTCOMES, Claim, Evidence, Verdict
+from reports.pages.records import OUTCOMES, Claim, Evidence, HardCase, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 
@@ -34,7 +34,8 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     page = _environment().get_template("page.html.j2")
     return page.render(
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
-        subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
+        hard_methods=methods_of(evidence.hard_cases), subjects=verdicts(evidence.claims),
+        counts=count_outcomes(evidence.claims),
     )
 
 
@@ -50,6 +51,21 @@ def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
     return {outcome: count for outcome, count in counts.items() if count}
 
 
+def methods_of(cases: Sequence[HardCase]) -> tuple[str, ...]:
+    """Return the methods that any case was tried with, in the order in which they first appear."""
+    return tuple(dict.fromkeys(result[0] for case in cases for result in case.results))
+
+
+def outcomes_by_method(results: Sequence[tuple[str, float | None, float | None, str]]) -> dict[str, str]:
+    """Return what came of one case with each method."""
+    return {method: outcome for method, _, _, outcome in results}
+
+
+def known(value: float | None) -> float | None:
+    """Return the value, or None for one that a method did not deliver (its outcome says why)."""
+    return None if value is None or value != value else value
+
+
 def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("reports.pages", "templates"), autoescape=True, undefined=StrictUndefined,
@@ -58,7 +74,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__,
+        as_finding=FINDINGS.__getitem__, known=known, outcomes_by_method=outcomes_by_method,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

@@ -161,6 +161,15 @@ def test_a_subject_without_claims_has_no_verdict() -> None:
     assert verdicts(()) == ()
 
 
+def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
+    cases = (HardCase("bar", "ours", "no gain", (("factored", 1e-16, 0.0, "stable"),
+                                                 ("gram", float("nan"), float("nan"), "refused: dependent rows"))),)
+    page = build_report(Evidence(hard_cases=cases))
+    assert '<span class="good">✓</span> stable' in page
+    assert '<span class="bad">✕</span> refused' in page
+    assert "not a number" not in page
+
+
 def test_prose_keeps_a_lone_dollar() -> None:
     assert str(prose("costs 5$ <i>")) == "costs 5$ &lt;i&gt;"
 
