@@ -56,6 +56,25 @@ def kernel(function: Callable[..., Any]) -> Any:
     return compiled
 
 
+class Entry:
+    """A kernel that Python calls again and again with arguments of one set of types.
+
+    Numba looks up the type of each argument at each call, some 5 µs for a block; an Entry does so at its first
+    call only. The caller sees to it that arrays keep their dtype, dimensions and layout.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._compiled: Callable[..., Any] | None = function if config.DISABLE_JIT else None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the kernel."""
+        if self._compiled is None:
+            types_of = tuple(typeof(argument) for argument in arguments)
+            self._compiled = self._function.compile(types_of)
+        return self._compiled(*arguments)
+
+
 @kernel
 def copy_into(target, source):
     """target[:] = source for vectors of one length; a slice assignment might make a hidden copy."""
@@ -104,7 +123,7 @@ class Block:
         return getattr(self._content, name)
 
 
-def block(content: Any) -> Block:
+def block(content: Any) -> Any:
     """Lay a NamedTuple out for kernels; see the file's docstring."""
     return content if isinstance(content, Block) else Block(content)
 

@@ -43,6 +43,32 @@ def finite_array(argument: str, value: ArrayLike, shape: tuple[int, ...], unit: 
     return array
 
 
+def float_vector(argument: str, value: ArrayLike, size: int) -> Floats:
+    """Return value as a contiguous float vector, itself if it is one; whether it is finite is not looked at.
+
+    Raises
+    ------
+    ArgumentError
+        Wrong shape, or not numbers.
+    """
+    try:
+        vector = np.asarray(value, np.float64, "C")
+    except (TypeError, ValueError):
+        return finite_array(argument, value, (size,))
+    return vector if vector.shape == (size,) else finite_array(argument, value, (size,))
+
+
+def float_rows(argument: str, value: ArrayLike, columns: int) -> Floats:
+    """Return value as a contiguous float array (rows, columns); like `float_vector`."""
+    try:
+        rows = np.asarray(value, np.float64, "C")
+    except (TypeError, ValueError):
+        raise ArgumentError(argument, value, f"numbers of shape (rows, {columns})") from None
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise ArgumentError(f"{argument} of shape", rows.shape, f"(rows, {columns})")
+    return rows
+
+
 def _check_rotation(argument: str, rotation: Floats) -> None:
     error = np.abs(rotation.T @ rotation - np.eye(3)).max()
     if error > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:

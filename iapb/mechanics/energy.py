@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import block
 from iapb.errors import ArgumentError
-from iapb.mechanics.bodies import finite_array
+from iapb.mechanics.bodies import finite_array, float_rows
 from iapb.mechanics.kernels.energy import displacements_along, energies_along
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
@@ -37,7 +37,7 @@ def energies(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats) -> 
     field = finite_array("gravity", gravity, (3,), "m/s^2")
     arrays = block(mechanism.arrays), block(mechanism.workspace())
     energies_along(
-        *arrays, _rows("q", q, mechanism.nq), _rows("v", v, mechanism.nv), field, kinetic, potential
+        *arrays, float_rows("q", q, mechanism.nq), float_rows("v", v, mechanism.nv), field, kinetic, potential
     )
     return kinetic, potential
 
@@ -45,7 +45,7 @@ def energies(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats) -> 
 def displacements(mechanism: Mechanism, q: Floats) -> Floats:
     """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations q."""
     out = np.zeros((max(len(q) - 1, 0), mechanism.nv))
-    displacements_along(block(mechanism.arrays), _rows("q", q, mechanism.nq), out)
+    displacements_along(block(mechanism.arrays), float_rows("q", q, mechanism.nq), out)
     return out
 
 
@@ -143,10 +143,3 @@ def energy_of_run(
         ledger["device_hand_work"] = port_energy(run.hand_force[:, slice(*run.tool_dofs)], moved)
         ledger["device_actuator_work"] = port_energy(run.device_force, moved)
     return ledger
-
-
-def _rows(name: str, values: Floats, columns: int) -> Floats:
-    rows = np.ascontiguousarray(values, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != columns:
-        raise ArgumentError(f"{name} of shape", rows.shape, f"(states, {columns})")
-    return rows

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Block, block
 from iapb.errors import ArgumentError
-from iapb.mechanics import kernels, structure
-from iapb.mechanics.bodies import Body, finite_array, parent_indices, tree_indices
+from iapb.mechanics import entries, structure
+from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.layout import collect_arrays, tree_ranges
@@ -24,9 +24,6 @@ from iapb.mechanics.layout import collect_arrays, tree_ranges
 __all__ = ["Body", "Joint", "Mechanism"]
 
 Floats = NDArray[np.float64]
-
-# Length of a quaternion or (cos, sin) pair given at the public border: single precision input passes.
-UNIT_TOLERANCE = 1e-6
 
 
 class Mechanism:
@@ -123,13 +120,13 @@ class Mechanism:
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt where that makes sense."""
         out = np.empty(self.nq)
-        kernels.integrate(self._block, self._configuration(q), self._velocity(v), float(dt), out)
+        entries.integrate(self._block, self._configuration(q), self._velocity(v), float(dt), out)
         return out
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest turns."""
         out = np.empty(self.nv)
-        kernels.difference(self._block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
+        entries.difference(self._block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
         return out
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
@@ -139,48 +136,81 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        return self._filled((self.nv, self.nv), kernels.mass_matrix, self._at(q))
+        place, out = float_vector("q", q, self.nq), np.empty((self.nv, self.nv))
+        if not entries.mass_matrix_at(self._block, self._workspace(), place, out):
+            self._refuse("q", place)
+        return out
+
+    def mass_matrices(self, qs: ArrayLike) -> Floats:
+        """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
+        places = float_rows("qs", qs, self.nq)
+        out = np.empty((len(places), self.nv, self.nv))
+        done = entries.mass_matrices_at(self._block, self._workspace(), places, out)
+        if done < len(places):
+            self._refuse(f"qs[{done}]", places[done])
+        return out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
-        return self._filled((self.nv,), kernels.bias, self._at(q), self._velocity(v))
+        place, rates = float_vector("q", q, self.nq), float_vector("v", v, self.nv)
+        out = np.empty(self.nv)
+        if not entries.bias_at(self._block, self._workspace(), place, rates, out):
+            self._refuse("q", place, "v", rates)
+        return out
+
+    def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
+        """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
+        places, rates = float_rows("qs", qs, self.nq), float_rows("vs", vs, self.nv)
+        if len(places) != len(rates):
+            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
+        out = np.empty((len(places), self.nv))
+        done = entries.biases_at(self._block, self._workspace(), places, rates, out)
+        if done < len(places):
+            self._refuse(f"qs[{done}]", places[done], f"vs[{done}]", rates[done])
+        return out
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
-        return self._filled((self.nv,), kernels.gravity, self._at(q), _field(g))
+        return self._filled((self.nv,), entries.gravity, self._at(q), _field(g))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
         rates, change = self._velocity(v), self._velocity(dv, "dv")
-        return self._filled((self.nv,), kernels.inverse_dynamics, self._at(q), rates, change, _field(g))
+        return self._filled((self.nv,), entries.inverse_dynamics, self._at(q), rates, change, _field(g))
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
         """Return J (3, d): velocity, world axes, of the world point [m] taken as fixed to the body."""
         place = finite_array("point", point, (3,), "m")
-        return self._filled((3, self.nv), kernels.point_jacobian, self._at(q), self.index(body), place)
+        return self._filled((3, self.nv), entries.point_jacobian, self._at(q), self.index(body), place)
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""
-        return self._filled((6, self.nv), kernels.frame_jacobian, self._at(q), self.index(body))
+        return self._filled((6, self.nv), entries.frame_jacobian, self._at(q), self.index(body))
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
         """Return the kinetic energy [J]."""
-        return float(kernels.kinetic_energy(self._block, self._at(q), self._velocity(v)))
+        return float(entries.kinetic_energy(self._block, self._at(q), self._velocity(v)))
 
     def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
         """Return -sum m g . c [J] of the bodies that can move, for the field g (3,) [m/s^2]."""
-        return float(kernels.potential_energy(self._block, self._at(q), _field(g)))
+        return float(entries.potential_energy(self._block, self._at(q), _field(g)))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the centre of mass of what moves."""
-        return self._filled((6,), kernels.centroidal_momentum, self._at(q), self._velocity(v))
+        return self._filled((6,), entries.centroidal_momentum, self._at(q), self._velocity(v))
+
+    def _workspace(self) -> Block:
+        """This thread's scratch."""
+        try:
+            workspace: Block = self._scratch.workspace
+        except AttributeError:
+            workspace = self._scratch.workspace = block(self.workspace())
+        return workspace
 
     def _at(self, q: ArrayLike) -> Block:
         """This thread's scratch, holding the kinematics of q until the next call."""
-        if not hasattr(self._scratch, "workspace"):
-            self._scratch.workspace = block(self.workspace())
-        workspace: Block = self._scratch.workspace
-        kernels.forward_kinematics(self._block, self._configuration(q), workspace)
+        workspace = self._workspace()
+        entries.forward_kinematics(self._block, self._configuration(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
@@ -189,17 +219,25 @@ class Mechanism:
         return out
 
     def _velocity(self, v: ArrayLike, argument: str = "v") -> Floats:
-        return finite_array(argument, v, (self.nv,))
+        values = float_vector(argument, v, self.nv)
+        return values if entries.all_finite(values) else finite_array(argument, v, (self.nv,))
 
     def _configuration(self, q: ArrayLike, argument: str = "q") -> Floats:
-        values = finite_array(argument, q, (self.nq,))
-        for body, start in zip(self.bodies, self.arrays.q_start, strict=True):
-            entries = body.joint.layout.coordinates
-            unit = [start + i for i, (_, u) in enumerate(entries) if u == "1"]
-            if unit and abs(np.linalg.norm(values[unit]) - 1.0) > UNIT_TOLERANCE:
-                where = f"{argument} of body {body.name!r}"
-                raise ArgumentError(where, values[unit], "entries of total length one")
+        values = float_vector(argument, q, self.nq)
+        if not entries.is_configuration(self._block, values):
+            self._refuse(argument, values)
         return values
+
+    def _refuse(self, argument: str, q: Floats, rates: str = "v", v: ArrayLike | None = None) -> None:
+        """Raise what is wrong with a configuration, or with a velocity."""
+        finite_array(argument, q, (self.nq,))
+        b = entries.misplaced_body(self._block, q)
+        if b >= 0:
+            first, layout = int(self.arrays.q_start[b]), self.bodies[b].joint.layout
+            unit = [first + i for i, (_, u) in enumerate(layout.coordinates) if u == "1"]
+            where = f"{argument} of body {self.names[b]!r}"
+            raise ArgumentError(where, q[unit], "entries of total length one")
+        finite_array(rates, np.zeros(self.nv) if v is None else v, (self.nv,))
 
 
 def _field(g: ArrayLike) -> Floats:

@@ -9,6 +9,15 @@ from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace, make_works
 from iapb.mechanics.kernels.configuration import difference, integrate
 from iapb.mechanics.kernels.dynamics import bias, gravity, inverse_dynamics, mass_matrix
 from iapb.mechanics.kernels.energy import centroidal_momentum, kinetic_energy, potential_energy
+from iapb.mechanics.kernels.evaluation import (
+    all_finite,
+    bias_at,
+    biases_at,
+    is_configuration,
+    mass_matrices_at,
+    mass_matrix_at,
+    misplaced_body,
+)
 from iapb.mechanics.kernels.jacobians import add_point_force, frame_jacobian, point_jacobian, point_velocity
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 
@@ -16,17 +25,24 @@ __all__ = [
     "MechanismArrays",
     "Workspace",
     "add_point_force",
+    "all_finite",
     "bias",
+    "bias_at",
+    "biases_at",
     "centroidal_momentum",
     "difference",
     "forward_kinematics",
     "frame_jacobian",
     "gravity",
     "integrate",
+    "is_configuration",
     "inverse_dynamics",
     "kinetic_energy",
     "make_workspace",
+    "mass_matrices_at",
     "mass_matrix",
+    "mass_matrix_at",
+    "misplaced_body",
     "point_jacobian",
     "point_velocity",
     "potential_energy",
