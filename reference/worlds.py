@@ -36,20 +36,26 @@ class World(NamedTuple):
         return coupling_of(scene, "none" if without else self.coupling)
 
 
-WORLD_NAMES = ("ideal", "IAPB", "PB", "CBuc")
+def _rigid() -> ContactLaw:
+    from reference.time_stepping import RigidConstraints
+
+    return RigidConstraints()
+
+
+# name -> (how IAPB meets the device's limits) -> world; to add one: a line here
+WORLDS: dict[str, Callable[[str], World]] = {
+    "ideal": lambda rendering: World("ideal", _rigid(), "four-channel"),
+    "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
+    "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
+    "CBuc": lambda rendering: World("CBuc", _rigid(), "unilateral"),
+}
 
 
 def find_world(name: str, rendering: str = "full") -> World:
     """The world of that name; `rendering` says how IAPB meets the device's limits (``full`` ignores them)."""
-    if name not in WORLD_NAMES:
-        raise ArgumentError("world", name, "one of " + ", ".join(WORLD_NAMES))
-    if name == "IAPB":
-        return World(name, ImpulseAugmented(rendering=rendering), "four-channel")
-    if name == "PB":
-        return World(name, Penalty(), "four-channel")
-    from reference.time_stepping import RigidConstraints
-
-    return World(name, RigidConstraints(), "four-channel" if name == "ideal" else "unilateral")
+    if name not in WORLDS:
+        raise ArgumentError("world", name, "one of " + ", ".join(WORLDS))
+    return WORLDS[name](rendering)
 
 
 def run_world(

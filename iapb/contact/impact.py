@@ -12,12 +12,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.impact_methods import METHODS, Whitened
+from iapb.contact.impact_methods import (
+    Method,
+    Whitened,
+    damped,
+    factored,
+    gram_cholesky,
+    gram_pinv,
+    poisson,
+    svd,
+)
 from iapb.contact.impact_problem import ImpactInput, check_input
 from iapb.contact.kernels.compensated import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
 
 Floats = NDArray[np.float64]
+
+# To add a method: write its function in a file of its own, and a line here.
+METHODS: dict[str, Method] = {
+    "factored": Method(factored, True),
+    "gram_pinv": Method(gram_pinv, False),
+    "gram_cholesky": Method(gram_cholesky, False),
+    "damped": Method(damped, True),
+    "svd": Method(svd, True),
+    "poisson": Method(poisson, True),
+}
 
 
 @dataclass(frozen=True)

@@ -188,13 +188,3 @@ def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float |
     length = work.length[:c]
     impulses = clamp * np.divide(scaled_impulses, length, out=np.zeros(c), where=length > 0.0)
     return Whitened(v_plus, momentum, impulses, int(np.sum(impulses > 0.0)), clamp)
-
-
-METHODS: dict[str, Method] = {
-    "factored": Method(factored, True),
-    "gram_pinv": Method(gram_pinv, False),
-    "gram_cholesky": Method(gram_cholesky, False),
-    "damped": Method(damped, True),
-    "svd": Method(svd, True),
-    "poisson": Method(poisson, True),
-}

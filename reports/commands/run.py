@@ -67,11 +67,15 @@ def describe(run: Run, existed: bool) -> None:
     impacts = run.impacts
     if len(impacts.step):
         lost = float(np.sum(impacts.energy_lost))
-        print(f"{len(impacts.step)} collisions, the first at {run.time[impacts.step[0]]:.4f} s, up to "
-              f"{int(impacts.rows.max())} contacts at once; they took {lost:.4g} J.")
+        print(f"{_counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
+              f"{_counted(int(impacts.rows.max()), 'contact')} at once; {lost:.4g} J were lost in them.")
     else:
         print("No collision was resolved by an impulse.")
     if len(run.contacts.gap):
         print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
     end = ", ".join(f"{name} {value:.6g}" for name, value in zip(run.coordinate_names, run.q[-1], strict=True))
     print(f"At the end: {end}.")
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -2,7 +2,7 @@
 
     ```python            executed, in order, in one namespace for the document; a ```text block right after it is
                          what it printed
-    ```console           lines that start with "$ " are commands (iapb, python, cat, pytest); the lines after one are its output
+    ```console           "$ " starts a command (iapb, cat, pytest); the lines after it are its output
     ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that file is written
     ```diff              first line "# some/file.py": lines with "+" are added to that file beside its " " lines
     ```sh                only read: every `make` target must exist

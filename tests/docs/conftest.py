@@ -17,7 +17,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # importmode=importlib does not
 
-from blocks import read_blocks  # noqa: E402
+from blocks import read_blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("iapb", "reference", "verification", "reports")
