@@ -90,8 +90,8 @@ def write_contacts(
     friction : (c,) tangential impulses along z × n, recorded as forces where `forced`
     """
     kept = np.flatnonzero((found.gap <= 0.0) | (impulse > 0.0))
-    was = _identities(state.contacts, range(int(state.count[0])))
-    identity = _identities(found.geometry, kept)
+    was = identities(state.contacts, range(int(state.contact_count[0])))
+    identity = identities(found.geometry, kept)
     for name in _GEOMETRY:
         getattr(state.contacts, name)[: len(kept)] = getattr(found.geometry, name)[kept]
     state.contacts.normal_velocity[: len(kept)] = found.gamma[kept]
@@ -100,21 +100,22 @@ def write_contacts(
     state.contacts.friction_force[: len(kept)] = np.where(forced, friction, 0.0)[kept, None] * along / dt
     state.contacts.is_new[: len(kept)] = [name not in was for name in identity]
     state.contact_impulse[: len(kept)] = np.where(forced, 0.0, impulse)[kept]
-    state.count[1], state.count[0] = state.count[0], len(kept)
+    state.contact_count[1], state.contact_count[0] = state.contact_count[0], len(kept)
 
 
 def write_impact(state: Any, system: Any, v: Floats, change: Floats, impulse: Floats, rows: Floats) -> None:
     """Log the blows of a step as one impact: velocity before, its change, generalized impulse and rows (c, d)."""
     log = state.impacts
-    log.count[0] = 0
+    log.logged[0] = 0
     if not len(rows):
         return
     log.group[0], log.rows[0], log.rank[0] = max(system.tool_tree, 0), len(rows), np.linalg.matrix_rank(rows)
     log.scale[0], log.clamp[0] = 1.0, 1.0
     log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
     log.energy_lost[0] = -float((v + 0.5 * change) @ impulse)
-    log.count[0] = 1
+    log.logged[0] = 1
 
 
-def _identities(contacts: ContactBuffer, rows: Any) -> list[tuple[int, int, int]]:
+def identities(contacts: ContactBuffer, rows: Any) -> list[tuple[int, int, int]]:
+    """Which contact each row is: its two shapes and their features."""
     return [(int(contacts.shape_a[i]), int(contacts.shape_b[i]), int(contacts.feature[i])) for i in rows]
