@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.compiled import block
+from iapb.contact.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
@@ -113,11 +114,13 @@ def make_world(system: System, law: Any) -> World:
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
         contacts=len(system.pairs) > 0,
+        broad_phase=len(system.pairs) > WORTHWHILE_PAIRS,
     )
     integrator = INTEGRATORS[law.integrator]
     ranges = np.array(mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
     return block(World(
         mechanism=mechanism.arrays, shapes=system.shapes, pairs=system.pairs,
+        broad_phase=make_broad_phase(system.shapes, system.pairs[: len(system.pairs) * switches.broad_phase]),
         tree_of_body=mechanism.tree_of_body,
         tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
         switches=switches, dt=system.dt, gravity=system.gravity,
@@ -139,7 +142,7 @@ def make_state(system: System) -> State:
     """Allocate everything a step writes and place the scene at its start."""
     mechanism, capacity = system.mechanism, system.capacity
     d, nq, trees = mechanism.nv, mechanism.nq, len(mechanism.tree_dofs)
-    rows = 2 * capacity  # per-body rows give two to a contact (13)-(14)
+    rows = capacity * (2 if system.scene.contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
     q = np.array([x for body in system.scene.bodies for x in body.position], dtype=np.float64)
     v = np.array([x for body in system.scene.bodies for x in body.velocity], dtype=np.float64)
     mass = mechanism.mass_matrix(q)

@@ -1,7 +1,8 @@
 """Shapes of a scene and the arrays that the narrow phase reads and writes.
 
-Three planar shapes: half-plane, circle and convex polygon (a box is a polygon). Every shape belongs to a
-body and is written in that body's frame; body -1 is the static world and its frame the world frame.
+Three planar shapes: half-plane, circle and convex polygon (a box is a polygon); three spatial ones, in
+`iapb.contact.spatial_geometry`: half-space, sphere and box. Every shape belongs to a body and is written in that
+body's frame; body -1 is the static world and its frame the world frame.
 """
 
 from __future__ import annotations
@@ -17,7 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.errors import ArgumentError
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
+HALF_SPACE, SPHERE, BOX = 3, 4, 5
+ENDLESS = (HALF_PLANE, HALF_SPACE)
 WORLD = -1  # the body index of the static world
+
+# Largest number of contacts of one pair: a face on a face keeps four, a box on a half-space has eight corners.
+BOX_PAIR_CONTACTS, BOX_CORNERS = 4, 8
+# While a face is clipped, all corners of the overlap stand in the buffer for a moment.
+CLIPPING_ROOM = 24
+# Scenes with many shapes cannot have all pairs touch at once: this many contacts per shape are six neighbours on
+# whole faces. Up to `SMALL_CAPACITY` contacts every pair keeps its place, whatever happens.
+CONTACTS_PER_SHAPE, SMALL_CAPACITY = 24, 4096
 
 # A polygon counts as convex when no corner turns inwards by more than this [rad]: vertices typed with six
 # digits describe straight edges to about 1e-6, and an inward turn that small moves no surface visibly.
@@ -30,12 +41,15 @@ Integers = NDArray[np.int32]
 class Shapes(NamedTuple):
     """All shapes of a scene, n of them with m vertices in total, as contiguous arrays for the kernels."""
 
-    kind: Integers  # (n,) HALF_PLANE, CIRCLE or POLYGON
+    kind: Integers  # (n,) HALF_PLANE, CIRCLE, POLYGON, HALF_SPACE, SPHERE or BOX
     body: Integers  # (n,) body that carries the shape, -1 = the static world
-    radius: Floats  # (n,) [m] of a circle, else 0
+    radius: Floats  # (n,) [m] of a circle or sphere, else 0
     first: Integers  # (n,) row of `vertices` where the shape begins
     count: Integers  # type: ignore[assignment]  # (n,) rows: half-plane 2, circle 1, polygon >= 3
     vertices: Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
+    center: Floats  # (n, 3) [m] of a sphere or box, point of a half-space; planar shapes: 0
+    axes: Floats  # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
+    half_size: Floats  # (n, 3) [m] of a box, along its axes
 
 
 class ContactBuffer(NamedTuple):
@@ -112,6 +126,7 @@ def make_shapes(descriptions: Sequence[Shape]) -> Shapes:
     count = np.array([len(block) for block in blocks], np.int32)
     first = (np.cumsum(count) - count).astype(np.int32)
     kinds = {HalfPlane: HALF_PLANE, Circle: CIRCLE, Polygon: POLYGON}
+    n = len(descriptions)
     return Shapes(
         kind=np.array([kinds[type(shape)] for shape in descriptions], np.int32),
         body=np.array([shape.body for shape in descriptions], np.int32),
@@ -119,11 +134,14 @@ def make_shapes(descriptions: Sequence[Shape]) -> Shapes:
         first=first,
         count=count,
         vertices=np.concatenate(blocks) if blocks else np.zeros((0, 2)),
+        center=np.zeros((n, 3)),
+        axes=np.tile(np.eye(3), (n, 1, 1)),
+        half_size=np.zeros((n, 3)),
     )
 
 
 def candidate_pairs(shapes: Shapes, may_touch: Callable[[int, int], bool] | None = None) -> Integers:
-    """Return the pairs (k, 2) of shape indices to test: bodies differ, shape a moves, a half-plane is b.
+    """Return the pairs (k, 2) of shape indices to test: bodies differ, shape a moves, a half-plane or half-space is b.
 
     `may_touch(body_a, body_b)` leaves out pairs of bodies (links joined to each other, for instance).
     Between two moving bodies a is the one with the smaller body index, so that the contacts of one pair of
@@ -156,14 +174,25 @@ def make_contact_buffer(capacity: int) -> ContactBuffer:
 
 
 def contact_capacity(shapes: Shapes, pairs: Integers) -> int:
-    """Return a capacity that `detect` cannot exceed for these pairs (at least 1)."""
-    total = 0
-    for a, b in pairs:
-        if shapes.kind[b] == HALF_PLANE:
-            total += int(shapes.count[a])  # one contact per vertex
-        else:
-            total += 2 if shapes.kind[a] == POLYGON and shapes.kind[b] == POLYGON else 1
-    return max(total, 1)
+    """Return a capacity that `detect` does not exceed for these pairs (at least 1).
+
+    Up to SMALL_CAPACITY that is certain; beyond, it holds while shapes do not lie in heaps inside each other.
+    """
+    total = sum(_most_contacts(shapes, int(a), int(b)) for a, b in pairs)
+    if total > SMALL_CAPACITY:
+        total = min(total, max(SMALL_CAPACITY, CONTACTS_PER_SHAPE * len(shapes.kind)))
+    clipped = CLIPPING_ROOM if np.any(shapes.kind == BOX) else 0
+    return max(total + clipped, 1)
+
+
+def _most_contacts(shapes: Shapes, a: int, b: int) -> int:
+    """Largest number of contacts of one pair."""
+    kinds = (int(shapes.kind[a]), int(shapes.kind[b]))
+    if kinds[1] == HALF_PLANE:
+        return int(shapes.count[a])  # one contact per vertex
+    if kinds[1] == HALF_SPACE:
+        return BOX_CORNERS if kinds[0] == BOX else 1
+    return {(POLYGON, POLYGON): 2, (BOX, BOX): BOX_PAIR_CONTACTS}.get(kinds, 1)
 
 
 def _ordered_pair(shapes: Shapes, i: int, j: int) -> tuple[int, int] | None:
@@ -172,8 +201,8 @@ def _ordered_pair(shapes: Shapes, i: int, j: int) -> tuple[int, int] | None:
         return None
     swap = body_i == WORLD or (body_j != WORLD and body_j < body_i)
     a, b = (j, i) if swap else (i, j)
-    if shapes.kind[a] == HALF_PLANE:
-        if shapes.body[b] == WORLD or shapes.kind[b] == HALF_PLANE:
+    if shapes.kind[a] in ENDLESS:
+        if shapes.body[b] == WORLD or shapes.kind[b] in ENDLESS:
             return None  # a moving half-plane against the world, or two half-planes: no contact is defined
         a, b = b, a
     return a, b

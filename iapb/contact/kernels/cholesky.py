@@ -94,3 +94,21 @@ def solve_mass(lower, force, acceleration):
         for i in range(k + 1, d):
             total -= lower[i, k] * acceleration[i]
         acceleration[k] = total / lower[k, k]
+
+
+@kernel
+def solve_tree_blocks(lower, start, stop, force, acceleration):
+    """The same for a block diagonal M, tree by tree: linear in their number, to the same last bit."""
+    for t in range(start.shape[0]):
+        i, j = start[t], stop[t]
+        solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])
+
+
+@kernel
+def cholesky_tree_blocks(matrix, start, stop, lower):
+    """`cholesky` of each block of a block diagonal M; entries outside the blocks of `lower` are left alone."""
+    for t in range(start.shape[0]):
+        i, j = start[t], stop[t]
+        if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:
+            return 1
+    return 0

@@ -1,4 +1,4 @@
-"""Narrow phase: contacts of candidate pairs of planar shapes, from the placements of their bodies.
+"""Narrow phase: contacts of candidate pairs of shapes, from the placements of their bodies; planar pairs are here.
 
 Every contact has a unit normal from b into a, a gap (negative = overlap) along it, and a point midway between
 the two surfaces, so that swapping the two shapes negates the normal and changes nothing else. A contact is
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
-from iapb.contact.geometry import CIRCLE, HALF_PLANE
+from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE
 from iapb.contact.kernels.polygon_pair import polygons
 from iapb.contact.kernels.shape_frames import (
     placement,
@@ -21,6 +21,7 @@ from iapb.contact.kernels.shape_frames import (
     vertex_feature,
     world_point,
 )
+from iapb.contact.kernels.spatial_pairs import spatial_pair
 
 
 @kernel
@@ -35,7 +36,9 @@ def detect(shapes, pairs, R, p, margin, buffer):
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
         kind_a, kind_b = shapes.kind[a], shapes.kind[b]
-        if kind_b == HALF_PLANE:
+        if kind_a >= HALF_SPACE:
+            count = spatial_pair(shapes, a, b, R, p, margin, buffer, count)
+        elif kind_b == HALF_PLANE:
             count = vertices_half_plane(shapes, a, b, R, p, margin, buffer, count)
         elif kind_a == CIRCLE and kind_b == CIRCLE:
             count = circles(shapes, a, b, R, p, margin, buffer, count)

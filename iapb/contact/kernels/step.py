@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.cholesky import cholesky, solve_mass
+from iapb.contact.kernels.broadphase import near_pairs
+from iapb.contact.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
 from iapb.contact.kernels.narrow_phase import detect
@@ -56,14 +57,14 @@ def locate(world, state):
     if not world.switches.varying_inertia:
         return True
     mass_matrix(world.mechanism, state.body, state.mass_matrix)
-    return cholesky(state.mass_matrix, state.lower) == 0
+    return cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
 
 
 @kernel
 def find_contacts(world, state):
     """Section III: touching contacts, filtered, new or old, each group in one of three states."""
     remember(state)
-    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.contacts)
+    count = touching(world, state, state.contacts)
     if count < 0:
         return count
     if world.switches.clustering:
@@ -79,6 +80,18 @@ def find_contacts(world, state):
             if state.state_of_tree[t] == COLLIDING:
                 state.state_of_tree[t] = RESTING
     return count
+
+
+@kernel
+def touching(world, state, contacts):
+    """Narrow phase at the present placements, on the near pairs only where there are many; -1: too many."""
+    R, p = state.body.rotation, state.body.position
+    if not world.switches.broad_phase:
+        return detect(world.shapes, world.pairs, R, p, 0.0, contacts)
+    near = near_pairs(world.broad_phase, R, p, 0.0)
+    if near < 0:
+        return -1
+    return detect(world.shapes, world.broad_phase.pairs[:near], R, p, 0.0, contacts)
 
 
 @kernel
@@ -145,7 +158,7 @@ def accelerate(world, state, applied, stage):
         bias(world.mechanism, state.body, state.v, state.bias)
         for k in range(a.shape[0]):
             a[k] -= state.bias[k]
-    solve_mass(state.lower, a, a)
+    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, a, a)
 
 
 @kernel
@@ -158,7 +171,7 @@ def rest(world, state, stage):
     contacts, count = state.contacts, state.count[0]
     if stage > 0:
         contacts = state.stage_contacts
-        count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, contacts)
+        count = touching(world, state, contacts)
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0

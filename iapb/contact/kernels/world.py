@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iapb.contact.broadphase import BroadPhase
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.mechanics.kernels import MechanismArrays, Workspace
@@ -22,6 +23,7 @@ class Switches(NamedTuple):
     impulse_limit: bool
     spreading: bool
     contacts: bool
+    broad_phase: bool
 
 
 class World(NamedTuple):
@@ -30,6 +32,7 @@ class World(NamedTuple):
     mechanism: MechanismArrays
     shapes: Shapes
     pairs: np.ndarray  # (k, 2) candidate pairs of shapes
+    broad_phase: BroadPhase  # finds the near ones among them; a stub where that does not pay
     tree_of_body: np.ndarray  # (n,) int64
     tree_start: np.ndarray  # (t,) first dof of each tree
     tree_stop: np.ndarray  # (t,)

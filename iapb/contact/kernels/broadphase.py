@@ -1,0 +1,157 @@
+"""Broad phase: the pairs of shapes whose bounding spheres meet, at a cost that is linear in the moving shapes.
+
+Moving shapes are sorted into the cells of a uniform grid as wide as the largest of them; two can touch only in
+the same cell or in neighbouring ones. Cells are found through a hash table with counted buckets (no list, no
+allocation). Every moving shape is held against every static one: linear in the moving shapes, too.
+
+The pairs come out in the order of the candidate pairs, so that a scene runs to the same last bit with and without.
+"""
+
+from __future__ import annotations
+
+import math
+
+from iapb.compiled import kernel
+
+LARGEST_CELL = 2**40  # of a coordinate far away; the hash wants integers, and int64 holds the cell and its neighbours
+
+
+@kernel
+def near_pairs(broad, R, p, margin):
+    """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 when they do not fit."""
+    place_bounds(broad, R, p)
+    fill_buckets(broad, margin)
+    count = moving_pairs(broad, margin)
+    count = static_pairs(broad, margin, count)
+    if count > 0:
+        sort_keys(broad.key, count)
+        shapes = broad.radius.shape[0]
+        for k in range(count):
+            i, j = broad.key[k] // shapes, broad.key[k] % shapes
+            first_is_a = broad.allowed[i, j] == 1
+            broad.pairs[k, 0] = i if first_is_a else j
+            broad.pairs[k, 1] = j if first_is_a else i
+    return count
+
+
+@kernel
+def place_bounds(broad, R, p):
+    """Centres of the bounding spheres of all moving shapes, in the world."""
+    for i in broad.moving:
+        body = broad.body[i]
+        for row in range(3):
+            total = p[body, row]
+            for k in range(3):
+                total += R[body, row, k] * broad.local_center[i, k]
+            broad.center[i, row] = total
+
+
+@kernel
+def bucket_of(x, y, z, buckets):
+    """Bucket of a cell, `buckets` a power of two: three large primes mix its coordinates (Teschner et al., 2003)."""
+    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (buckets - 1)
+
+
+@kernel
+def cell_number(value, width):
+    """Cell of a coordinate; those out of range of integers, infinite or not a number share the last."""
+    number = math.floor(value / width)
+    return int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
+
+
+@kernel
+def fill_buckets(broad, margin):
+    """Counting sort of the moving shapes by the bucket of their cell."""
+    buckets = broad.start.shape[0] - 1
+    width = broad.cell_size + margin
+    broad.start[:] = 0
+    for m in range(broad.moving.shape[0]):
+        i = broad.moving[m]
+        for axis in range(3):
+            broad.cell[m, axis] = cell_number(broad.center[i, axis], width)
+        broad.bucket[m] = bucket_of(broad.cell[m, 0], broad.cell[m, 1], broad.cell[m, 2], buckets)
+        broad.start[broad.bucket[m] + 1] += 1
+    for k in range(buckets):
+        broad.start[k + 1] += broad.start[k]
+    for m in range(broad.moving.shape[0]):
+        broad.sorted[broad.start[broad.bucket[m]]] = m
+        broad.start[broad.bucket[m]] += 1
+    for k in range(buckets, 0, -1):  # filling moved every start to the next one
+        broad.start[k] = broad.start[k - 1]
+    broad.start[0] = 0
+
+
+@kernel
+def moving_pairs(broad, margin):
+    """Pairs of moving shapes from the 9 (plane) or 27 cells around each; each pair is seen from both, kept once."""
+    buckets, count = broad.start.shape[0] - 1, 0
+    for m in range(broad.moving.shape[0]):
+        for neighbour in range(broad.neighbours):
+            x = broad.cell[m, 0] + neighbour % 3 - 1
+            y = broad.cell[m, 1] + neighbour // 3 % 3 - 1
+            z = broad.cell[m, 2] + (neighbour // 9 + 1) % 3 - 1  # the cell's own layer first
+            bucket = bucket_of(x, y, z, buckets)
+            for k in range(broad.start[bucket], broad.start[bucket + 1]):
+                n = broad.sorted[k]
+                if n <= m or broad.cell[n, 0] != x or broad.cell[n, 1] != y or broad.cell[n, 2] != z:
+                    continue
+                count = keep_pair(broad, broad.moving[m], broad.moving[n], margin, count)
+                if count < 0:
+                    return -1
+    return count
+
+
+@kernel
+def static_pairs(broad, margin, count):
+    """Pairs of a moving and a static shape."""
+    if count < 0:
+        return -1
+    for i in broad.moving:
+        for j in broad.static:
+            count = keep_pair(broad, i, j, margin, count)
+            if count < 0:
+                return -1
+    return count
+
+
+@kernel
+def keep_pair(broad, i, j, margin, count):
+    """Append the pair if it is a candidate and the bounding spheres meet; shapes without bound always do."""
+    if i > j:
+        i, j = j, i
+    if broad.allowed[i, j] == 0:
+        return count
+    reach, square = broad.radius[i] + broad.radius[j] + margin, 0.0
+    for axis in range(3):
+        apart = broad.center[i, axis] - broad.center[j, axis]
+        square += apart * apart
+    if square > reach * reach:
+        return count
+    if count >= broad.key.shape[0]:
+        return -1
+    broad.key[count] = i * broad.radius.shape[0] + j
+    return count + 1
+
+
+@kernel
+def sort_keys(keys, count):
+    """Heapsort of the first `count` keys: no recursion, no scratch, n log n whatever their order."""
+    for root in range(count // 2 - 1, -1, -1):
+        _sift(keys, root, count)
+    for end in range(count - 1, 0, -1):
+        keys[0], keys[end] = keys[end], keys[0]
+        _sift(keys, 0, end)
+
+
+@kernel
+def _sift(keys, root, end):
+    while True:
+        child = 2 * root + 1
+        if child >= end:
+            return
+        if child + 1 < end and keys[child + 1] > keys[child]:
+            child += 1
+        if keys[root] >= keys[child]:
+            return
+        keys[root], keys[child] = keys[child], keys[root]
+        root = child

@@ -1,0 +1,154 @@
+"""Contacts of spheres, boxes and half-spaces: laws, and agreement with coal at random poses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.compiled import block
+from iapb.contact import coal_geometry
+from iapb.contact.geometry import ContactBuffer, candidate_pairs, contact_capacity, make_contact_buffer
+from iapb.contact.kernels.box_pair import EDGE_SHARE
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.spatial_geometry import HalfSpace, Sphere, SpatialBox, SpatialShape, make_spatial_shapes
+
+Pose = tuple[np.ndarray, np.ndarray]
+KINDS = ("sphere", "box")
+
+
+def random_pose(rng: np.random.Generator, spread: float) -> Pose:
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return axes * np.sign(np.linalg.det(axes)), rng.uniform(-spread, spread, 3)
+
+
+def contacts_of(shapes: list[SpatialShape], poses: list[Pose], margin: float = 0.0) -> ContactBuffer:
+    """Contacts of shapes on bodies 0, 1, ... (or the world) at these poses, cut to the rows in use."""
+    arrays = make_spatial_shapes(shapes)
+    pairs = candidate_pairs(arrays)
+    buffer: Any = block(make_contact_buffer(contact_capacity(arrays, pairs)))
+    R, p = np.array([pose[0] for pose in poses]), np.array([pose[1] for pose in poses])
+    count = detect(block(arrays), pairs, np.ascontiguousarray(R), np.ascontiguousarray(p), margin, buffer)
+    assert count >= 0
+    return ContactBuffer(*(getattr(buffer, name)[:count].copy() for name in ContactBuffer._fields))
+
+
+def make(kind: str, rng: np.random.Generator, body: int) -> tuple[SpatialShape, Any]:
+    """A random shape about its body's origin, ours and coal's."""
+    if kind == "sphere":
+        radius = rng.uniform(0.05, 0.2)
+        return Sphere(radius, body=body), coal_geometry.coal_sphere(radius)
+    size = rng.uniform(0.1, 0.4, 3)
+    return SpatialBox(size, body=body), coal_geometry.coal_box(size)
+
+
+def random_pairs(kind_a: str, kind_b: str, trials: int) -> Any:
+    """Yield (contacts, coal's patch or None) of overlapping and of separate random pairs."""
+    rng = np.random.default_rng(KINDS.index(kind_a) * 2 + KINDS.index(kind_b))
+    for _ in range(trials):
+        (ours_a, coal_a), (ours_b, coal_b) = make(kind_a, rng, 0), make(kind_b, rng, 1)
+        poses = [random_pose(rng, 0.15), random_pose(rng, 0.15)]
+        yield contacts_of([ours_a, ours_b], poses), coal_geometry.patch(coal_a, poses[0], coal_b, poses[1])
+
+
+@pytest.mark.parametrize("kind_a", KINDS)
+@pytest.mark.parametrize("kind_b", KINDS)
+def test_contacts_agree_with_coal_at_random_poses(kind_a: str, kind_b: str) -> None:
+    pytest.importorskip("coal")
+    touching = same_axis = 0
+    for found, patch in random_pairs(kind_a, kind_b, 400):
+        if patch is None or patch.gap > -1e-6:
+            assert patch is not None or len(found.gap) == 0 or found.gap.min() > -1e-6
+            continue
+        touching += 1
+        assert len(found.gap) >= 1
+        np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, atol=1e-12)
+        depth, true_depth = -found.gap.min(), -patch.gap
+        # coal iterates to about 1e-6 of the size; of two boxes a face may be taken that is EDGE_SHARE deeper
+        allowed = EDGE_SHARE * true_depth if kind_a == kind_b == "box" else 0.0
+        assert true_depth - 2e-6 <= depth <= (true_depth + allowed) / (1.0 - EDGE_SHARE * (allowed > 0)) + 2e-6
+        if depth - true_depth < 1e-8:  # else an axis of nearly equal depth was taken
+            same_axis += 1
+            np.testing.assert_allclose(found.normal[0], patch.normal, atol=1e-4)
+    assert touching > 100
+    assert same_axis > 0.6 * touching
+
+
+def test_half_space_contacts_agree_with_coal() -> None:
+    pytest.importorskip("coal")
+    rng = np.random.default_rng(5)
+    for kind in KINDS:
+        for _ in range(100):
+            ours, other = make(kind, rng, 0)
+            normal, offset = rng.normal(size=3), rng.uniform(-0.1, 0.1)
+            unit = normal / np.linalg.norm(normal)
+            pose = random_pose(rng, 0.15)
+            found = contacts_of([ours, HalfSpace(offset * unit, normal)], [pose])
+            ground = coal_geometry.coal_half_space(normal, offset)
+            patch = coal_geometry.patch(other, pose, ground, (np.eye(3), np.zeros(3)))
+            assert (patch is None) == (len(found.gap) == 0)
+            if patch is not None:
+                assert found.gap.min() == pytest.approx(patch.gap, abs=1e-9)
+                np.testing.assert_allclose(found.normal[0], patch.normal, atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 4])
+def test_face_on_face_keeps_four_points_that_span_the_overlap(turn: float) -> None:
+    cos, sin = np.cos(turn), np.sin(turn)
+    upper = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    shapes = [SpatialBox([0.2, 0.2, 0.1], body=0), SpatialBox([0.2, 0.2, 0.1])]
+    found = contacts_of(shapes, [(upper, np.array([0.0, 0.0, 0.0999]))])
+    assert len(found.gap) == 4
+    np.testing.assert_allclose(found.gap, -1e-4, atol=1e-12)
+    np.testing.assert_allclose(found.normal, np.tile([0.0, 0.0, 1.0], (4, 1)), atol=1e-12)
+    np.testing.assert_allclose(found.point[:, 2], 0.04995, atol=1e-12)
+    middle = found.point[:, :2].mean(axis=0)
+    assert np.linalg.norm(middle) < 0.03  # the load through the middle lies inside the four
+
+
+def test_swapping_the_shapes_turns_the_normal_round_and_changes_nothing_else() -> None:
+    rng = np.random.default_rng(2)
+    compared = 0
+    for _ in range(200):
+        (first, _), (second, _) = make("box", rng, 0), make("sphere", rng, 1)
+        poses = [random_pose(rng, 0.12), random_pose(rng, 0.12)]
+        found = contacts_of([first, second], poses)
+        swapped = contacts_of(
+            [Sphere(second.radius, body=0), SpatialBox(first.size, body=1)], poses[::-1]  # type: ignore[union-attr]
+        )
+        assert len(found.gap) == len(swapped.gap)
+        if len(found.gap):
+            compared += 1
+            np.testing.assert_array_equal(found.normal, -swapped.normal)
+            np.testing.assert_array_equal(found.point, swapped.point)
+            np.testing.assert_array_equal(found.gap, swapped.gap)
+    assert compared > 30
+
+
+@pytest.mark.parametrize(
+    "shapes",
+    [
+        [Sphere(0.1, body=0), Sphere(0.1, body=1)],
+        [Sphere(0.1, body=0), SpatialBox([0.1, 0.1, 0.1], body=1)],
+        [SpatialBox([0.1, 0.1, 0.1], body=0), SpatialBox([0.1, 0.1, 0.1], body=1)],
+    ],
+)
+def test_coincident_shapes_have_finite_unit_normals(shapes: list[SpatialShape]) -> None:
+    found = contacts_of(shapes, [(np.eye(3), np.zeros(3))] * 2)
+    assert len(found.gap) >= 1
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, atol=1e-15)
+    assert np.isfinite(found.gap).all() and np.isfinite(found.point).all()
+
+
+def test_motion_along_the_normal_by_the_depth_parts_two_boxes() -> None:
+    """The gap is the distance to part along the normal: exact for the axis that was taken."""
+    rng = np.random.default_rng(11)
+    for _ in range(200):
+        shapes = [make("box", rng, 0)[0], make("box", rng, 1)[0]]
+        poses = [random_pose(rng, 0.12), random_pose(rng, 0.12)]
+        found = contacts_of(shapes, poses)
+        if len(found.gap):
+            step = -found.gap.min() * (1.0 + 1e-9) + 1e-12
+            moved = (poses[0][0], poses[0][1] + step * found.normal[0])
+            assert len(contacts_of(shapes, [moved, poses[1]]).gap) == 0
