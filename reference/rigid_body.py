@@ -6,6 +6,8 @@ file by Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` answers
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -107,6 +109,14 @@ class PinocchioMechanism:
         """v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""
         run = _pinocchio().impulseDynamics
         return np.array(run(self.model, self.data, q, v, contact_jacobian, restitution, 0.0))
+
+    def calls(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
+        """Pinocchio's own q -> M and (q, v) -> B + G, bound to the model and nothing more: for timing."""
+        pinocchio = _pinocchio()
+        return (
+            partial(pinocchio.crba, self.model, self.data),
+            partial(pinocchio.nonLinearEffects, self.model, self.data),
+        )
 
     def _frame(self, body: str) -> int:
         body_type = _pinocchio().FrameType.BODY

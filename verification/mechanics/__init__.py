@@ -1,0 +1,1 @@
+"""Studies of the mechanics: plain records, no files written."""

@@ -1,0 +1,112 @@
+"""Time of mass matrix and bias per call, against Pinocchio called from Python; and of many states in one call.
+
+Pinocchio is called in its cheapest form, a bound function whose result is thrown away. Calls of both are interleaved:
+a slow minute of the machine slows both, and the ratio of each round is what counts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.mechanics.mechanism import Mechanism
+from reference.random_mechanisms import random_state
+from reference.rigid_body import model_from_urdf
+from verification.claims.table import Column, Table, table_of
+from verification.mechanics.record import Finding, check_depth
+from verification.mechanics.robots import SEED, robot_files
+
+Floats = NDArray[np.float64]
+
+LARGEST_RATIO = 3.0  # of one call; a batch must be faster than Pinocchio: 1
+STATES = 200  # random states, one call each, in one round
+ROUNDS = {"quick": 25, "full": 200}
+COLUMNS = (
+    Column("robot", condition=True),
+    Column("velocities", condition=True),
+    Column("quantity", condition=True),
+    Column("form", condition=True),
+    Column("time", "µs per state"),
+    Column("Pinocchio", "µs per state"),
+    Column("ratio"),
+    Column("lower quartile"),
+    Column("upper quartile"),
+)
+ONE, MANY = "one state per call", f"{STATES} states in one call"
+
+
+def time_robots(folder: str | Path | None = None, depth: str = "quick") -> Finding:
+    """Time every URDF file of a folder (default `shared/robots` beside the checkout)."""
+    check_depth(depth)
+    files, skipped = robot_files(folder)
+    table = table_of(COLUMNS, [row for path in files for row in _rows(path, ROUNDS[depth])])
+    statement = "M and B cost little more per call from Python than Pinocchio's, and less for many states at once."
+    tolerance = f"median ratio at most {LARGEST_RATIO:g} per call, below 1 for many states; medians of interleaved rounds"
+    return Finding("Time of M and B", statement, tolerance, _judged(table), skipped)
+
+
+def _rows(path: Path, rounds: int) -> Iterator[dict[str, Any]]:
+    mechanism = Mechanism.from_urdf(path)
+    rng = np.random.default_rng(SEED)
+    states = [random_state(rng, mechanism) for _ in range(STATES)]
+    head = {"robot": path.stem, "velocities": mechanism.nv}
+    for quantity, form, ours, theirs in _contests(mechanism, path, states):
+        times = np.array(list(_interleaved(ours, theirs, rounds))) / STATES * 1e6
+        lower, ratio, upper = np.percentile(times[:, 0] / times[:, 1], (25, 50, 75))
+        ours_median, theirs_median = np.median(times, axis=0)
+        yield {**head, "quantity": quantity, "form": form, "time": float(ours_median),
+               "Pinocchio": float(theirs_median), "ratio": float(ratio), "lower quartile": float(lower),
+               "upper quartile": float(upper)}  # fmt: skip
+
+
+def _contests(
+    mechanism: Mechanism, path: Path, states: list[tuple[Floats, Floats]]
+) -> Iterator[tuple[str, str, Callable[[], object], Callable[[], object]]]:
+    """Quantity, form, and both sides' work on all states."""
+    qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
+    their_mass, their_bias = model_from_urdf(path).calls()
+
+    def masses() -> None:
+        for q, _ in states:
+            mechanism.mass_matrix(q)
+
+    def biases() -> None:
+        for q, v in states:
+            mechanism.bias(q, v)
+
+    def their_masses() -> None:
+        for q, _ in states:
+            their_mass(q)
+
+    def their_biases() -> None:
+        for q, v in states:
+            their_bias(q, v)
+
+    yield "mass matrix", ONE, masses, their_masses
+    yield "bias", ONE, biases, their_biases
+    yield "mass matrix", MANY, lambda: mechanism.mass_matrices(qs), their_masses
+    yield "bias", MANY, lambda: mechanism.biases(qs, vs), their_biases
+
+
+def _interleaved(
+    ours: Callable[[], object], theirs: Callable[[], object], rounds: int
+) -> Iterator[tuple[float, float]]:
+    """Yield the two times [s] of each round, after one to warm up."""
+    for k in range(rounds + 1):
+        marks = [time.perf_counter()]
+        for work in (ours, theirs):
+            work()
+            marks.append(time.perf_counter())
+        if k:
+            yield marks[1] - marks[0], marks[2] - marks[1]
+
+
+def _judged(table: Table) -> Table:
+    holds = (row["ratio"] < (1.0 if row["form"] == MANY else LARGEST_RATIO) for row in table.records())
+    return replace(table, holds=tuple(holds))

@@ -1,0 +1,110 @@
+"""Random trees and real robots against Pinocchio: how far apart, over many random states.
+
+A robot is read twice from its URDF file, by the engine's reader and by Pinocchio's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.mechanics.mechanism import Mechanism
+from reference.mechanism_comparison import compare
+from reference.random_mechanisms import random_mechanism, random_state
+from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
+from verification.claims.table import Column, Table, table_of
+from verification.mechanics.record import Finding, check_depth
+
+# Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.
+AGREEMENT = 1e-11
+STATES = 100
+TREE_SIZES = (1, 2, 4, 8, 16, 30)
+TREES = {"quick": 3, "full": 50}  # of each size
+SEED = 20050602
+ROBOTS = Path(__file__).parents[3] / "shared" / "robots"
+
+QUANTITIES = (
+    "mass_matrix", "point_jacobian", "frame_jacobian", "bias", "gravity", "inverse_dynamics", "kinetic_energy",
+    "potential_energy", "momentum", "placement",
+)  # fmt: skip
+COLUMNS = (
+    Column("mechanism", condition=True),
+    Column("base", condition=True),
+    Column("bodies", condition=True),
+    Column("velocities", condition=True),
+    Column("states", condition=True),
+    *(Column(name, "relative difference") for name in QUANTITIES),
+    Column("worst", "relative difference"),
+)
+_TOLERANCE = f"{AGREEMENT:g} of the reference's largest entry: two algorithms, each exact to about 1e-14 per link"
+
+
+def compare_trees(depth: str = "quick", seed: int = SEED) -> Finding:
+    """Compare random trees of every joint kind, nearly singular inertias among them, at 100 states each."""
+    check_depth(depth)
+    rows = []
+    for joints in TREE_SIZES:
+        rng = np.random.default_rng([seed, joints])
+        trees = [random_mechanism(rng, joints) for _ in range(TREES[depth])]
+        found = [_worst(tree, model_of(tree), rng) for tree in trees if tree.nv]
+        rows.append({"mechanism": f"{len(found)} trees of {joints}", "base": "random", "bodies": joints,
+                     "velocities": max((tree.nv for tree in trees), default=0),
+                     "states": STATES * len(found), **_largest(found)})  # fmt: skip
+    statement = "Mass matrix, Jacobians, forces, energies and momentum of random trees are those of Pinocchio."
+    return Finding("Random trees against Pinocchio", statement, _TOLERANCE, _judged(table_of(COLUMNS, rows)))
+
+
+def compare_robots(folder: str | Path | None = None, seed: int = SEED) -> Finding:
+    """Compare every URDF file of a folder, with a fixed and with a floating base, at 100 states each.
+
+    Parameters
+    ----------
+    folder : default `shared/robots` beside the checkout; where it is absent the finding says that it was skipped
+    """
+    files, skipped = robot_files(folder)
+    rows = list(_robot_rows(files, seed))
+    statement = "Robots read by the engine are those that Pinocchio reads, in every quantity."
+    table = _judged(table_of(COLUMNS, rows))
+    return Finding("Robots against Pinocchio", statement, _TOLERANCE, table, skipped)
+
+
+def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
+    """Return the URDF files of a folder, and why there are none where there are none."""
+    place = ROBOTS if folder is None else Path(folder)
+    files = sorted(place.glob("*.urdf"))
+    return files, "" if files else f"no URDF files in {place.name}/, which is not part of the project"
+
+
+def _robot_rows(files: list[Path], seed: int) -> Iterator[dict[str, Any]]:
+    for path in files:
+        for floating in (False, True):
+            mechanism, model = Mechanism.from_urdf(path, floating), model_from_urdf(path, floating)
+            rng = np.random.default_rng([seed, floating])
+            yield {"mechanism": path.stem, "base": "floating" if floating else "fixed",
+                   "bodies": len(mechanism.bodies), "velocities": mechanism.nv, "states": STATES,
+                   **_largest([_worst(mechanism, model, rng)])}  # fmt: skip
+
+
+def _worst(mechanism: Mechanism, model: PinocchioMechanism, rng: np.random.Generator) -> dict[str, float]:
+    """The largest difference of each quantity over random states."""
+    found = [compare(mechanism, model, *random_state(rng, mechanism)) for _ in range(STATES)]
+    if not mechanism.has_velocity_terms:  # B = 0: nothing to be relative to
+        for differences in found:
+            del differences["bias"]
+    return {name: max(differences[name] for differences in found) for name in found[0]}
+
+
+def _largest(found: list[dict[str, float]]) -> dict[str, float]:
+    largest: dict[str, float] = {}
+    for differences in found:
+        for name, value in differences.items():
+            largest[name] = max(value, largest.get(name, 0.0))
+    return {**largest, "worst": max(largest.values(), default=0.0)}
+
+
+def _judged(table: Table) -> Table:
+    return replace(table, holds=tuple(bool(worst <= AGREEMENT) for worst in table.column("worst")))
