@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.accuracy_time.measure import Quartiles, one_thread
+from verification.accuracy_time.measure import Quartiles
+from verification.threads import one_thread
 
 Floats = NDArray[Any]
 

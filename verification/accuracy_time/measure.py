@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -13,6 +12,7 @@ import numpy as np
 from iapb.errors import IapbError
 from verification.accuracy_time.methods import METHODS
 from verification.accuracy_time.problems import Floats, TimedProblem, timed_problems
+from verification.threads import one_thread
 
 ROUNDS = 30
 _ENOUGH = 0.5  # seconds spent on one method of one problem; slow methods get fewer rounds, never less than three
@@ -72,13 +72,6 @@ def work_precision(
         if progress is not None:
             progress(done, len(chosen))
     return tuple(records)
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """BLAS on one thread: on matrices this small more threads cost time, up to a thousandfold on a busy machine."""
-    from threadpoolctl import threadpool_limits
-
-    return threadpool_limits(limits=1)
 
 
 def _measure(problem: TimedProblem, names: tuple[str, ...], rounds: int) -> list[Measurement]:

@@ -13,6 +13,7 @@ import numpy as np
 from iapb.errors import IapbError
 from verification.hard_cases.case import Floats, HardCase
 from verification.hard_cases.catalogue import HARD_CASES
+from verification.threads import one_thread
 
 WITHOUT_CLAMP = "factored, no clamp"
 METHODS = ("factored", WITHOUT_CLAMP, "gram_pinv", "gram_cholesky", "damped", "svd")
@@ -65,12 +66,13 @@ def judge_hard_cases(
     """Return the verdict of each method on each case (all of the catalogue by default)."""
     chosen = [HARD_CASES[name]() for name in (HARD_CASES if cases is None else cases)]
     wanted = tuple(methods)
-    return tuple(
-        judge_hard_case(case, method)
-        for case in chosen
-        for method in wanted
-        if case.methods is None or method in case.methods
-    )
+    with one_thread():
+        return tuple(
+            judge_hard_case(case, method)
+            for case in chosen
+            for method in wanted
+            if case.methods is None or method in case.methods
+        )
 
 
 def judge_hard_case(case: HardCase, method: str) -> HardCaseVerdict:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.energy_gain import bulk_energy_gain
+from verification.threads import one_thread
 
 Floats = NDArray[Any]
 
@@ -144,31 +145,32 @@ def bulk_impacts(
     largest_condition : κ(M) is log-uniform up to it.
     progress : called with (done, impacts) after each batch.
     """
-    from iapb import resolve_impact
-
     columns: dict[str, list[Floats]] = {}
     seconds, done = 0.0, 0
-    for batch in _batches(np.random.default_rng(seed), impacts, largest_condition):
-        n, d = batch.velocities.shape
-        v_plus, rank = np.empty((n, d)), np.empty(n)
-        started = time.perf_counter()
-        for k in range(n):
-            impact = resolve_impact(
-                batch.masses[k],
-                batch.jacobians[k],
-                batch.velocities[k],
-                float(batch.restitutions[k]),
-                method=method,
-                clamp=clamp,
-            )
-            v_plus[k], rank[k] = impact.velocity, impact.rank
-        seconds += time.perf_counter() - started
-        for name, values in _measure(batch, v_plus, rank).items():
-            columns.setdefault(name, []).append(values)
-        done += n
-        if progress is not None:
-            progress(done, impacts)
+    with one_thread():
+        for batch in _batches(np.random.default_rng(seed), impacts, largest_condition):
+            started = time.perf_counter()
+            v_plus, rank = _resolve(batch, method, clamp)
+            seconds += time.perf_counter() - started
+            for name, values in _measure(batch, v_plus, rank).items():
+                columns.setdefault(name, []).append(values)
+            done += len(rank)
+            if progress is not None:
+                progress(done, impacts)
     return BulkImpacts(method, clamp, seed, seconds, **{name: np.concatenate(x) for name, x in columns.items()})
+
+
+def _resolve(batch: _Batch, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
+    """v⁺ (n, d) and rank (n,)."""
+    from iapb import resolve_impact
+
+    v_plus, rank = np.empty_like(batch.velocities), np.empty(len(batch.velocities))
+    for k, (mass, rows, v, e) in enumerate(
+        zip(batch.masses, batch.jacobians, batch.velocities, batch.restitutions, strict=True)
+    ):
+        impact = resolve_impact(mass, rows, v, float(e), method=method, clamp=clamp)
+        v_plus[k], rank[k] = impact.velocity, impact.rank
+    return v_plus, rank
 
 
 def _measure(batch: _Batch, v_plus: Floats, rank: Floats) -> dict[str, Floats]:

@@ -12,6 +12,7 @@ from verification.properties.case import ImpactCase, LawResidual, Resolver, Reso
 from verification.properties.families import draw_case
 from verification.properties.laws import LAWS
 from verification.properties.shrink import search_counterexample, shrink
+from verification.threads import one_thread
 
 NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
 LARGEST_CONDITION = 1e8  # κ(M) of the default families; beyond it plain Cholesky loses what the laws compare
@@ -25,6 +26,7 @@ class LawVerdict:
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
     worst : the residual with the largest value / tolerance (None if the law never applied).
+    largest : largest value of the residual, whatever its tolerance.
     fault : first complaint where the resolver raised or returned nothing usable.
     """
 
@@ -34,6 +36,7 @@ class LawVerdict:
     failures: int
     worst: LawResidual | None
     worst_case: ImpactCase | None
+    largest: float
     fault: str = ""
 
     @property
@@ -118,15 +121,16 @@ def check_passivity(
     """
     rng = np.random.default_rng(seed)
     cases = [draw_case(rng, largest_condition) for _ in range(impacts)]
-    verdicts = tuple(_judge(name, resolver, bounds, cases) for name in LAWS)
-    broken = next((verdict for verdict in verdicts if not verdict.passed), None)
-    example = None if broken is None else _counterexample(broken, resolver, bounds, search, seed)
+    with one_thread():
+        verdicts = tuple(_judge(name, resolver, bounds, cases) for name in LAWS)
+        broken = next((verdict for verdict in verdicts if not verdict.passed), None)
+        example = None if broken is None else _counterexample(broken, resolver, bounds, search, seed)
     name = getattr(resolver, "__qualname__", None) or repr(resolver)
     return PassivityReport(name, impacts, seed, verdicts, example, broken.law if broken else "")
 
 
 def _judge(name: str, resolver: Resolver, bounds: Bounds, cases: list[ImpactCase]) -> LawVerdict:
-    checked, failures, fault = 0, 0, ""
+    checked, failures, fault, largest = 0, 0, "", -np.inf
     worst: LawResidual | None = None
     worst_case: ImpactCase | None = None
     for case in cases:
@@ -136,9 +140,10 @@ def _judge(name: str, resolver: Resolver, bounds: Bounds, cases: list[ImpactCase
         checked += 1
         failures += not residual.passed
         fault = fault or complaint
+        largest = max(largest, residual.value)
         if worst is None or residual.ratio > worst.ratio:
             worst, worst_case = residual, case
-    return LawVerdict(name, LAWS[name].statement, checked, failures, worst, worst_case, fault)
+    return LawVerdict(name, LAWS[name].statement, checked, failures, worst, worst_case, largest, fault)
 
 
 def _residual(name: str, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:

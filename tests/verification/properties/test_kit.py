@@ -17,7 +17,7 @@ from verification.properties.laws.kinetic_energy import relative_gain
 
 @pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, partial(resolve_impact, method="svd")])
 def test_sound_resolvers_pass(resolver: object) -> None:
-    report = check_passivity(resolver, impacts=300)
+    report = check_passivity(resolver, impacts=200)
     assert report.passed, report
     assert report.counterexample is None and report.counterexample_test == ""
     assert all(verdict.checked > 0 for verdict in report.verdicts)
@@ -25,7 +25,7 @@ def test_sound_resolvers_pass(resolver: object) -> None:
 
 
 def test_our_resolver_keeps_its_own_bounds_on_wider_families() -> None:
-    report = check_passivity(resolve_impact, impacts=300, bounds=FACTORED, largest_condition=1e10)
+    report = check_passivity(resolve_impact, impacts=200, bounds=FACTORED, largest_condition=1e10)
     assert report.passed, report
 
 
@@ -40,8 +40,8 @@ def test_every_planted_bug_is_caught_by_its_law(name: str) -> None:
 def test_the_printed_formula_is_found_to_gain_energy() -> None:
     """Above 1e-6 and by itself, with a small counterexample that still shows it."""
     printed = partial(resolve_impact, method="gram_pinv")
-    report = check_passivity(printed, impacts=800, search=100)
-    assert report.verdict("kinetic_energy").worst.value > 1e-6
+    report = check_passivity(printed, impacts=500, search=60)
+    assert report.verdict("kinetic_energy").largest > 1e-6
     case = report.counterexample
     assert report.counterexample_law == "kinetic_energy"
     assert case.coordinates <= 3 and case.contacts <= 3
