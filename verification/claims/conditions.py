@@ -17,8 +17,9 @@ from verification.claims.table import Column
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
 
-# Worlds without friction and penalties do not see these; one run of theirs serves all values.
-PENALTY_ONLY = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")
+# What the worlds do not see: one run of theirs serves all values.
+_RIGID_IGNORES = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")
+IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_velocity", "force_limit"), "IAPB": ()}
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,12 @@ class Condition:
     approach_velocity: float = 1e-6
     force_limit: float = 1.0
 
-    def rigid(self) -> Condition:
-        """The same trial as a world of rigid, frictionless contacts sees it."""
-        default = Condition()
-        return replace(self, **{name: getattr(default, name) for name in PENALTY_ONLY})
+    def seen_by(self, world: str, rendering: str) -> Condition:
+        """The same trial as a world sees it: what it ignores takes its default."""
+        default, ignored = Condition(), IGNORED[world]
+        if rendering == "full":
+            ignored = (*ignored, "force_limit")
+        return replace(self, **{name: getattr(default, name) for name in ignored})
 
     def record(self) -> dict[str, float]:
         """The condition by column name."""
@@ -64,7 +67,7 @@ class Condition:
 
 
 TILTS = {
-    "quick": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.1, 0.3),
+    "quick": (0.0, 0.005, 0.015, 0.03, 0.1, 0.3),
     "full": (0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35),
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
@@ -73,7 +76,7 @@ FRICTIONS = (0.1, 0.3)
 # 1e-6 takes every contact that approaches at all, as the paper does. An old contact that creeps into its wall under
 # the hand approaches too, by up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value leaves such contacts out.
 APPROACH_VELOCITIES = (1e-3, 1e-2)
-FORCE_LIMITS = (1.0, 0.3)
+TIGHT = 0.3  # of the paper's limits: below the penalty forces of a hard landing
 STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
 DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 
@@ -89,9 +92,11 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
-    """The starting conditions with the paper's device limits, and with tighter ones (C12 to C14, C16)."""
-    starts = start_conditions(depth)
-    return tuple(replace(start, force_limit=limit) for limit in FORCE_LIMITS for start in starts)
+    """The starting conditions with the paper's device limits, some also with tighter ones (C12 to C14, C16)."""
+    default = Condition()
+    starts = [start for start in start_conditions(depth) if start.approach_velocity == default.approach_velocity]
+    plain = [start for start in starts if start == replace(default, tilt=start.tilt)]
+    return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
 
 def wall_conditions() -> tuple[Condition, ...]:

@@ -9,7 +9,7 @@ Nothing is written here; whoever wants the runs kept passes a `run` that keeps t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from iapb.errors import ArgumentError
@@ -28,7 +28,6 @@ from verification.claims.trace import Trace, trace_of
 Runner = Callable[[Scene, str, str], Run]
 
 DEPTHS = ("quick", "full")
-RIGID = ("ideal", "CBuc")
 SEED = 20050601  # of the random instances; the month the paper appeared
 
 
@@ -76,10 +75,8 @@ class Study:
         return limited_conditions(self.depth)
 
     def trace(self, condition: Condition, world: str, rendering: str = "full") -> Trace:
-        """The peg under a condition in a world; rigid worlds see neither friction nor penalties."""
-        seen = condition.rigid() if world in RIGID else condition
-        if world not in RIGID and rendering == "full":
-            seen = replace(seen, force_limit=Condition().force_limit)  # where nobody heeds it
+        """The peg under a condition in a world, run once for all conditions that this world cannot tell apart."""
+        seen = condition.seen_by(world, rendering)
         key = (seen, world, rendering)
         if key not in self._traces:
             run = self.run(self.place(seen), world, rendering)
@@ -136,4 +133,5 @@ def check_claims(
 
 def conditions(depth: str = "quick") -> tuple[dict[str, Any], ...]:
     """Every variation of the peg scene that the claims of this depth compute, for a report."""
-    return tuple(describe(condition) for condition in dict.fromkeys(limited_conditions(depth) + wall_conditions()))
+    every = start_conditions(depth) + limited_conditions(depth) + wall_conditions()
+    return tuple(describe(condition) for condition in dict.fromkeys(every))

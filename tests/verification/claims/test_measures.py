@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verification.claims.conditions import Condition, limited_conditions, start_conditions
+from verification.claims.conditions import TIGHT, Condition, limited_conditions, start_conditions
 from verification.claims.measures import (
     bounces,
     comparison_window,
@@ -112,4 +112,5 @@ def test_conditions_cover_what_the_paper_leaves_open():
     listed = conditions("quick")
     for name in ("tilt [rad]", "clearance [m]", "travel [m]", "friction", "force_limit [F_limit]"):
         assert len({condition[name] for condition in listed}) > 1
-    assert set(start_conditions("quick")) <= set(limited_conditions("quick"))
+    assert {one.force_limit for one in limited_conditions("quick")} == {1.0, TIGHT}
+    assert len({one.approach_velocity for one in start_conditions("quick")}) > 1
