@@ -70,9 +70,15 @@ class Entry:
     def __call__(self, *arguments: Any) -> Any:
         """Call the kernel."""
         if self._compiled is None:
-            types_of = tuple(typeof(argument) for argument in arguments)
-            self._compiled = self._function.compile(types_of)
+            self._compiled = self.taking(*arguments)
         return self._compiled(*arguments)
+
+    def taking(self, *examples: Any) -> Callable[..., Any]:
+        """Return the machine code's own Python function for arguments of these types."""
+        if config.DISABLE_JIT:
+            return self._function
+        code: Callable[..., Any] = self._function.compile(tuple(typeof(example) for example in examples))
+        return code
 
 
 @kernel

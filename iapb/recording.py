@@ -114,8 +114,8 @@ def _busiest(state):
 @kernel
 def _write_contacts(record, k, state):
     contacts = state.contacts
-    record.contact_count[k] = state.count[0]
-    for i in range(state.count[0]):
+    record.contact_count[k] = state.contact_count[0]
+    for i in range(state.contact_count[0]):
         m = record.used[0]
         record.body_a[m], record.body_b[m] = contacts.body_a[i], contacts.body_b[i]
         copy_into(record.point[m], contacts.point[i])
@@ -130,7 +130,7 @@ def _write_contacts(record, k, state):
 @kernel
 def _write_impacts(record, step, state):
     log = state.impacts
-    for i in range(log.count[0]):
+    for i in range(log.logged[0]):
         m = record.used[1]
         record.impact_step[m], record.impact_group[m] = step, log.group[i]
         record.impact_rows[m], record.impact_rank[m] = log.rows[i], log.rank[i]

@@ -50,7 +50,9 @@ class Checkpoint(Protocol):
 
 
 @kernel
-def compiled_steps(world, state, port, record, first, steps):
+def compiled_steps(  # type: ignore[no-untyped-def]
+    world, state, port, record, first, steps
+):
     """Do `steps` steps of an engine law; return (steps done, status)."""
     for k in range(steps):
         couple(world, state, port)
@@ -248,7 +250,7 @@ class _Recording:
             coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
             velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
             body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.steps + 1) * system.dt, **states, **forces,
+            time=np.arange(self.steps + 1, dtype=np.float64) * system.dt, **states, **forces,
             contacts=contact_table(self.records, self.sizes), impacts=impact_table(self.records, self.sizes),
             energy={}, effects=_effects(simulation),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),

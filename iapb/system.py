@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     """The coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
     if name == "none":
         return NoCoupling()
-    kinds = {"four-channel": (FourChannel, scene.couplings.four_channel),
+    kinds: dict[str, tuple[Callable[..., Coupling], Any]] = {"four-channel": (FourChannel, scene.couplings.four_channel),
              "unilateral": (UnilateralCoupler, scene.couplings.unilateral)}  # fmt: skip
     if name not in kinds:
         raise ArgumentError("coupling", name, "one of none, four-channel, unilateral")
@@ -158,7 +159,7 @@ def make_state(system: System) -> State:
     return block(State(
         q=q, v=v, mass_matrix=mass, lower=lower, body=mechanism.workspace(),
         contacts=make_contact_buffer(capacity), previous=make_contact_buffer(capacity),
-        stage_contacts=make_contact_buffer(capacity), count=np.zeros(2, np.int64),
+        stage_contacts=make_contact_buffer(capacity), contact_count=np.zeros(2, np.int64),
         group_of_tree=np.arange(trees, dtype=np.int64), state_of_tree=np.zeros(trees, np.int8),
         spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq), contact_impulse=np.zeros(rows),
         rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64), row_impulse=np.zeros(rows),

@@ -48,7 +48,8 @@ class Impact:
     velocity : (d,) generalized velocity v⁺ after the impact [m/s, rad/s].
     generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp [N s, N m s].
     impulses : (c,) p along the contact normals [N s], positive pushes. Where rows are redundant p is not unique:
-        this is the one of least norm (for Poisson's law: the non-negative one found).
+        this is the one of least norm (Poisson's law: the non-negative one found; ``damped``: of least norm in rows
+        scaled by powers of two to like size).
     rank : rows found independent and used; Poisson's law: contacts that push.
     energy_change : KE⁺ − KE⁻ [J], of the rounded velocities, evaluated in double-double.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
@@ -109,7 +110,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     Notes
     -----
     KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2 with its missing ½). In floating point the relative gain of
-    ``factored`` stays below 10 d ε √κ(M). Source: Constantinescu, Salcudean, Croft (2005), section V.
+    ``factored`` stays below 10 d ε √κ(M): Cholesky's error d ε κ(M) is refined away, then energy is clamped. Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)

@@ -36,7 +36,7 @@ class StepResult(NamedTuple):
 class ContactLaw(Protocol):
     """A contact law: the whole step.
 
-    A law may also fill ``state.contacts`` (with ``state.count[0]``), for the record. Stateless where possible:
+    A law may also fill ``state.contacts`` (with ``state.contact_count[0]``), for the record. Stateless where possible:
     what changes lives in `state`.
     """
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,21 @@ from iapb.errors import ArgumentError
 from iapb.mechanics import entries, structure
 from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
-from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.layout import collect_arrays, tree_ranges
+from iapb.mechanics.moving_parts import moving_parts
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
 Floats = NDArray[np.float64]
+
+
+class _Scratch(threading.local):
+    """Where kernels write; made anew in each thread that asks."""
+
+    def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
+        self.workspace: Block = block(Workspace(*(array.copy() for array in workspace)))
+        self.parts: Block = block(Evaluation(parts, self.workspace))
 
 
 class Mechanism:
@@ -62,9 +72,10 @@ class Mechanism:
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
         self.arrays: MechanismArrays = collect_arrays(self.bodies, parents)
         self._block: Block = block(self.arrays)
-        self._scratch = threading.local()  # kernels write: each thread needs its own
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
+        self._square = (self.nv, self.nv)
+        self._scratch = _Scratch(self.workspace(), moving_parts(self.arrays))
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
         self.tree_dofs: list[tuple[int, int]] = tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
@@ -136,8 +147,8 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place, out = float_vector("q", q, self.nq), np.empty((self.nv, self.nv))
-        if not entries.mass_matrix_at(self._block, self._workspace(), place, out):
+        place, out = float_vector("q", q, self.nq), np.empty(self._square)
+        if not self._mass_matrix_at(self._scratch.parts, place, out):
             self._refuse("q", place)
         return out
 
@@ -145,7 +156,7 @@ class Mechanism:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
         places = float_rows("qs", qs, self.nq)
         out = np.empty((len(places), self.nv, self.nv))
-        done = entries.mass_matrices_at(self._block, self._workspace(), places, out)
+        done = entries.mass_matrices_at(self._scratch.parts, places, out)
         if done < len(places):
             self._refuse(f"qs[{done}]", places[done])
         return out
@@ -154,7 +165,7 @@ class Mechanism:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_vector("q", q, self.nq), float_vector("v", v, self.nv)
         out = np.empty(self.nv)
-        if not entries.bias_at(self._block, self._workspace(), place, rates, out):
+        if not self._bias_at(self._scratch.parts, place, rates, out):
             self._refuse("q", place, "v", rates)
         return out
 
@@ -164,7 +175,7 @@ class Mechanism:
         if len(places) != len(rates):
             raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
         out = np.empty((len(places), self.nv))
-        done = entries.biases_at(self._block, self._workspace(), places, rates, out)
+        done = entries.biases_at(self._scratch.parts, places, rates, out)
         if done < len(places):
             self._refuse(f"qs[{done}]", places[done], f"vs[{done}]", rates[done])
         return out
@@ -199,17 +210,18 @@ class Mechanism:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the centre of mass of what moves."""
         return self._filled((6,), entries.centroidal_momentum, self._at(q), self._velocity(v))
 
-    def _workspace(self) -> Block:
-        """This thread's scratch."""
-        try:
-            workspace: Block = self._scratch.workspace
-        except AttributeError:
-            workspace = self._scratch.workspace = block(self.workspace())
-        return workspace
+    @cached_property
+    def _mass_matrix_at(self) -> Callable[..., bool]:
+        return entries.mass_matrix_at.taking(self._scratch.parts, np.empty(self.nq), np.empty(self._square))
+
+    @cached_property
+    def _bias_at(self) -> Callable[..., bool]:
+        v = np.empty(self.nv)
+        return entries.bias_at.taking(self._scratch.parts, np.empty(self.nq), v, v)
 
     def _at(self, q: ArrayLike) -> Block:
         """This thread's scratch, holding the kinematics of q until the next call."""
-        workspace = self._workspace()
+        workspace: Block = self._scratch.workspace
         entries.forward_kinematics(self._block, self._configuration(q), workspace)
         return workspace
 

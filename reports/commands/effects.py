@@ -14,9 +14,6 @@ def effects(
     rendering: Annotated[str, typer.Option(help="full, saturate, scale or spread.")] = "full",
 ) -> None:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
-    from rich.console import Console
-    from rich.table import Table
-
     from iapb import decide_effects, find_scene, load_scene
 
     source = load_scene(find_scene(scene))
@@ -27,10 +24,12 @@ def effects(
 
         chosen = find_world(world, rendering)
         found = decide_effects(source, chosen.law.name, chosen.coupling_in(source).name, rendering)
-    table = Table(title=f"Effects of {source.name}" + (f" in {world}" if world else ""), show_lines=True)
-    for heading in ("effect", "", "why", "left out, it would change"):
-        table.add_column(heading, overflow="fold")
-    for effect in sorted(found, key=lambda effect: not effect.active):
-        table.add_row(effect.name, "on" if effect.active else "off", effect.reason, effect.left_out)
-    Console().print(table)
-    print(f"{sum(effect.active for effect in found)} of {len(found)} effects are on; the others cost nothing.")
+    on = [effect for effect in found if effect.active]
+    print(f"Effects of {source.name}" + (f" in {world}" if world else "") + ": what is on, and what it prevents")
+    for effect in on:
+        print(f"  {effect.name:<18}{effect.reason}\n{'':<20}without it: {effect.left_out}")
+    print("Off, because")
+    for effect in found:
+        if not effect.active:
+            print(f"  {effect.name:<18}{effect.reason}")
+    print(f"{len(on)} of {len(found)} effects are on; the others cost nothing.")

@@ -65,7 +65,8 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
     if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
         with stage_progress() as progress:
             return gather(out, depth, progress).inputs
-    runner, found = Runner(out / "runs"), {}
+    runner = Runner(out / "runs")
+    found: dict[str, Any] = {}
     for name in needs:
         if name in FIGURE_RUNS:
             scene, values, world, rendering = FIGURE_RUNS[name]

@@ -20,7 +20,7 @@ def compute(progress: Progress) -> tuple[Property, ...]:
     from verification.properties import LAWS, PLANTED_BUGS, check_passivity
 
     report = check_passivity(resolve_impact, impacts=1500, search=0)
-    first = {}
+    first: dict[str, tuple[str, Any]] = {}
     for name, bug in PLANTED_BUGS.items():
         first.setdefault(bug.caught_by, (name, bug))
     records = []

@@ -44,7 +44,7 @@ def gather_rows(world, state, group, size):
     """Rows of J_c: (11) against the static world; (12), or the two of (13)-(14), at a self-collision."""
     contacts = state.contacts
     count = 0
-    for i in range(state.count[0]):
+    for i in range(state.contact_count[0]):
         if not contacts.collides[i] or state.group_of_tree[world.tree_of_body[contacts.body_a[i]]] != group:
             continue
         if world.per_body_rows and contacts.body_b[i] >= 0:
@@ -80,7 +80,7 @@ def apply_group(world, state, size, share):
 def log_impact(state, group, rows, rank, share, clamp, lost, size):
     """Append one line to the step's impacts."""
     log = state.impacts
-    n = log.count[0]
+    n = log.logged[0]
     log.group[n], log.rows[n], log.rank[n] = group, rows, rank
     log.scale[n], log.clamp[n], log.energy_lost[n] = share, clamp, lost
     for k in range(state.v.shape[0]):
@@ -91,7 +91,7 @@ def log_impact(state, group, rows, rank, share, clamp, lost, size):
         k = state.dofs[i]
         log.v_minus[n, k] = state.group_v[i]
         log.impulse[n, k] = state.impulse[k]
-    log.count[0] = n + 1
+    log.logged[0] = n + 1
 
 
 @kernel

@@ -47,7 +47,7 @@ def clear(state):
     state.penalty_force[:] = 0.0
     state.friction_force[:] = 0.0
     state.impulse[:] = 0.0
-    state.impacts.count[0] = 0
+    state.impacts.logged[0] = 0
 
 
 @kernel
@@ -69,10 +69,10 @@ def find_contacts(world, state):
         return count
     if world.switches.clustering:
         count = cluster(state.contacts, count, world.cluster_distance)
-    state.count[0] = count
+    state.contact_count[0] = count
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
-    mark_new(state.contacts, count, state.previous, state.count[1], world.coherence_distance)
+    mark_new(state.contacts, count, state.previous, state.contact_count[1], world.coherence_distance)
     classify(state.contacts, count, world.tree_of_body, world.tree_start, world.tree_stop, world.approach_velocity,
              state.spreading, state.group_of_tree, state.state_of_tree)
     if not world.switches.impulses:
@@ -98,14 +98,14 @@ def touching(world, state, contacts):
 def remember(state):
     """The contacts of this step become those of the step before: what `mark_new` compares with."""
     now, before = state.contacts, state.previous
-    for i in range(state.count[0]):
+    for i in range(state.contact_count[0]):
         before.shape_a[i], before.shape_b[i] = now.shape_a[i], now.shape_b[i]
         before.body_a[i], before.body_b[i] = now.body_a[i], now.body_b[i]
         before.feature[i], before.gap[i] = now.feature[i], now.gap[i]
         for axis in range(3):
             before.point[i, axis] = now.point[i, axis]
             before.normal[i, axis] = now.normal[i, axis]
-    state.count[1] = state.count[0]
+    state.contact_count[1] = state.contact_count[0]
 
 
 @kernel
@@ -168,7 +168,7 @@ def rest(world, state, stage):
     state.stage_friction[:] = 0.0
     if not world.switches.contacts:
         return
-    contacts, count = state.contacts, state.count[0]
+    contacts, count = state.contacts, state.contact_count[0]
     if stage > 0:
         contacts = state.stage_contacts
         count = touching(world, state, contacts)

@@ -66,7 +66,7 @@ class State(NamedTuple):
     contacts: ContactBuffer  # of this step
     previous: ContactBuffer  # of the step before
     stage_contacts: ContactBuffer  # at an inner stage of the integrator
-    count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
+    contact_count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
     group_of_tree: np.ndarray  # (t,) int64: first tree of its contact group
     state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
     spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
@@ -100,7 +100,7 @@ class State(NamedTuple):
 class ImpactLog(NamedTuple):
     """The impacts of one step, one row per colliding group."""
 
-    count: np.ndarray  # (1,) int64
+    logged: np.ndarray  # (1,) int64: lines in use
     group: np.ndarray  # (t,) int64
     rows: np.ndarray  # (t,) int64
     rank: np.ndarray  # (t,) int64

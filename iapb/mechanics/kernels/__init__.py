@@ -5,7 +5,7 @@ along it or turns it about the line through the body's origin; hence one formula
 Order of calls: `forward_kinematics` fills the workspace, everything else reads it.
 """
 
-from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.kernels.configuration import difference, integrate
 from iapb.mechanics.kernels.dynamics import bias, gravity, inverse_dynamics, mass_matrix
 from iapb.mechanics.kernels.energy import centroidal_momentum, kinetic_energy, potential_energy
@@ -22,6 +22,7 @@ from iapb.mechanics.kernels.jacobians import add_point_force, frame_jacobian, po
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 
 __all__ = [
+    "Evaluation",
     "MechanismArrays",
     "Workspace",
     "add_point_force",

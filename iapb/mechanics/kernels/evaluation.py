@@ -55,38 +55,38 @@ def is_configuration(m, q):
 
 
 @kernel
-def mass_matrix_at(m, w, q, out):
+def mass_matrix_at(at, q, out):
     """out (d, d) <- M(q); False if q is no configuration."""
-    if not is_configuration(m, q):
+    if not is_configuration(at.mechanism, q):
         return False
-    forward_kinematics(m, q, w)
-    mass_matrix(m, w, out)
+    forward_kinematics(at.mechanism, q, at.workspace)
+    mass_matrix(at.mechanism, at.workspace, out)
     return True
 
 
 @kernel
-def bias_at(m, w, q, v, out):
+def bias_at(at, q, v, out):
     """out (d,) <- B(q, v); False if q is no configuration or v not finite."""
-    if not (is_configuration(m, q) and all_finite(v)):
+    if not (is_configuration(at.mechanism, q) and all_finite(v)):
         return False
-    forward_kinematics(m, q, w)
-    bias(m, w, v, out)
+    forward_kinematics(at.mechanism, q, at.workspace)
+    bias(at.mechanism, at.workspace, v, out)
     return True
 
 
 @kernel
-def mass_matrices_at(m, w, q, out):
+def mass_matrices_at(at, q, out):
     """out (n, d, d) <- M at each row of q (n, nq); return the rows done: fewer than n if one is refused."""
     for k in range(q.shape[0]):
-        if not mass_matrix_at(m, w, q[k], out[k]):
+        if not mass_matrix_at(at, q[k], out[k]):
             return k
     return q.shape[0]
 
 
 @kernel
-def biases_at(m, w, q, v, out):
+def biases_at(at, q, v, out):
     """out (n, d) <- B at each row of q (n, nq) and v (n, d); return the rows done."""
     for k in range(q.shape[0]):
-        if not bias_at(m, w, q[k], v[k], out[k]):
+        if not bias_at(at, q[k], v[k], out[k]):
             return k
     return q.shape[0]
