@@ -49,7 +49,7 @@ class Port(NamedTuple):
     device_damping: np.ndarray  # (d_t,) physical damping b of the device
     damped: bool
     force_limit: np.ndarray  # (d_t,) [N, N m], inf = none
-    limited: bool  # the actuators clip the environment force to force_limit
+    limited: bool  # the actuators clip what they are asked for to force_limit
     resolution: np.ndarray  # (nq_t,) [m, rad] of the position sensors
     quantised: bool
     delayed_force: np.ndarray  # (n + 1, d_t) ring of actuator forces on their way; n = 0: no delay
@@ -189,15 +189,16 @@ def drive_device(world, state, port):
 
 @kernel
 def command(port):
-    """Actuator force: F_env within the device's limits (four channels only) minus the PD, after the delay."""
+    """Actuator force: F_env (four channels only) minus the PD, within the device's limits, after the delay."""
     slots = port.delayed_force.shape[0]
     now = port.clock[0] % slots
     for i in range(port.device_force.shape[0]):
         k = port.v_start + i
         force = port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0
+        force -= port.coupling_force[k]
         if port.limited:
             force = min(max(force, -port.force_limit[i]), port.force_limit[i])
-        port.delayed_force[now, i] = force - port.coupling_force[k]
+        port.delayed_force[now, i] = force
         port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
 
 

@@ -11,10 +11,10 @@ from iapb.scene import Scene
 from reports.runner import Runner
 
 # The experiments of the paper's section VII, emulated: its device at 512 Hz read and driven one step late each way,
-# encoders of 10 µm and 0.1 mrad, a little bearing friction. Ours: the paper gives none of these numbers.
+# encoders of 1 µm and 0.01 mrad, a little bearing friction. Ours: the paper gives none of these numbers.
 EMULATED_DEVICE: dict[str, Any] = {
     "device.delay": 1,
-    "device.position_resolution": [1e-5, 1e-5, 1e-4],
+    "device.position_resolution": [1e-6, 1e-6, 1e-5],
     "device.damping": [0.5, 0.5, 1e-3],
 }
 

@@ -15,7 +15,7 @@ from reports.figures.worlds import DEVICE, legend_of, runs_of
 KEY, NUMBER, TITLE = "fig13", "Figure 13", "Emulated device at 512 Hz: forces"
 CAPTION = (
     "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays within "
-    "the limits of the device; the position channel adds its own force to them. The fine chatter is the resolution "
+    "the limits of the device. The fine chatter is the resolution "
     "of the encoders, felt through the damping of the position channel."
 )
 

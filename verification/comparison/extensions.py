@@ -193,7 +193,7 @@ def _unequal_cell(signs: str, count: int, seed: int) -> UnequalCell:
 
 
 def struck_bar() -> dict[str, float]:
-    """The bar of design section 4, struck at 0.5 and 0.4 with e = (1, 0): kinetic energies [J] by law."""
+    """The bar of docs/theory.md, struck at 0.5 and 0.4 with e = (1, 0): kinetic energies [J] by law."""
     from iapb import resolve_impact
     from reference.complementarity.laws import LAWS
     from reference.complementarity.problem import ImpactProblem

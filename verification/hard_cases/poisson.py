@@ -20,7 +20,7 @@ def exact_poisson(
 ) -> tuple[tuple[Fraction, ...], int]:
     """Return v⁺ exactly and the number of contacts that push.
 
-    Compression `0 ≤ p_c ⟂ γ_c ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (design.md section 4).
+    Compression `0 ≤ p_c ⟂ γ_c ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (docs/theory.md).
     """
     M, J = _fractions(mass_matrix), _fractions(contact_jacobian)
     v, e = _fractions(velocity), _fractions(restitution)

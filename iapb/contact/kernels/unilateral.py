@@ -136,7 +136,7 @@ def poisson_impulses(rows, count, u, restitution, p, change):
     """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. False: no convergence.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
-    p = p_c + p_e (design.md section 4; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
+    p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
     """
     d = u.shape[0]
     compressed, final = np.zeros(d), np.zeros(d)

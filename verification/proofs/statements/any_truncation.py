@@ -44,7 +44,7 @@ def statement() -> Statement:
     return Statement(
         name="any_truncation",
         title="Every truncation is passive",
-        source="design section 4 (anytime)",
+        source="docs/theory.md (anytime)",
         statement=(
             r"Let $Q = (Q_1 \; Q_2)$ have orthonormal columns. Stopping after $Q_1$ gives $u_1 = u - (1+e) "
             r"Q_1 Q_1^\top u$ with $|u|^2 - |u_1|^2 = (1-e^2) |Q_1^\top u|^2 \geq 0$, whatever the rows "

@@ -71,7 +71,7 @@ def statement() -> Statement:
     return Statement(
         name="damped_impact",
         title="The damped impact is passive",
-        source="design section 4 (damping); a spectral filter with its own certificate",
+        source="docs/theory.md (damping); a spectral filter with its own certificate",
         statement=(
             r"With $X = (W + \lambda I)^{-1}$, $\lambda \geq 0$, and $v^+ = v - (1+e) M^{-1} J^\top X J v$ "
             r"twice the loss is $(1-e^2) \, y^\top W y + 2 (1+e) \lambda \, y^\top y \geq 0$ with $y = X J "

@@ -38,7 +38,7 @@ def statement() -> Statement:
     return Statement(
         name="energy_clamp",
         title="The energy clamp",
-        source="design section 4 (energy clamp)",
+        source="docs/theory.md (energy clamp)",
         statement=(
             r"Let $\Delta$ be any candidate change of velocity, and $0 \leq \alpha \leq -2 \, v^\top M "
             r"\Delta / \Delta^\top M \Delta$. Then $v^+ = v + \alpha \Delta$ loses $\frac12 \alpha \, (-2 "

@@ -32,7 +32,7 @@ def statement() -> Statement:
     return Statement(
         name="erratum_adhesion",
         title="Erratum: impulses at all approaching contacts can pull",
-        source="paper V, assumption (i); paper.md erratum 4",
+        source="paper V, assumption (i); erratum 4",
         statement=(
             r"If $W^{-1}$ has no negative entry (contacts that do not push each other apart), then $-J v "
             r"\geq 0$ gives $p = -(1+e) W^{-1} J v \geq 0$. In general some $p_i$ is negative: an adhesive "

@@ -17,7 +17,7 @@ def statement() -> Statement:
     return Statement(
         name="erratum_half",
         title="Erratum: the half that (18), (24) and (32) lose",
-        source="paper (32), last line; (18), (24); paper.md erratum 1",
+        source="paper (32), last line; (18), (24); erratum 1",
         statement=(
             r"With $k = KE_0$ and $x = \dot q_0^\top J^\top \bar J^\top D \bar J J \dot q_0$ the last but "
             r"one line of (32) is $k - (1+e) \frac12 (2 x - (1+e) x)$, which equals $k - \frac12 (1-e^2) x$ "

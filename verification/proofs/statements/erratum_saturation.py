@@ -31,7 +31,7 @@ def statement() -> Statement:
     return Statement(
         name="erratum_saturation",
         title="Erratum: saturating component by component can add energy",
-        source="paper VI, first strategy; paper.md erratum 5",
+        source="paper VI, first strategy; erratum 5",
         statement=(
             r"For a diagonal inertia, clipping component $i$ of the impulse is harmless when that component "
             r"loses energy by itself. An impact only promises that the sum loses: with one component "

@@ -26,7 +26,7 @@ def statement() -> Statement:
     return Statement(
         name="erratum_self_collision",
         title="Erratum: per-body rows depend on the observer",
-        source="paper (13)-(14), assumption (ii); paper.md erratum 3",
+        source="paper (13)-(14), assumption (ii); erratum 3",
         statement=(
             r"With relative rows (12) a common velocity $t$ of all bodies has $J t = 0$, and adding it "
             r"before the impact adds it after. With the per-body rows (13)-(14) it does not."

@@ -42,7 +42,7 @@ def statement() -> Statement:
     return Statement(
         name="erratum_spreading",
         title="Erratum: spreading does not deliver the prescribed restitution",
-        source="paper VI, third strategy; paper.md erratum 5",
+        source="paper VI, third strategy; erratum 5",
         statement=(
             r"Scale the first impulse by $s$, then apply Newton's law again in full: the velocity ends at "
             r"$-e v_0 + e (1+e) s v_0$. The prescribed $-e v_0$ is reached only for $e = 0$ (or $s = 0$, $e "

@@ -46,7 +46,7 @@ def statement() -> Statement:
     return Statement(
         name="exact_instances",
         title="Both sides as rational numbers",
-        source="issue on proofs, item 8",
+        source="random rational instances",
         statement=(
             rf"{CASES} random rational impacts ($d \leq {LARGEST}$, redundant rows included, "
             r"$G$ the exact Moore-Penrose inverse): hypotheses and conclusions of Theorem 2 hold as "

@@ -33,7 +33,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_cholesky",
         title="Floating point: Cholesky's error costs the condition number",
-        source="design section 4; Higham (2002), Theorem 10.3",
+        source="docs/theory.md; Higham (2002), Theorem 10.3",
         statement=(
             r"Let $L L^\top = M + \Delta$ with $-\eta M \leq \Delta \leq \eta M$. If the energy in the "
             r"metric $L L^\top$ grows by at most $1+g$, the true energy grows by at most "

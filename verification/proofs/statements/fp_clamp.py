@@ -29,7 +29,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_clamp",
         title="Floating point: what the clamp leaves",
-        source="design section 4 (energy clamp); issue on proofs, item 7",
+        source="docs/theory.md (energy clamp)",
         statement=(
             r"Let $x = v^\top M \Delta$, $y = \Delta^\top M \Delta$, and let $X < 0$, $Y$ be their computed "
             r"values and $\alpha \leq -2X/Y$ up to one rounding. Then twice the energy gained, $2 \alpha x "

@@ -38,7 +38,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_gram_pinv",
         title="Floating point: the printed formula has no such bound",
-        source="paper (20)-(21); paper.md erratum 6",
+        source="paper (20)-(21); erratum 6",
         statement=(
             r"Let $M = I$, $J = \begin{pmatrix} 1 & 0 \\ 1 - 2^{-k} & 2^{-28} \end{pmatrix}$, $v = (0, 1)$, "
             r"$e = 1$. The last entry of $J J^\top$ rounds so that the computed matrix has the determinant "

@@ -43,7 +43,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_projector",
         title="Floating point: the projector keeps the energy whatever the conditioning",
-        source="design section 4; issue on proofs, item 7",
+        source="docs/theory.md",
         statement=(
             r"Let $Q^\top Q \leq (1+\delta) I$. Then $u^+ = u - (1+e) Q Q^\top u$ has "
             r"$|u^+|^2 \leq (1 + (1+e)^2 \delta (1+\delta)) |u|^2 \leq (1 + 4 \delta (1+\delta)) |u|^2$ for "

@@ -26,7 +26,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_promise",
         title="Floating point: the promised bound 10 d ε √κ",
-        source="design section 4; issue on the impact core, must show",
+        source="docs/theory.md",
         statement=(
             r"The bound of fp_clamp and fp_rounding, $(65/64)(12 + 6 \sqrt{\kappa}) u$, with what is left "
             r"of second order, is below $20 d u \sqrt{\kappa} = 10 d \epsilon \sqrt{\kappa}$ for every $d "

@@ -37,7 +37,7 @@ def statement() -> Statement:
     return Statement(
         name="fp_rounding",
         title="Floating point: rounding the answer costs √κ",
-        source="design section 4; issue on proofs, item 7",
+        source="docs/theory.md",
         statement=(
             r"Scale the units so that $I \leq M \leq \kappa I$, and let $v$ be rounded to $v + r$ with $|r| "
             r"\leq u |v|$. With $\eta = u \sqrt{\kappa}$ the kinetic energy grows at most by the factor "

@@ -28,7 +28,7 @@ def statement() -> Statement:
     return Statement(
         name="momentum",
         title="Relative rows conserve momentum",
-        source="paper (12) against (13)-(14); paper.md erratum 3; Newton's third law",
+        source="paper (12) against (13)-(14); erratum 3; Newton's third law",
         statement=(
             r"Let $t$ be a motion of all bodies together (a translation or rotation), so that $J t = 0$ for "
             r"relative rows. Then $t^\top M v^+ = t^\top M v$ for every impulse $p$."

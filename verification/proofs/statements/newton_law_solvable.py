@@ -43,7 +43,7 @@ def statement() -> Statement:
     return Statement(
         name="newton_law_solvable",
         title="When Newton's law can be met",
-        source="paper (15), (20); design section 4 (unequal restitution)",
+        source="paper (15), (20); docs/theory.md (unequal restitution)",
         statement=(
             r"Let $b = -(I+E)\gamma^-$ and $W G W = W$. Some impulse $p$ gives every contact its own "
             r"restitution, $W p = b$, if and only if $W G b = b$; the solutions are then $p = G b + (I - G "

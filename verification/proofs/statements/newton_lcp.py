@@ -43,7 +43,7 @@ def statement() -> Statement:
     return Statement(
         name="newton_lcp",
         title="The Newton LCP is passive when all its contacts approach",
-        source="design section 4 (unequal restitution); Moreau",
+        source="docs/theory.md (unequal restitution); Moreau",
         statement=(
             r"Let $v^+ = v + M^{-1} J^\top p$ with $p \geq 0$, $p^\top (J v^+ + E J v) = 0$, $J v \leq 0$ "
             r"and $E$ diagonal with $e_i \leq 1$. Then twice the loss is $p^\top (I - E)(-J v) \geq 0$."

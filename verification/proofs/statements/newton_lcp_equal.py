@@ -46,7 +46,7 @@ def statement() -> Statement:
     return Statement(
         name="newton_lcp_equal",
         title="With equal restitution the Newton LCP is passive for all velocities",
-        source="design section 4, sharpened",
+        source="docs/theory.md, sharpened",
         statement=(
             r"If $v^+ = v + M^{-1} J^\top p$ and $p^\top (J v^+ + e J v) = 0$ with one scalar $e \in (-1, "
             r"1]$, then twice the loss is $\frac{1-e}{1+e} \, p^\top W p \geq 0$: no sign of $p$ or of $J "

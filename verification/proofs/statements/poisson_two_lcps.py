@@ -69,7 +69,7 @@ def statement() -> Statement:
     return Statement(
         name="poisson_two_lcps",
         title="Poisson's law by two LCPs is passive",
-        source="design section 4 (unequal restitution); Glocker and Pfeiffer",
+        source="docs/theory.md (unequal restitution); Glocker and Pfeiffer",
         statement=(
             r"Compression: $v_k = v + M^{-1} J^\top p$, $0 \leq p \perp J v_k$. Restitution: $v^+ = v_k + "
             r"M^{-1} J^\top p_e$, $p_e - E p \perp J v^+ \geq 0$, with $E$ diagonal and $e_i \leq 1$. For "

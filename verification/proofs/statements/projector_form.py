@@ -70,7 +70,7 @@ def statement() -> Statement:
     return Statement(
         name="projector_form",
         title="The impact is an orthogonal projection",
-        source="design section 4; paper (21)",
+        source="docs/theory.md; paper (21)",
         statement=(
             r"Let $M = L L^\top$, $u = L^\top v$, $A = J L^{-\top}$ and let the columns of $Q$ be an "
             r"orthonormal basis of the row space of $A$. Then (21) is $u^+ = u - (1+e) Q Q^\top u$ and "

@@ -40,7 +40,7 @@ def statement() -> Statement:
     return Statement(
         name="spectral_filter",
         title="Every spectral filter is passive",
-        source="design section 4 (one family)",
+        source="docs/theory.md (one family)",
         statement=(
             r"Let $V^\top V = I$ and $E = E^\top$ with $-I \leq E \leq I$. Then $u^+ = u - V (I+E) V^\top "
             r"u$ has $|u|^2 - |u^+|^2 = u^\top V (I - E^2) V^\top u \geq 0$. With $E$ diagonal mode $k$ has "

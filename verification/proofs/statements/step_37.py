@@ -41,7 +41,7 @@ def statement() -> Statement:
     return Statement(
         name="step_37",
         title="What (37) computes is not the Moore-Penrose inverse",
-        source="paper (36)-(41); paper.md erratum 2",
+        source="paper (36)-(41); erratum 2",
         statement=(
             r"With $P = \begin{pmatrix} I & 0 \\ A & I \end{pmatrix}$ and $R = (I \; 0)$, the matrix $X = "
             r"P^\top R^\top W_n^{-1} R P$ of (37) is just $R^\top W_n^{-1} R$. It satisfies $W X W = W$ and "

@@ -61,7 +61,7 @@ def statement() -> Statement:
     return Statement(
         name="unequal_restitution",
         title="Unequal restitution by equalities: the exact condition",
-        source="design section 4; the paper's future work",
+        source="docs/theory.md; the paper's future work",
         statement=(
             r"Let $W = J M^{-1} J^\top$ be invertible and $v^+ = v - M^{-1} J^\top W^{-1} (I+E) J v$. Then "
             r"$J v^+ = -E J v$ and twice the loss is $\gamma^\top (W^{-1} - E^\top W^{-1} E) \gamma$ with "

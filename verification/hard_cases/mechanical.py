@@ -1,0 +1,152 @@
+"""Hard cases of mechanics: light bodies, short levers, singular linkages, grazing, tiny speeds, unequal restitution."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from verification.hard_cases.case import HardCase
+
+_DESIGN = "docs/theory.md"
+
+
+def mass_ratio() -> HardCase:
+    """A grain of 1e-12 kg between a body of 1 kg and the wall."""
+    return HardCase(
+        "Mass ratio 1e12",
+        "a grain between a body and a wall",
+        "κ(M) = 1e12; the light body's speed is a thousandfold the heavy one's error",
+        "exact bounce of both, no gain",
+        np.diag([1.0, 1e-12]),
+        np.array([[1.0, -1.0], [0.0, 1.0]]),
+        np.array([-1.0, -1e3]),
+        1.0,
+    )
+
+
+def tiny_lever_arm() -> HardCase:
+    """Two points of a face 1e-9 m apart."""
+    return HardCase(
+        "Lever arms of 1e-9 m",
+        "contact points clustered on one spot",
+        "two rows whose difference is 1e-9: a real rotation constraint, close to noise",
+        "rank 2: the rotation is stopped",
+        np.diag([1.0, 1.0, 1.0]),
+        np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-9]]),
+        np.array([1.0, -1.0, 3.0]),
+        0.0,
+    )
+
+
+def _arm(q1: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix of the straight two-link arm of Fig. 2 (slender rods) and its tip's row along the arm."""
+    mass = np.array([[8.0 / 3.0, 5.0 / 6.0], [5.0 / 6.0, 1.0 / 3.0]])
+    tip, elbow = 2.0 * np.array([np.cos(q1), np.sin(q1)]), np.array([np.cos(q1), np.sin(q1)])
+    along = np.array([np.cos(q1), np.sin(q1)])
+    rows = [along @ [-lever[1], lever[0]] for lever in (tip, tip - elbow)]
+    return mass, np.array([rows])
+
+
+def straight_arm() -> HardCase:
+    """The arm struck along itself, its row set to exact zero as the contact set does."""
+    mass, row = _arm(0.3)
+    cleaned = np.where(np.abs(row) <= 1e-13 * np.array([[2.0, 1.0]]), 0.0, row)
+    return HardCase(
+        "Straight arm struck along itself",
+        f"{_DESIGN}; a singular linkage",
+        "the exact row is zero, the computed one 1e-16: unit scaling would promote it to a contact",
+        "nothing happens, since the contact set makes such a row exactly zero",
+        mass,
+        cleaned,
+        np.array([1.0, -0.5]),
+        0.0,
+        exact_jacobian=np.array([[Fraction(0), Fraction(0)]], dtype=object),
+        methods=("factored", "gram_pinv", "damped", "svd"),
+    )
+
+
+def face_at_three_points() -> HardCase:
+    """A box face on three points of a wall turned by the angle of a 3-4-5 triangle: exactly of rank two."""
+    n, t = (Fraction(-3, 5), Fraction(4, 5)), (Fraction(4, 5), Fraction(3, 5))
+    rows = []
+    for arm in (Fraction(-1, 2), Fraction(1, 7), Fraction(1, 2)):
+        r = [Fraction(-3, 10) * n[k] + arm * t[k] for k in range(2)]
+        rows.append([n[0], n[1], r[0] * n[1] - r[1] * n[0]])
+    exact = np.array(rows, dtype=object)
+    return HardCase(
+        "Face struck at three points in a rotated frame",
+        _DESIGN,
+        "rank 2 in geometry, rank 3 in doubles: noise taken for a row brakes the sliding",
+        "the tangential speed is kept",
+        np.diag([2.0, 2.0, 0.1]),
+        exact.astype(float),
+        np.array([2.4 + 0.6, 1.8 - 0.8, 0.0]),
+        0.5,
+        exact_jacobian=exact,
+        methods=("factored", "gram_pinv", "damped", "svd"),
+    )
+
+
+def grazing() -> HardCase:
+    """Fast sliding with a normal velocity of 1e-12 m/s."""
+    return HardCase(
+        "Grazing impact",
+        "a fast tool brushing a wall",
+        "the approach is twelve digits below the speed",
+        "the sliding keeps every digit, the approach is reversed to ε of the speed",
+        np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.25], [0.0, 0.25, 3.0]]),
+        np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.5]]),
+        np.array([100.0, -1e-12, 0.0]),
+        0.7,
+    )
+
+
+def subnormal_speeds() -> HardCase:
+    """Speeds near 1e-312 m/s."""
+    return HardCase(
+        "Subnormal speeds",
+        "a body that has come to rest by halving",
+        "squares underflow: energies of 1e-624 J",
+        "scaled, so solved as any other; the result is rounded to subnormals",
+        np.array([[2.0, 0.5], [0.5, 1.0]]),
+        np.array([[1.0, 0.0]]),
+        np.array([-3e-312, 1e-312]),
+        0.5,
+    )
+
+
+def light_direction() -> HardCase:
+    """v along M's lightest direction, κ(M) = 1e12, rows random in the kinetic metric, elastic."""
+    rng = np.random.default_rng(34)
+    d = 6
+    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass = axes * np.logspace(0.0, -12.0, d) @ axes.T
+    mass = 0.5 * (mass + mass.T)
+    rows = rng.normal(size=(3, d)) @ np.linalg.cholesky(mass).T
+    return HardCase(
+        "Velocity along M's lightest direction, κ(M) = 1e12",
+        _DESIGN,
+        "Cholesky's backward error d ε κ(M) is as large as the energy's fifth digit",
+        "no gain above 10 d ε √κ(M), thanks to the clamp",
+        mass,
+        rows,
+        axes[:, -1],
+        1.0,
+    )
+
+
+def bar_with_unequal_restitution() -> HardCase:
+    """The bar that equalities throw from 0.5 J to 12.167 J."""
+    mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
+    return HardCase(
+        "Bar struck at two points, e = (1, 0)",
+        f"{_DESIGN}; Kane and Levinson (1985) for the kind",
+        "equalities with unequal e create energy: 0.5 J becomes 12.167 J",
+        "Poisson's law by two LCPs: passive, pushing, separating",
+        mass,
+        rows,
+        np.array([-1.0, 0.0]),
+        np.array([1.0, 0.0]),
+        methods=("factored",),
+    )
