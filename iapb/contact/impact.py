@@ -110,7 +110,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     Notes
     -----
     KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2 with its missing ½). In floating point the relative gain of
-    ``factored`` stays below 10 d ε √κ(M): Cholesky's error d ε κ(M) is refined away, then energy is clamped. Source: Constantinescu, Salcudean, Croft (2005), section V.
+    ``factored`` stays below 10 d ε √κ(M): Cholesky's error d ε κ(M) is refined
+    away, then the energy is clamped. Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)
