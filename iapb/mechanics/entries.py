@@ -1,7 +1,10 @@
 """The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`)."""
 
-from iapb.compiled import Entry
+import threading
+
+from iapb.compiled import Block, Entry, block
 from iapb.mechanics import kernels
+from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace
 
 all_finite = Entry(kernels.all_finite)
 bias_at = Entry(kernels.bias_at)
@@ -20,3 +23,17 @@ mass_matrix_at = Entry(kernels.mass_matrix_at)
 misplaced_body = Entry(kernels.misplaced_body)
 point_jacobian = Entry(kernels.point_jacobian)
 potential_energy = Entry(kernels.potential_energy)
+
+
+class Scratch(threading.local):
+    """Where kernels write; made anew in each thread that asks.
+
+    Attributes
+    ----------
+    workspace : for the mechanism as it is
+    parts : the moving parts alone, with that workspace
+    """
+
+    def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
+        self.workspace: Block = block(Workspace(*(array.copy() for array in workspace)))
+        self.parts: Block = block(Evaluation(parts, self.workspace))

@@ -5,7 +5,6 @@ M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
@@ -19,21 +18,13 @@ from iapb.errors import ArgumentError
 from iapb.mechanics import entries, structure
 from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
-from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.layout import collect_arrays, tree_ranges
 from iapb.mechanics.moving_parts import moving_parts
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
 Floats = NDArray[np.float64]
-
-
-class _Scratch(threading.local):
-    """Where kernels write; made anew in each thread that asks."""
-
-    def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
-        self.workspace: Block = block(Workspace(*(array.copy() for array in workspace)))
-        self.parts: Block = block(Evaluation(parts, self.workspace))
 
 
 class Mechanism:
@@ -75,7 +66,7 @@ class Mechanism:
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
         self._square = (self.nv, self.nv)
-        self._scratch = _Scratch(self.workspace(), moving_parts(self.arrays))
+        self._scratch = entries.Scratch(self.workspace(), moving_parts(self.arrays))
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
         self.tree_dofs: list[tuple[int, int]] = tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
