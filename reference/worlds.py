@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, NamedTuple
 
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
@@ -36,18 +37,18 @@ class World(NamedTuple):
         return coupling_of(scene, "none" if without else self.coupling)
 
 
-def _rigid() -> ContactLaw:
-    from reference.time_stepping import RigidConstraints
-
-    return RigidConstraints()
+def _named(module: str, law: str) -> ContactLaw:
+    """A law with its defaults, imported when its world is asked for."""
+    made: ContactLaw = getattr(import_module(module), law)()
+    return made
 
 
 # name -> (how IAPB meets the device's limits) -> world; to add one: a line here
 WORLDS: dict[str, Callable[[str], World]] = {
-    "ideal": lambda rendering: World("ideal", _rigid(), "four-channel"),
+    "ideal": lambda rendering: World("ideal", _named("reference.time_stepping", "RigidConstraints"), "four-channel"),
     "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
     "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
-    "CBuc": lambda rendering: World("CBuc", _rigid(), "unilateral"),
+    "CBuc": lambda rendering: World("CBuc", _named("reference.time_stepping", "RigidConstraints"), "unilateral"),
 }
 
 

@@ -66,13 +66,13 @@ def apply_diff(path: Path, text: str) -> None:
     place: int | None = None
     for line in text.splitlines():
         sign, content = line[:1], line[1:]
-        if sign == "+" and place is None:
+        if line.strip() in ("…", ""):
+            place = None
+        elif sign == "+" and place is None:
             waiting.append(content)
         elif sign == "+":
             lines.insert(place, content)
             place += 1
-        elif content.strip() == "…" or not line:
-            place = None
         else:
             if lines.count(content) != 1:
                 raise ValueError(f"{path} has the line {content!r} {lines.count(content)} times, not once")
