@@ -1,8 +1,8 @@
 """Event-driven truth for the project's scenes: smooth motion by a high-order integrator, events found by its roots.
 
-Between events M a = f − B − G + Jᵀλ with the closed contacts held (J a + J̇v = 0, λ >= 0); an event is a gap that closes or
-a λ that ends. All closed contacts take part in an impact by a law of `reference.complementarity.laws`. With a four-channel
-coupling the device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one
+Between events M a = f − B − G + Jᵀλ with the closed contacts held (J a + J̇v = 0, λ >= 0); an event is a gap that closes
+or a λ that ends. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling the
+device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one
 on the device at the same instant. This is what the "ideal" world's steps must converge to, for scenes whose
 coordinates may be added and whose impacts do not accumulate within the duration asked for.
 """
@@ -31,6 +31,7 @@ Contact = tuple[int, int, int]
 _ACCURACY = 1e-11
 _CLOSED = 1e-8  # gap [m] below which a contact is closed at an event: scenes place touching shapes to 1e-9
 _AT_REST = 1e-9  # normal velocity [m/s] below which a closed contact rests
+_RELEASED = 1e-8  # share of the largest force below which a contact force has ended: the event's root carries 1e-11
 _DIFFERENCE = 1e-6  # step [s] of the central difference J̇v: truncation and rounding both near 1e-10
 
 
@@ -77,6 +78,8 @@ class _Motion:
         self.d = mechanism.nv
         self.tool = slice(*self.system.tool_dofs)
         self.device = self.system.device_mechanism() if self.coupled else None
+        settings = self.scene.device
+        self.drag = np.asarray(settings.damping if settings is not None and settings.damping else 0.0)
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """q, v, device q, device v of a state."""
@@ -145,6 +148,7 @@ class _Motion:
         contact = (np.array([self.rows(q, v)[n][1] for n in self.held]).T @ push) if self.held else np.zeros(self.d)
         force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
+        force -= self.drag * device_v
         moved = np.linalg.solve(self.device.mass_matrix(device_q), force)
         return np.concatenate([v, acceleration, device_v, moved])
 
@@ -174,7 +178,8 @@ class _Motion:
         mass = self.system.mechanism.mass_matrix(q)
         free = np.linalg.solve(mass, self.force(state))
         pushed = nearest_velocity(mass, free, rows, -drift).impulse
-        self.held = [n for n, p in zip(resting, pushed, strict=True) if p > 0.0]
+        least = _RELEASED * float(np.abs(self.force(state)).max(initial=0.0))
+        self.held = [n for n, p in zip(resting, pushed, strict=True) if p > least]
 
 
 def scene_truth(scene: Scene, duration: float, coupled: bool = False, most_events: int = 60) -> SceneTruth:

@@ -1,15 +1,16 @@
 """Dry friction in the collision response: an extension of (15)-(21) that the paper leaves to the future.
 
-With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P the projector onto A_n's rows, the change of velocity is split into
-two orthogonal parts,
+With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P the projector onto A_n's rows, the change of velocity is split
+into two orthogonal parts,
 
     Δu = −(1 + e) P u  +  α Bᵀ p_t,      B = A_t (I − P).
 
 The first is the paper's impulse. The second is a tangential impulse *together with the normal impulse that keeps every
-normal velocity at −e γ⁻*: so restitution is met exactly whatever friction does. p_t obeys Coulomb's law with the tangential
-velocity after the impact (stick, or slip against it at |p_t| = μ p_n); α ≤ 1 is the largest factor for which the
-impact gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|², whose root is α: Kane and
-Levinson's gain of Newton's law with friction cannot occur, and where it would not, α = 1 and the outcome is Coulomb's.
+normal velocity at −e γ⁻*: so restitution is met exactly whatever friction does. p_t obeys Coulomb's law with the
+tangential velocity after the impact (stick, or slip against it at |p_t| = μ p_n); α ≤ 1 is the largest factor for
+which the impact gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|², whose root
+is α: Kane and Levinson's gain of Newton's law with friction cannot occur, and where it would not, α = 1 and the
+outcome is Coulomb's.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ _ROUNDS = 200  # updates of the friction limits μ p_n, which depend on the tang
 _UNDAMPED = 20  # rounds after which the limits move half way only: large μ can make them swing
 _SWEEPS = 100  # within each round
 _STILL = 1e-13  # of the largest velocity: a sweep, or an update of the limits, that moves less is the last one
-_PUSHES = 1e-9  # share of the normal impulse that a non-negative choice may leave unexplained (rounding of an active set)
+_PUSHES = 1e-9  # share of the normal impulse that a non-negative choice may leave unexplained: an active set's rounding
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,7 @@ def _share_within_cone(without: Floats, wanted: Floats, p_t: Floats, friction: F
 
 
 def _passive_share(split: _Split, moved: Floats, restitution: float) -> float:
-    """Largest α in [0, 1] for which the whole impact gains no energy: ½|Δ_t|² α² + (u·Δ_t) α <= loss of the normal part."""
+    """Largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α <= loss of the normal part: the whole impact gains no energy."""
     square, along = float(moved @ moved), float(split.u @ moved)
     lost = 0.5 * (1.0 - restitution) / (1.0 + restitution) * float(split.change @ split.change)
     if square == 0.0 or 0.5 * square + along <= lost:

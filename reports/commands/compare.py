@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from verification.comparison.problem_study import ProblemStudy
+    from verification.comparison.step_cost import CostRow
     from verification.comparison.study import ComparisonStudy
 
 
@@ -72,9 +73,9 @@ def _map_table(study: ComparisonStudy) -> Table:
 
 
 def _friction_table(study: ComparisonStudy) -> Table:
-    table = _table("Friction in the impact: IAPB, Coulomb's NCP, its relaxation CCP (energies of KE⁻)", "e", "μ", "cases",
-                   "all push", "as NCP", "reduced", "unsolved", "NCP gains", "CCP gains", "most, IAPB", "most, NCP",
-                   "most, CCP")  # fmt: skip
+    table = _table("Friction in the impact: IAPB, Coulomb's NCP, its relaxation CCP (energies of KE⁻)", "e", "μ",
+                   "cases", "all push", "as NCP", "reduced", "unsolved", "NCP gains", "CCP gains", "most, IAPB",
+                   "most, NCP", "most, CCP")  # fmt: skip
     for c in study.friction:
         table.add_row(f"{c.restitution:g}", f"{c.friction:g}", *(str(n) for n in (
             c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains)),
@@ -87,11 +88,15 @@ def _cost_table(study: ComparisonStudy) -> Table:
     table = _table("Time per impact [µs]: median (least to largest)", "impacts", "contacts", *solvers)
     cells = {(row.family, row.contacts, row.solver): row for row in study.impact_costs}
     for family, contacts in sorted({(row.family, row.contacts) for row in study.impact_costs}):
-        rows = [cells[family, contacts, solver] for solver in solvers]
-        table.add_row(family, str(contacts), *(
-            f"{r.median * 1e6:.3g} ({r.least * 1e6:.3g} to {r.largest * 1e6:.3g}){'' if r.verdict == 'solved' else ' ' + r.verdict}"
-            if r.repeats else r.verdict for r in rows))  # fmt: skip
+        table.add_row(family, str(contacts), *(_spread(cells[family, contacts, solver]) for solver in solvers))
     return table
+
+
+def _spread(row: CostRow) -> str:
+    if not row.repeats:
+        return row.verdict
+    median, least, largest = (f"{seconds * 1e6:.3g}" for seconds in (row.median, row.least, row.largest))
+    return f"{median} ({least} to {largest})" + ("" if row.verdict == "solved" else f" {row.verdict}")
 
 
 def _problem_tables(study: ProblemStudy) -> list[Table]:
@@ -100,8 +105,8 @@ def _problem_tables(study: ProblemStudy) -> list[Table]:
     for line in study.lines:
         by = dict(line.verdicts)
         skew = f"{line.asymmetry:.1g}" if line.asymmetry else ""
-        verdicts.add_row(line.problem, str(line.unknowns), str(line.rank), skew, *(by.get(s, "") for s in study.solvers),
-                         f"{line.spread:.0e}")  # fmt: skip
+        outcomes = (by.get(solver, "") for solver in study.solvers)
+        verdicts.add_row(line.problem, str(line.unknowns), str(line.rank), skew, *outcomes, f"{line.spread:.0e}")
     for file in study.unread:
         verdicts.add_row(file.file, "", "", "", *("not read" for _ in study.solvers), "")
     return [verdicts, _profile_table(study)]
@@ -113,8 +118,8 @@ def _profile_table(study: ProblemStudy) -> Table:
     from verification.comparison.problem_study import FACTORS
 
     shown = [1.0, 3.0, 10.0, 100.0, 1e5]
-    table = _table("Performance profile (Dolan and Moré): share solved within a factor of the fastest", "kind", "solver",
-                   *(f"{factor:g}" for factor in shown))  # fmt: skip
+    title = "Performance profile (Dolan and Moré): share solved within a factor of the fastest"
+    table = _table(title, "kind", "solver", *(f"{factor:g}" for factor in shown))  # fmt: skip
     for kind, solver, share in study.profile:
         at = [share[np.searchsorted(FACTORS, factor, side="right") - 1] for factor in shown]
         table.add_row(kind, solver, *(_share(float(value)) for value in at))

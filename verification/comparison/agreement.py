@@ -41,7 +41,8 @@ class Comparison:
     distance : |v⁺ − v⁺_law|; cone_distance : of IAPB's impulse from {Jᵀp : p >= 0}
     energy_lost, energy_lost_law : share of KE⁻; law_2, law_3 : defects of the statements 1 and 3 above
     adhesion : "none", "artefact of the minimum norm" or "adhesive"; adhesive_share : of the impulses as given
-    approaching : contacts, given or touching, that IAPB leaves approaching; momentum_residual : share of M(v⁺−v⁻) outside range(Jᵀ)
+    approaching : contacts, given or touching, that IAPB leaves approaching
+    momentum_residual : share of M(v⁺−v⁻) outside range(Jᵀ)
     """
 
     family: str

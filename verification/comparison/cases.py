@@ -71,7 +71,9 @@ def random_cases(
                     yield ImpactCase(family.name, mass, rows[closing], velocity, e, rows[~closing])
 
 
-def two_contacts(cosine: float, speed_ratio: float, rng: np.random.Generator, coordinates: int = 4) -> ImpactCase:
+def two_contacts(
+    cosine: float, speed_ratio: float, rng: np.random.Generator, coordinates: int = 4
+) -> ImpactCase:
     """Two contacts whose unit rows have this cosine in the kinetic metric, closing at 1 and `speed_ratio`.
 
     Lengths of the rows, the mass matrix and all motion along neither contact are random.
@@ -82,7 +84,8 @@ def two_contacts(cosine: float, speed_ratio: float, rng: np.random.Generator, co
     u = frame.T @ np.concatenate([closing, rng.normal(size=coordinates - 2)])
     lower = np.linalg.cholesky(random_mass_matrix(rng, coordinates))
     lengths = np.exp(rng.normal(size=(2, 1)))
-    return ImpactCase("two contacts", lower @ lower.T, lengths * (rows @ lower.T), np.linalg.solve(lower.T, u), 0.0)
+    velocity = np.linalg.solve(lower.T, u)
+    return ImpactCase("two contacts", lower @ lower.T, lengths * (rows @ lower.T), velocity, 0.0)
 
 
 def random_mass_matrix(rng: np.random.Generator, coordinates: int) -> Floats:
@@ -100,7 +103,8 @@ def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Flo
     d = int(rng.integers(1, 13))
     velocity, row = rng.normal(size=d), rng.normal(size=(1, d))
     row = _approaching(row, velocity)
-    return random_mass_matrix(rng, d), np.vstack([row * s for s in (1.0, *rng.uniform(0.5, 2.0, redundancy))]), velocity
+    sizes = (1.0, *rng.uniform(0.5, 2.0, redundancy))
+    return random_mass_matrix(rng, d), np.vstack([row * size for size in sizes]), velocity
 
 
 def _cradle(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
@@ -117,7 +121,8 @@ def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
     frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
     rows = np.linalg.cholesky(np.minimum(gram, gram.T)) @ frame[:c]
     lower = np.linalg.cholesky(random_mass_matrix(rng, d))
-    u = frame.T @ np.concatenate([np.linalg.solve(rows @ frame[:c].T, -rng.uniform(0.05, 1.0, c)), rng.normal(size=d - c)])
+    closing = np.linalg.solve(rows @ frame[:c].T, -rng.uniform(0.05, 1.0, c))
+    u = frame.T @ np.concatenate([closing, rng.normal(size=d - c)])
     return lower @ lower.T, rows @ lower.T, np.linalg.solve(lower.T, u)
 
 

@@ -19,7 +19,6 @@ from verification.comparison.cases import random_mass_matrix
 
 if TYPE_CHECKING:
     from iapb.contact.impact_laws import FrictionalImpact
-    from reference.complementarity.problem import ImpactProblem
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +32,8 @@ RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
 class FrictionCell:
     """All impacts with one e and one μ; counts of impacts, energies as shares of KE⁻.
 
-    pushing : every contact pushes (with and without friction), nothing was reduced; same : of these, the motion is the NCP's
+    pushing : every contact pushes (with and without friction), nothing was reduced
+    same : of these, the motion is the NCP's
     reduced : friction reduced so that no energy is gained; ncp_gains, ccp_gains : impacts in which that law gains
     unsolved : impacts that NSGS or the engine's limits left unconverged, compared by energy only
     """
@@ -134,11 +134,12 @@ def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
         if _pushes(impact, e, ours):
             pushing += 1
             same += distances[-1] <= SAME_WITH_FRICTION
+    largest = {name: max(found, default=np.nan) for name, found in gains.items()}
     return FrictionCell(
         e, mu, len(impacts), pushing, same, reduced, unsolved,
-        sum(g > GAIN for g in gains["ncp"]), sum(g > GAIN for g in gains["ccp"]),
-        *(max(gains[name], default=np.nan) for name in ("ours", "ncp", "ccp")),
-        float(np.median(distances)) if distances else np.nan,
+        ncp_gains=sum(g > GAIN for g in gains["ncp"]), ccp_gains=sum(g > GAIN for g in gains["ccp"]),
+        largest_gain=largest["ours"], largest_gain_ncp=largest["ncp"], largest_gain_ccp=largest["ccp"],
+        typical_distance=float(np.median(distances)) if distances else np.nan,
     )  # fmt: skip
 
 
@@ -198,8 +199,9 @@ def struck_bar() -> dict[str, float]:
     from reference.complementarity.laws import LAWS
     from reference.complementarity.problem import ImpactProblem
 
-    mass, rows, velocity, e = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]]), np.array([-1.0, 0.0]), (1.0, 0.0)
-    problem: ImpactProblem = ImpactProblem.from_impact(mass, rows, velocity, e)
+    mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
+    velocity, e = np.array([-1.0, 0.0]), (1.0, 0.0)
+    problem = ImpactProblem.from_impact(mass, rows, velocity, e)
     outcomes = {name: LAWS[name].apply(problem).velocity for name in ("newton_equality", "newton_lcp", "poisson")}
     outcomes["IAPB, unequal restitution"] = resolve_impact(mass, rows, velocity, e).velocity
     return {"before": 0.5} | {name: 0.5 * float(v @ mass @ v) for name, v in outcomes.items()}

@@ -46,8 +46,8 @@ def _always(cells: Sequence[MapCell], family: str) -> bool:
 def two_contacts(study: ComparisonStudy) -> str:
     """The border r = c."""
     right = sum(c.predicted == c.found for c in study.two_contacts)
-    return (f"Two contacts whose rows have the cosine c in the kinetic metric and close at speeds 1 and r agree exactly "
-            f"where r >= c: {right} of {len(study.two_contacts)} grid points.")
+    return (f"Two contacts whose rows have the cosine c in the kinetic metric and close at speeds 1 and r agree "
+            f"exactly where r >= c: {right} of {len(study.two_contacts)} grid points.")
 
 
 def difference(study: ComparisonStudy) -> str:
@@ -55,22 +55,21 @@ def difference(study: ComparisonStudy) -> str:
     cells = [c for c in study.cells if c.agree < 1.0]
     if not cells:
         return ""
-    defect = max(c.defect for c in study.cells + study.scenes)
-    by_redundancy = ", ".join(
-        f"{r}: {100 * (1 - np.mean([c.agree for c in cells if c.redundancy == r])):.0f} %"
-        for r in sorted({c.redundancy for c in cells})
-    )
-    return (f"Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses (defect at most "
-            f"{defect:.0e}), up to {max(c.farthest for c in cells):.2g} |v⁻|. It grows with 1 + e, which moves no impact "
-            f"across the border. Impacts that differ, by redundant rows, {by_redundancy}.")
+    defect, farthest = max(c.defect for c in study.cells + study.scenes), max(c.farthest for c in cells)
+    redundancies = sorted({c.redundancy for c in cells})
+    apart = {r: 100.0 * (1.0 - np.mean([c.agree for c in cells if c.redundancy == r])) for r in redundancies}
+    return (f"Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses (defect at "
+            f"most {defect:.0e}), up to {farthest:.2g} |v⁻|. It grows with 1 + e, which moves no impact across the "
+            "border. Impacts that differ, by redundant rows, "
+            f"{', '.join(f'{r}: {share:.0f} %' for r, share in apart.items())}.")
 
 
 def energy(study: ComparisonStudy) -> str:
     """Extra loss."""
     cells = study.cells + study.scenes
-    return (f"IAPB never keeps more energy than the LCP: it loses ½ (1−e)/(1+e) · distance² more, up to "
-            f"{100 * max(c.extra_loss for c in cells):.0f} % of KE⁻, nothing at e = 1. Momentum changes lie in range(Jᵀ) "
-            f"to {max(c.momentum for c in cells):.0e}.")
+    extra, momentum = 100 * max(c.extra_loss for c in cells), max(c.momentum for c in cells)
+    return (f"IAPB never keeps more energy than the LCP: it loses ½ (1−e)/(1+e) · distance² more, up to {extra:.0f} % of "
+            f"KE⁻, nothing at e = 1. Momentum changes lie in range(Jᵀ) to {momentum:.0e}.")
 
 
 def scenes(study: ComparisonStudy) -> str:
@@ -91,33 +90,34 @@ def touching(study: ComparisonStudy) -> str:
     cells = [c for c in study.cells if c.family == "with a neighbour"]
     if not cells:
         return ""
-    ours, theirs = (float(np.mean([getattr(c, n) for c in cells])) for n in ("left_approaching", "left_approaching_law"))
-    return (f"A touching contact that is not given a row is left approaching in {100 * ours:.0f} % of such impacts by "
-            f"IAPB and in {100 * theirs:.0f} % by the LCP on the same rows.")
+    ours = 100 * float(np.mean([c.left_approaching for c in cells]))
+    theirs = 100 * float(np.mean([c.left_approaching_law for c in cells]))
+    return (f"A touching contact that is not given a row is left approaching in {ours:.0f} % of such impacts by IAPB and "
+            f"in {theirs:.0f} % by the LCP on the same rows.")
 
 
 def friction(study: ComparisonStudy) -> str:
     """The extension by dry friction."""
     cells = study.friction
     pushing, same = sum(c.pushing for c in cells), sum(c.same for c in cells)
-    gains = {name: max(getattr(c, name) for c in cells) for name in
-             ("largest_gain", "largest_gain_ncp", "largest_gain_ccp")}  # fmt: skip
-    elastic = [c for c in cells if c.restitution > 0.0]
-    share = 100 * sum(c.ncp_gains for c in elastic) / max(1, sum(c.cases for c in elastic))
+    ours, ncp, ccp = (max(getattr(c, f"largest_gain{law}") for c in cells) for law in ("", "_ncp", "_ccp"))
+    bouncing = [c for c in cells if c.restitution > 0.0]
+    share = 100 * sum(c.ncp_gains for c in bouncing) / max(1, sum(c.cases for c in bouncing))
     return (f"Friction in the impact: where every contact pushes, IAPB's motion is Coulomb's NCP in {same} of {pushing} "
-            f"impacts. With e > 0 the NCP gains energy in {share:.0f} % (up to {gains['largest_gain_ncp']:.2g} KE⁻, the CCP "
-            f"up to {gains['largest_gain_ccp']:.2g}); IAPB never (largest change {gains['largest_gain']:.0e} KE⁻).")
+            f"impacts. With e > 0 the NCP gains energy in {share:.0f} % (up to {ncp:.2g} KE⁻, the CCP up to {ccp:.2g}); "
+            f"IAPB never (largest change {ours:.0e} KE⁻).")
 
 
 def unequal(study: ComparisonStudy) -> str:
     """The extension by unequal restitution."""
     distance = max(c.distance for c in study.unequal)
-    gains = {name: max(getattr(c, name) for c in study.unequal) for name in ("gain", "gain_equality")}
-    mixed = max(c.gain_newton_lcp for c in study.unequal)
-    return (f"Unequal restitution: the engine's two LCPs are the reference's to {distance:.0e} and gain at most "
-            f"{gains['gain']:.0e} KE⁻; equalities gain up to {gains['gain_equality']:.2g}, the Newton LCP up to {mixed:.2g} "
-            f"where some contacts separate. On the struck bar (0.5 J): equalities {study.bar['newton_equality']:.4g} J, "
-            f"IAPB {study.bar['IAPB, unequal restitution']:.4g} J.")
+    ours, newton, equality = (
+        max(getattr(c, name) for c in study.unequal) for name in ("gain", "gain_newton_lcp", "gain_equality")
+    )
+    before, after = study.bar["newton_equality"], study.bar["IAPB, unequal restitution"]
+    return (f"Unequal restitution: the engine's two LCPs are the reference's to {distance:.0e} and gain at most {ours:.0e} "
+            f"KE⁻; equalities gain up to {equality:.2g}, the Newton LCP up to {newton:.2g} where some contacts separate. "
+            f"On the struck bar (0.5 J): equalities {before:.4g} J, IAPB {after:.4g} J.")
 
 
 def cost(study: ComparisonStudy) -> str:
@@ -134,7 +134,8 @@ def cost(study: ComparisonStudy) -> str:
 def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
     here = {row.solver: row for row in rows if row.family == family and row.contacts == contacts}
     others = [row for name, row in here.items() if not name.startswith("IAPB") and row.verdict == "solved"]
-    text = f"{family} of {contacts}: IAPB {_seconds(here[KERNEL].median)} compiled, {_seconds(here[IAPB].median)} from Python"
+    compiled, called = _seconds(here[KERNEL].median), _seconds(here[IAPB].median)
+    text = f"{family} of {contacts}: IAPB {compiled} compiled, {called} from Python"
     if not others:
         return text + ", no LCP solver solved it"
     best = min(others, key=lambda row: row.median)

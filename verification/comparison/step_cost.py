@@ -169,8 +169,8 @@ def _row(
     speed = float(np.linalg.norm(upper @ case.velocity))
     distance = float(np.linalg.norm(upper @ (answers[name] - reference))) / speed
     verdict = "solved" if distance <= _SOLVED else "failed"
-    times = np.array(samples[name])
-    return CostRow(*size, verdict, float(np.median(times)), float(times.min()), float(times.max()), len(times), distance)
+    times = samples[name]
+    return CostRow(*size, verdict, float(np.median(times)), min(times), max(times), len(times), distance)
 
 
 def _engine_call(case: ImpactCase, method: str) -> Call:

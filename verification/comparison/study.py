@@ -50,7 +50,7 @@ DEPTHS = {
 class ComparisonStudy:
     """Everything that `iapb compare` found.
 
-    single : C05, one contact (family "one contact" without redundancy) and law "newton_lcp"
+    single : C05, the family "one contact" without redundancy
     cells : the map over random families; two_contacts : the exact border of two contacts
     scenes : the map over impacts of the project's scenes; left_out : scene impacts that cannot be compared
     friction, unequal, bar : the engine's extensions beside their complementarity counterparts
@@ -98,7 +98,7 @@ def compare(
     scene_cells, left_out = compare_scenes(scenes, say)
     return ComparisonStudy(
         depth,
-        single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy and c.law == "newton_lcp"),
+        single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy),
         cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
         friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
         bar=struck_bar(), impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
@@ -124,7 +124,8 @@ def compare_scenes(
     """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
     from iapb.scene_files import scene_names
 
-    names, found, left_out = list(scene_names() if scenes is None else scenes), [], 0
+    names, left_out = list(scene_names() if scenes is None else scenes), 0
+    found: list[Comparison] = []
     for done, name in enumerate(names):
         for restitution in SCENE_RESTITUTIONS:
             impacts = scene_impacts(name, restitution=restitution)
