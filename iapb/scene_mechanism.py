@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, make_shapes
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from iapb.scene import Scene
+from iapb.scene import Scene, SpatialScene
 from iapb.scene.bodies import WORLD
 from iapb.scene.bodies import Body as SceneBody
+from iapb.scene_space import body_in_space, shapes_in_space
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,8 @@ def mechanism_of(scene: Scene) -> Mechanism:
     A planar moment of inertia I about z becomes diag(I/2, I/2, I): the inertia of a flat body, so that the
     spatial engine sees a physical one. Only its zz entry ever moves in the plane.
     """
-    return Mechanism(_spatial_body(body) for body in scene.bodies)
+    lay_out = body_in_space if isinstance(scene, SpatialScene) else _spatial_body
+    return Mechanism(lay_out(body) for body in scene.bodies)
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:
@@ -39,6 +41,8 @@ def shapes_of(scene: Scene) -> Shapes:
 
     A shape of a body that nothing moves (fixed to the world through and through) is static, like a wall.
     """
+    if isinstance(scene, SpatialScene):
+        return shapes_in_space(scene)
     described = [_described(shape, _Frame.of(scene, owner)) for owner, shape in _owned_shapes(scene)]
     return make_shapes(described)
 

@@ -44,7 +44,7 @@ class System:
         self.pairs = pairs_of(scene, self.shapes)
         self.capacity = contact_capacity(self.shapes, self.pairs)
         self.dt = 1.0 / scene.rate
-        self.gravity = np.array([*(scene.gravity or (0.0, 0.0)), 0.0])
+        self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
         self._worlds: dict[Any, World] = {}
@@ -191,8 +191,8 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Po
     wrench = np.zeros(6)
     point = np.zeros(3)
     if hand is not None:
-        wrench[0], wrench[1], wrench[5] = hand.force
-        point[:2] = hand.point
+        wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
+        point[: len(hand.point)] = hand.point
     gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
     zeros = {name: np.zeros(d) for name in ("hand_force", "coupling_force", "environment_force", "applied")}
     tool_zeros = {name: np.zeros(size) for name in (

@@ -2,5 +2,6 @@
 
 from iapb.scene.model import Scene
 from iapb.scene.reading import load_scene, scene_from_text, scene_schema
+from iapb.scene.space import SpatialScene
 
-__all__ = ["Scene", "load_scene", "scene_from_text", "scene_schema"]
+__all__ = ["Scene", "SpatialScene", "load_scene", "scene_from_text", "scene_schema"]

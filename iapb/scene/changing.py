@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import io
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,6 +10,7 @@ from pydantic import ValidationError
 from iapb.errors import ArgumentError, SceneError
 from iapb.scene.model import Scene
 from iapb.scene.reading import mistakes_of
+from iapb.scene.writing import scene_text
 
 
 def changed(scene: Scene, values: dict[str, Any]) -> Scene:
@@ -19,23 +19,13 @@ def changed(scene: Scene, values: dict[str, Any]) -> Scene:
     for path, value in values.items():
         _set(plain, path, value)
     try:
-        made = Scene.model_validate(plain)
+        made = type(scene).model_validate(plain)
     except ValidationError as failure:
         raise SceneError(
             mistakes_of(failure, f"scene {scene.name} with new values", values=plain)
         ) from failure
     made._source_text = scene_text(made, f"{scene.name} with new values for {', '.join(values) or 'nothing'}")
     return made
-
-
-def scene_text(scene: Scene, comment: str = "") -> str:
-    """Return YAML text that reads back as this scene, exact to the last bit."""
-    from ruamel.yaml import YAML
-
-    yaml, stream = YAML(typ="safe", pure=True), io.StringIO()
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = None, False  # type: ignore[assignment]
-    yaml.dump(scene.resolved(), stream)
-    return (f"# {comment}\n" if comment else "") + stream.getvalue()
 
 
 def _set(plain: dict[str, Any], path: Any, value: Any) -> None:

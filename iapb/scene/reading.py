@@ -11,6 +11,9 @@ from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.scene.document import MAX_CHARACTERS, DocumentError, Node, read_document
 from iapb.scene.model import Scene
 from iapb.scene.parts import MISSING
+from iapb.scene.robots import with_robots
+from iapb.scene.space import scene_kind
+from iapb.scene.writing import scene_text
 
 Place = tuple[str | int, ...]
 
@@ -62,13 +65,15 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     mistakes = [
         Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated
     ]
+    given, wrong = with_robots(root.value, file)
     try:
-        scene = Scene.model_validate(root.value)
+        scene = scene_kind(given).model_validate(given)
     except ValidationError as failure:
         mistakes += mistakes_of(failure, file, root)
+    mistakes += wrong
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
-    scene._source_text = text
+    scene._source_text = text if given is root.value else scene_text(scene, f"{scene.name} with its robots as bodies")
     return scene
 
 
