@@ -114,6 +114,9 @@ class Block:
     The arrays stay where they are and are kept alive; numbers are copied and cannot change.
     """
 
+    block_type: BlockType
+    address: int  # of the layout in memory
+
     def __init__(self, content: Any) -> None:
         members = [block(value) if _is_named_tuple(value) else value for value in content]
         self._content = content._replace(**dict(zip(content._fields, members, strict=True)))

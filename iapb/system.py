@@ -88,8 +88,10 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     """The coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
     if name == "none":
         return NoCoupling()
-    kinds: dict[str, tuple[Callable[..., Coupling], Any]] = {"four-channel": (FourChannel, scene.couplings.four_channel),
-             "unilateral": (UnilateralCoupler, scene.couplings.unilateral)}  # fmt: skip
+    kinds: dict[str, tuple[Callable[..., Coupling], Any]] = {
+        "four-channel": (FourChannel, scene.couplings.four_channel),
+        "unilateral": (UnilateralCoupler, scene.couplings.unilateral),
+    }
     if name not in kinds:
         raise ArgumentError("coupling", name, "one of none, four-channel, unilateral")
     kind, gains = kinds[name]

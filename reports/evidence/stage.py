@@ -1,7 +1,7 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
 The file's name carries a hash of what determines the records: the stage's inputs and the sources of the engine, the
-references and the verification. So a changed line of theirs makes the stage run again, and a change of the report does not.
+references and the verification. So a changed line of theirs makes the stage run again, a change of the report not.
 """
 
 from __future__ import annotations

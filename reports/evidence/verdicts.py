@@ -10,8 +10,8 @@ from reports.pages.records import LIMITED, OUTCOMES, REFUTED, REPRODUCED, Eviden
 
 def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
     """One verdict for each topic that was computed."""
-    return tuple([*_claims(evidence), *_passivity(evidence), *_proofs(evidence), *_laws(evidence),
-                  *_checks(evidence), *_hard_cases(evidence)])  # fmt: skip
+    return (*_claims(evidence), *_passivity(evidence), *_proofs(evidence), *_laws(evidence), *_checks(evidence),
+            *_hard_cases(evidence))  # fmt: skip
 
 
 def _claims(evidence: Evidence) -> Iterator[Verdict]:
