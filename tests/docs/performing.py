@@ -5,6 +5,7 @@ The working directory is where files are written; in documents that add to the p
 
 from __future__ import annotations
 
+import glob
 import io
 import json
 import shlex
@@ -45,6 +46,7 @@ def _perform(block: dict[str, Any], namespace: dict[str, Any]) -> None:
 
 def _command(words: list[str]) -> None:
     """The commands that documents use, in this process: a start of Python for each would take most of the time."""
+    words = [found for word in words for found in (sorted(glob.glob(word)) if "*" in word else [word])]
     if words[0] == "iapb":
         from reports.cli import main
 
