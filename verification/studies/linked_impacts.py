@@ -1,0 +1,153 @@
+"""Newton's cradle and Bernoulli's three balls: energy and momentum do not decide, the rows do.
+
+The same elastic impact is resolved by the engine's map (21) on different sets of rows, each stated, and one contact
+after the other by the exact event-driven reference. With relative rows (12) every one of these outcomes keeps energy
+and momentum; the paper's per-body rows (13)-(14) keep the energy and lose momentum (erratum 3).
+
+    cradle     n balls in line, the first arrives with v = 1 m/s, the others rest and touch
+    Bernoulli  a ball arrives along x between two that touch, their centres at ±30° from its path
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# Start gaps that put contacts in an order for the event-driven reference, where gaps are linear: any size will do.
+_GAP = 1e-3
+
+
+@dataclass(frozen=True)
+class LinkedBalls:
+    """Equal frictionless discs of 1 kg that touch, d = 2 n velocities (x, y of each).
+
+    contacts : pairs (a, b), the normal points from b into a; normals : (c, 2)
+    velocity : (n, 2) before the impact [m/s]
+    """
+
+    name: str
+    contacts: tuple[tuple[int, int], ...]
+    normals: Floats
+    velocity: Floats
+
+    def relative_rows(self, chosen: Sequence[int]) -> Floats:
+        """Rows (12), nᵀ(J_a − J_b), of the chosen contacts."""
+        rows = np.zeros((len(chosen), *self.velocity.shape))
+        for row, contact in zip(rows, chosen, strict=True):
+            a, b = self.contacts[contact]
+            row[a], row[b] = self.normals[contact], -self.normals[contact]
+        return rows.reshape(len(chosen), -1)
+
+    def per_body_rows(self, chosen: Sequence[int]) -> Floats:
+        """Rows (13) and (14), nᵀJ_a and nᵀJ_b, of the chosen contacts."""
+        rows = np.zeros((2 * len(chosen), *self.velocity.shape))
+        for k, contact in enumerate(chosen):
+            a, b = self.contacts[contact]
+            rows[2 * k, a], rows[2 * k + 1, b] = self.normals[contact], self.normals[contact]
+        return rows.reshape(2 * len(chosen), -1)
+
+    def approaching(self) -> tuple[int, ...]:
+        """The contacts with v_n < 0."""
+        every = range(len(self.contacts))
+        return tuple(np.flatnonzero(self.relative_rows(every) @ self.velocity.ravel() < 0.0).tolist())
+
+
+@dataclass(frozen=True)
+class LinkedOutcome:
+    """One treatment of one problem.
+
+    rows : which rows were taken, in words; velocity : (n, 2) after [m/s]
+    """
+
+    problem: str
+    treatment: str
+    rows: str
+    before: Floats
+    velocity: Floats
+
+    @property
+    def energy_change(self) -> float:
+        """Relative change of the kinetic energy."""
+        return float(np.sum(self.velocity**2) / np.sum(self.before**2) - 1.0)
+
+    @property
+    def momentum_change(self) -> float:
+        """Length of the change of momentum over the momentum before."""
+        before = self.before.sum(axis=0)
+        return float(np.linalg.norm(self.velocity.sum(axis=0) - before) / np.linalg.norm(before))
+
+
+def cradle(balls: int = 5) -> LinkedBalls:
+    """Newton's cradle: ball 0 arrives along +x."""
+    velocity = np.zeros((balls, 2))
+    velocity[0, 0] = 1.0
+    contacts = tuple((k, k + 1) for k in range(balls - 1))
+    return LinkedBalls(f"cradle of {balls}", contacts, np.tile([-1.0, 0.0], (balls - 1, 1)), velocity)
+
+
+def bernoulli(degrees: float = 30.0) -> LinkedBalls:
+    """Bernoulli's three balls: ball 0 arrives along +x, balls 1 and 2 lie at ± the angle and touch at 30°."""
+    angle = math.radians(degrees)
+    normals = np.array([[-math.cos(angle), -math.sin(angle)], [-math.cos(angle), math.sin(angle)], [0.0, 1.0]])
+    velocity = np.zeros((3, 2))
+    velocity[0, 0] = 1.0
+    return LinkedBalls("Bernoulli", ((0, 1), (0, 2), (1, 2)), normals, velocity)
+
+
+def outcomes(balls: LinkedBalls) -> tuple[LinkedOutcome, ...]:
+    """Return the elastic outcomes of every treatment, side by side."""
+    every = tuple(range(len(balls.contacts)))
+    found = [
+        _mapped(balls, "simultaneous, relative rows (12)", "all touching contacts", balls.relative_rows(every)),
+        _mapped(balls, "simultaneous, relative rows (12)", "approaching contacts",
+                balls.relative_rows(balls.approaching())),
+        _mapped(balls, "simultaneous, per-body rows (13)-(14)", "all touching contacts", balls.per_body_rows(every)),
+        _mapped(balls, "simultaneous, per-body rows (13)-(14)", "approaching contacts",
+                balls.per_body_rows(balls.approaching())),
+    ]  # fmt: skip
+    return (*found, *_sequential(balls))
+
+
+def _mapped(balls: LinkedBalls, treatment: str, rows_in_words: str, rows: Floats) -> LinkedOutcome:
+    from iapb.contact.impact import resolve_impact
+
+    v = balls.velocity.ravel()
+    after = resolve_impact(np.eye(len(v)), rows, v, 1.0).velocity
+    return LinkedOutcome(balls.name, treatment, rows_in_words, balls.velocity, after.reshape(-1, 2))
+
+
+def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
+    """Event-driven outcomes: all at once by Newton's LCP, then in the orders in which contacts may close."""
+    c = len(balls.contacts)
+    yield _event_driven(balls, "all at once, Newton's LCP", np.zeros(c))
+    if balls.name.startswith("cradle"):
+        yield _event_driven(balls, "one after the other along the row", _GAP * np.arange(c))
+        return
+    for order in permutations(balls.approaching()):
+        start = np.zeros(c)
+        for rank, contact in enumerate(order):
+            start[contact] = _GAP * rank
+        yield _event_driven(balls, "contact " + ", then ".join(str(k) for k in order), start)
+
+
+def _event_driven(balls: LinkedBalls, order: str, start: Floats) -> LinkedOutcome:
+    from reference.event_driven import LinearSystem, event_driven
+
+    d = balls.velocity.size
+    rows = balls.relative_rows(range(len(balls.contacts)))
+    system = LinearSystem(np.eye(d), np.zeros(d), rows, start, 1.0)
+    path = event_driven(system, np.zeros(d), balls.velocity.ravel(), duration=10.0)
+    return LinkedOutcome(balls.name, "event-driven", order, balls.velocity, path.v[-1].reshape(-1, 2))
+
+
+def study_linked_impacts() -> tuple[LinkedOutcome, ...]:
+    """Return all outcomes: cradles of two to seven balls, and Bernoulli's problem."""
+    problems = [*(cradle(n) for n in range(2, 8)), bernoulli()]
+    return tuple(outcome for problem in problems for outcome in outcomes(problem))
