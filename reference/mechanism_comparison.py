@@ -20,7 +20,9 @@ def compare(
 ) -> dict[str, float]:
     """Return the largest difference of each quantity, relative to the reference's largest entry.
 
-    The potential energy, whose zero is a convention, is taken relative to the sum of m |g| |c|.
+    The potential energy, whose zero is a convention, is taken relative to the sum of m |g| |c|; a bias that nearly
+    vanishes (a centre of mass almost on its axis) relative to the sum of m |c| w^2, w the fastest turn: world
+    positions c are rounded, and with them every lever arm.
 
     Quantities: mass_matrix, bias, gravity, inverse_dynamics, kinetic_energy, potential_energy, momentum,
     and, over all bodies, placement, point_jacobian (at a point one metre off the origin) and frame_jacobian.
@@ -28,13 +30,13 @@ def compare(
     m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
     pairs: dict[str, tuple[Any, Any]] = {
         "mass_matrix": (m.mass_matrix(q), p.mass_matrix(q)),
-        "bias": (m.bias(q, v), p.bias(q, v)),
         "gravity": (m.gravity(q, gravity), p.gravity(q, gravity)),
         "inverse_dynamics": (m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity)),
         "kinetic_energy": (m.kinetic_energy(q, v), p.kinetic_energy(q, v)),
         "momentum": (m.centroidal_momentum(q, v), p.centroidal_momentum(q, v)),
     }
     differences = {name: relative_difference([pair]) for name, pair in pairs.items()}
+    differences["bias"] = relative_difference([(m.bias(q, v), p.bias(q, v))], _swung(mechanism, q, v))
     height = abs(m.potential_energy(q, gravity) - p.potential_energy(q, gravity))
     differences["potential_energy"] = height / max(_lifted(mechanism, q, gravity), np.finfo(float).tiny)
     return differences | _compare_bodies(mechanism, reference, q)
@@ -42,12 +44,20 @@ def compare(
 
 def _lifted(mechanism: Mechanism, q: Floats, gravity: ArrayLike) -> float:
     """Sum of m |g| |c| [J]: the size of the terms of a potential energy that may itself be near zero."""
+    return float(np.linalg.norm(gravity)) * _spread(mechanism, q)
+
+
+def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
+    """Sum of m |c| w^2 [N]: the size of the terms of a bias that may itself be near zero."""
+    fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
+    return fastest**2 * _spread(mechanism, q)
+
+
+def _spread(mechanism: Mechanism, q: Floats) -> float:
+    """Sum of m |c| [kg m]."""
     rotations, positions = mechanism.placements(q)
-    strength = float(np.linalg.norm(gravity))
     bodies = zip(mechanism.bodies, rotations, positions, strict=True)
-    return strength * sum(
-        body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies
-    )
+    return sum(body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies)
 
 
 def _compare_bodies(mechanism: Mechanism, reference: PinocchioMechanism, q: Floats) -> dict[str, float]:
@@ -63,8 +73,9 @@ def _compare_bodies(mechanism: Mechanism, reference: PinocchioMechanism, q: Floa
     return {name: relative_difference(found) for name, found in pairs.items()}
 
 
-def relative_difference(pairs: list[tuple[Any, Any]]) -> float:
-    """Return the largest |ours - theirs| of all pairs over the largest |theirs|; 0 where both are zero."""
+def relative_difference(pairs: list[tuple[Any, Any]], floor: float = 0.0) -> float:
+    """Return the largest |ours - theirs| of all pairs over the largest |theirs|, or over the floor if it is more."""
     scale = max((float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs), default=0.0)
+    scale = max(scale, floor)
     gap = max((float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs), default=0.0)
     return gap if scale == 0.0 else gap / scale

@@ -27,12 +27,6 @@ seeds = st.integers(0, 2**32 - 1)
 
 def worst(mechanism, model, q, v):
     differences = compare(mechanism, model, q, v)
-    if not mechanism.has_velocity_terms:  # B = 0: nothing to be relative to
-        assert (
-            np.abs(mechanism.bias(q, v)).max(initial=0.0)
-            <= AGREEMENT * np.abs(mechanism.mass_matrix(q)).max()
-        )
-        del differences["bias"]
     return max(differences.items(), key=lambda item: item[1])
 
 

@@ -46,8 +46,12 @@ def time_robots(folder: str | Path | None = None, depth: str = "quick") -> Findi
     check_depth(depth)
     files, skipped = robot_files(folder)
     table = table_of(COLUMNS, [row for path in files for row in _rows(path, ROUNDS[depth])])
-    statement = "M and B cost little more per call from Python than Pinocchio's, and less for many states at once."
-    tolerance = f"median ratio at most {LARGEST_RATIO:g} per call, below 1 for many states; medians of interleaved rounds"
+    statement = (
+        "M and B cost little more per call from Python than Pinocchio's, and less for many states at once."
+    )
+    tolerance = (
+        f"median ratio at most {LARGEST_RATIO:g} per call, below 1 for many states; rounds interleaved"
+    )
     return Finding("Time of M and B", statement, tolerance, _judged(table), skipped)
 
 

@@ -1,0 +1,76 @@
+"""The closed form solves Euler's equations, and the study tells a wrong order and a wrong body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from iapb.mechanics.integrators import INTEGRATORS
+from verification.mechanics import tumbling
+from verification.mechanics.torque_free import TorqueFreeBody
+
+H = 1e-4  # [s] of central differences: their error is about H^2
+BODIES = tumbling.MOTIONS.values()
+
+
+@pytest.mark.parametrize("body", BODIES, ids=tumbling.MOTIONS)
+@pytest.mark.parametrize("time", [0.0, 0.31, 2.0, 40.0])
+def test_the_closed_form_solves_the_equations(body, time):
+    moments, rate = np.array(body.moments), body.rates(time)
+    change = (body.rates(time + H) - body.rates(time - H)) / (2 * H)
+    torque = moments * change + np.cross(rate, moments * rate)
+    assert np.abs(torque).max() <= 1e-6 * np.abs(moments * change).max() + 1e-9
+    spin = body.axes(time).T @ (body.axes(time + H) - body.axes(time - H)) / (2 * H)
+    np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], rate, atol=1e-5)
+    np.testing.assert_allclose(body.axes(time) @ (moments * rate), [0, 0, body.momentum], atol=1e-14)
+    assert 0.5 * moments @ rate**2 == pytest.approx(body.energy, rel=1e-12)
+
+
+def test_rates_repeat_after_a_period():
+    for body in BODIES:
+        np.testing.assert_allclose(body.rates(body.period), body.rates(0.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("moments", [(2.0, 1.0, 3.0), (1.0, 1.0, 2.0)])
+def test_what_the_formulas_do_not_cover_is_refused(moments):
+    with pytest.raises(ArgumentError, match="moments"):
+        TorqueFreeBody(moments, 1.0, 2.0)
+    with pytest.raises(ArgumentError, match="third_rate"):
+        TorqueFreeBody((1.0, 2.0, 3.0), 5.0, 0.1)
+
+
+@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
+def test_every_integrator_keeps_its_order_in_the_compiled_step(method):
+    body = tumbling.MOTIONS["turning over"]
+    rows = list(tumbling._halved(body, method, tumbling.end_compiled, 2))
+    assert rows[-1]["order"] == pytest.approx(method.group_order, abs=tumbling.ORDER_TOLERANCE)
+
+
+def test_runge_kutta_keeps_its_fourth_order_on_rotations():
+    body, method = tumbling.MOTIONS["wobbling"], INTEGRATORS["runge_kutta_4"]
+    rows = list(tumbling._halved(body, method, tumbling.end_by_python, 2))
+    assert rows[-1]["order"] == pytest.approx(4, abs=tumbling.ORDER_TOLERANCE)
+    assert max(abs(rows[-1]["energy drift"]), rows[-1]["momentum drift"]) < 1e-7
+
+
+def test_a_body_of_another_shape_does_not_converge():
+    body, method = tumbling.MOTIONS["wobbling"], INTEGRATORS["midpoint"]
+    other = replace(body, moments=(1e-3, 2e-3, 2.8001e-3))
+
+    def end(_, method, steps):
+        return tumbling.end_by_python(other, method, steps)
+
+    rows = list(tumbling._halved(body, method, end, 3))
+    assert rows[-1]["order"] < 2 - tumbling.ORDER_TOLERANCE
+
+
+def test_an_undeclared_order_fails_the_finding():
+    rows = [
+        {"motion": "m", "integrator": "i", "form": "f", "step": 0.1, "declared order": 2},
+        {"motion": "m", "integrator": "i", "form": "f", "step": 0.05, "declared order": 2, "order": 1.0},
+    ]
+    table = tumbling.judged(tumbling.table_of(tumbling.COLUMNS, rows))
+    assert table.holds == (None, False)
