@@ -15,19 +15,24 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
+WRITTEN = ("file", "diff")
+
 
 def perform(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Do every block; a failure is recorded, and the blocks after it are still tried."""
+    """Do every block; a failure is recorded, and the blocks after it are still tried.
+
+    Files and lines are written first: what is imported once would not see a line that comes later.
+    """
     namespace: dict[str, Any] = {"__name__": "document"}
-    answers = []
-    for block in blocks:
+    answers: list[dict[str, Any]] = [{}] * len(blocks)
+    for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1]["kind"] not in WRITTEN):
         out, failure = io.StringIO(), ""
         try:
             with redirect_stdout(out), redirect_stderr(out):
                 _perform(block, namespace)
         except BaseException:  # whatever a documented line does is the finding
             failure = traceback.format_exc()
-        answers.append({"output": out.getvalue(), "failure": failure})
+        answers[number] = {"output": out.getvalue(), "failure": failure}
     return answers
 
 
