@@ -19,7 +19,7 @@ from pydantic import Field
 
 from iapb.errors import ArgumentError, Mistake, shown
 from iapb.scene.parts import Name, Part
-from iapb.scene.space import ORIGIN, JOINTS, SpatialShape, Vector3
+from iapb.scene.space import JOINTS, ORIGIN, SpatialShape, Vector3
 
 
 class Robot(Part):
@@ -124,5 +124,6 @@ def with_robots(given: Any, file: str) -> tuple[Any, list[Mistake]]:
                 path = ".".join(map(str, ("", *error["loc"])))
                 mistakes.append(Mistake(file, 0, 0, f"robots[{i}]{path}", shown(error["input"]), error["msg"]))
         except ArgumentError as failure:
-            mistakes.append(Mistake(file, 0, 0, f"robots[{i}].{failure.argument}", shown(failure.value), failure.expected))
+            where = f"robots[{i}].{failure.argument}"
+            mistakes.append(Mistake(file, 0, 0, where, shown(failure.value), failure.expected))
     return {key: value for key, value in given.items() if key != "robots"} | {"bodies": bodies}, mistakes

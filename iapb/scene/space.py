@@ -140,7 +140,7 @@ class SpatialBody(Part):
             raise expectation("a symmetric matrix")
         turned = info.data.get("joint") in ("spherical", "free_flyer")
         if turned and np.linalg.eigvalsh(matrix).min() < SMALLEST_POSITIVE:
-            raise expectation(f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns the body about all axes")
+            raise expectation(f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes")
         return inertia
 
     @field_validator("position", "velocity")

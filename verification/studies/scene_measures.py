@@ -9,9 +9,6 @@ import numpy as np
 
 from iapb.run import Run
 
-# A step counts as typical up to this share of the chunks' times: the first chunk may hold compilation.
-_FIRST_CHUNK = 1
-
 
 @dataclass(frozen=True)
 class SceneMeasure:
@@ -19,7 +16,7 @@ class SceneMeasure:
 
     penetration : deepest overlap [m]; most_rows : rows of the largest impact; most_contacts : in one step
     energy : the ledger's last entries by name [J]; largest_kinetic : [J], to compare the residual with
-    seconds_per_step : mean over all chunks but the first; infinite where there is only one
+    seconds_per_step : median over the chunks, since the first may hold compilation
     realtime_factor : step length over it
     """
 
@@ -39,11 +36,10 @@ class SceneMeasure:
 
 def measure(run: Run) -> SceneMeasure:
     """Return the record of a run."""
-    steps, seconds = run.chunk_steps[_FIRST_CHUNK:].sum(), run.chunk_seconds[_FIRST_CHUNK:].sum()
-    pace = float(seconds / steps) if steps else np.inf
+    pace = float(np.median(run.chunk_seconds / run.chunk_steps))
     return SceneMeasure(
         run.scene_name, run.world, run.steps, run.complete,
-        penetration=float(max(-run.contacts.gap.min(initial=0.0), 0.0)),
+        penetration=float(np.maximum(-run.contacts.gap, 0.0).max(initial=0.0)),
         most_rows=int(run.impacts.rows.max(initial=0)),
         most_contacts=int(np.diff(run.contacts.offsets).max(initial=0)),
         impacts=len(run.impacts.step),

@@ -12,7 +12,7 @@ from iapb.contact import coal_geometry
 from iapb.contact.geometry import ContactBuffer, candidate_pairs, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.box_pair import EDGE_SHARE
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.spatial_geometry import HalfSpace, Sphere, SpatialBox, SpatialShape, make_spatial_shapes
+from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, SpatialShape, Sphere, make_spatial_shapes
 
 Pose = tuple[np.ndarray, np.ndarray]
 KINDS = ("sphere", "box")

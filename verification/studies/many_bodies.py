@@ -1,0 +1,72 @@
+"""Cost of a step against the number of free bodies: linear, with the broad phase."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
+RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
+CHUNKS, CHUNK_STEPS = 10, 50  # the quickest chunk counts: other load on the machine only adds
+
+
+@dataclass(frozen=True)
+class StepCost:
+    """seconds : per step; contacts : mean per step; impacts : in all."""
+
+    bodies: int
+    seconds: float
+    contacts: float
+    impacts: int
+
+
+def field_of_discs(n: int) -> str:
+    """YAML text of n discs with random velocities over a wall."""
+    rng, columns = np.random.default_rng(0), math.ceil(math.sqrt(n))
+    bodies = [
+        f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 2e-5, "
+        f"shapes: [{{kind: circle, radius: {RADIUS}}}], "
+        f"position: [{PITCH * (k % columns):.6f}, {PITCH * (k // columns):.6f}, 0], "
+        f"velocity: [{0.3 * rng.normal():.6f}, {0.3 * rng.normal():.6f}, 0]}}"
+        for k in range(n)
+    ]
+    return "\n".join([
+        "name: field_of_discs", "rate: 1000", "duration: 1", "bodies:", *bodies, "walls:",
+        "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
+        "contact: {stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}", "",
+    ])  # fmt: skip
+
+
+def study_many_bodies(counts: Sequence[int] = COUNTS) -> tuple[StepCost, ...]:
+    """Return the cost of a step for each number of bodies."""
+    return tuple(_cost(n) for n in counts)
+
+
+def growth_exponent(costs: Sequence[StepCost], least_bodies: int = 20) -> float:
+    """Return the slope of log(seconds) over log(bodies), from `least_bodies` on: below, overhead hides the growth."""
+    chosen = [cost for cost in costs if cost.bodies >= least_bodies]
+    x = np.log([cost.bodies for cost in chosen])
+    return float(np.polyfit(x, np.log([cost.seconds for cost in chosen]), 1)[0])
+
+
+def _cost(n: int) -> StepCost:
+    from iapb.recording import make_record
+    from iapb.scene import scene_from_text
+    from iapb.simulation import Simulation
+
+    simulation = Simulation(scene_from_text(field_of_discs(n)))
+    sizes = (simulation.system.mechanism.nq, simulation.system.mechanism.nv, 0, 0)
+    simulation.advance_chunk(make_record(1, sizes, simulation.system.capacity, n), 1)  # compiles
+    quickest, contacts, impacts = math.inf, 0.0, 0
+    for _ in range(CHUNKS):
+        record = make_record(CHUNK_STEPS, sizes, simulation.system.capacity, n)
+        start = time.perf_counter()
+        simulation.advance_chunk(record, CHUNK_STEPS)
+        quickest = min(quickest, (time.perf_counter() - start) / CHUNK_STEPS)
+        contacts += float(record.contact_count.mean()) / CHUNKS
+        impacts += int(record.used[1])
+    return StepCost(n, quickest, contacts, impacts)
