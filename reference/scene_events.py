@@ -211,7 +211,9 @@ def _until_event(motion: _Motion, state: Floats, now: float, duration: float) ->
     """Integrate to the next event, or to the end."""
     from scipy.integrate import solve_ivp
 
-    def closing(_time: float, y: Floats) -> float:
+    def closing(time: float, y: Floats) -> float:
+        if time == now:  # contacts that the impact has just opened: their gap is a rounding of zero
+            return 1.0
         q, v, _, _ = motion.split(y)
         return min((gap for n, (gap, _) in motion.rows(q, v).items() if n not in motion.held), default=1.0)
 

@@ -48,7 +48,7 @@ def compare(
 
 
 def _tables(study: ComparisonStudy) -> list[Table]:
-    tables = [_map_table(study), _friction_table(study), _cost_table(study)]
+    tables = [_map_table(study), _friction_table(study), _convergence_table(study), _cost_table(study)]
     return tables + [table for each in study.problems for table in _problem_tables(each)]
 
 
@@ -80,6 +80,16 @@ def _friction_table(study: ComparisonStudy) -> Table:
         table.add_row(f"{c.restitution:g}", f"{c.friction:g}", *(str(n) for n in (
             c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains)),
             f"{c.largest_gain:.0e}", f"{c.largest_gain_ncp:.2g}", f"{c.largest_gain_ccp:.2g}")  # fmt: skip
+    return table
+
+
+def _convergence_table(study: ComparisonStudy) -> Table:
+    table = _table("The rigid world against event-driven truth: errors per step, coarse to fine", "scene", "device",
+                   "until [s]", "events", "positions", "order", "velocities", "order")  # fmt: skip
+    for row in study.convergence:
+        table.add_row(row.scene, "yes" if row.coupled else "no", f"{row.duration:g}", str(row.events),
+                      f"{row.position_coarse:.3g} to {row.position_fine:.3g}", f"{row.position_order:.2f}",
+                      f"{row.velocity_coarse:.3g} to {row.velocity_fine:.3g}", f"{row.velocity_order:.2f}")  # fmt: skip
     return table
 
 

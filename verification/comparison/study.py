@@ -12,6 +12,7 @@ from iapb.scene import Scene
 from verification.comparison.agreement import Comparison, compare_case, compare_cases
 from verification.comparison.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
 from verification.comparison.cases import random_cases
+from verification.comparison.convergence import ConvergenceRow, convergence
 from verification.comparison.extensions import (
     FrictionCell,
     UnequalCell,
@@ -54,6 +55,7 @@ class ComparisonStudy:
     cells : the map over random families; two_contacts : the exact border of two contacts
     scenes : the map over impacts of the project's scenes; left_out : scene impacts that cannot be compared
     friction, unequal, bar : the engine's extensions beside their complementarity counterparts
+    convergence : of the rigid world to event-driven truth, scene by scene
     impact_costs, step_costs : C22; problems : folders of problem files
     """
 
@@ -66,6 +68,7 @@ class ComparisonStudy:
     friction: tuple[FrictionCell, ...]
     unequal: tuple[UnequalCell, ...]
     bar: Mapping[str, float]
+    convergence: tuple[ConvergenceRow, ...]
     impact_costs: tuple[CostRow, ...]
     step_costs: tuple[StepCostRow, ...]
     problems: tuple[ProblemStudy, ...] = ()
@@ -101,7 +104,7 @@ def compare(
         single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy),
         cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
         friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
-        bar=struck_bar(), impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
+        bar=struck_bar(), convergence=convergence(progress=say), impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
         step_costs=world_cost(repeats=size.repeats, progress=say),
         problems=tuple(study_problems(folder, progress=say) for folder in folders),
     )  # fmt: skip

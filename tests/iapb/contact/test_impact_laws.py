@@ -1,0 +1,89 @@
+"""Friction in the impact: Coulomb's law where nothing prevents it, restitution exactly, and never a gain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb import ArgumentError, resolve_frictional_impact, resolve_impact
+from iapb.contact import impact_laws
+
+
+def drawn(seed: int) -> tuple[Any, ...]:
+    rng = np.random.default_rng(seed)
+    d, c, m = int(rng.integers(2, 8)), int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    root = rng.normal(size=(d, d))
+    rows, tangents, v = rng.normal(size=(c, d)), rng.normal(size=(c, m, d)), rng.normal(size=d)
+    return root @ root.T + 0.1 * np.eye(d), rows, tangents, v, float(rng.choice([0.0, 0.4, 1.0])), rng.uniform(0.0, 2.0, c)
+
+
+@given(st.integers(0, 100_000))
+def test_laws_of_every_outcome(seed: int) -> None:
+    """Passive, restitution exact, momentum through the contacts only, Coulomb's cone kept."""
+    M, J, T, v, e, mu = drawn(seed)
+    found = resolve_frictional_impact(M, J, T, v, e, mu)
+    energy = 0.5 * v @ M @ v
+    assert found.energy_change <= 1e-14 * energy
+    met = resolve_impact(M, J, v, e).velocity  # redundant rows: what the normal law itself leaves
+    scale = np.abs(J) @ np.abs(v) + np.abs(J) @ np.abs(found.velocity)
+    assert np.all(np.abs(J @ (found.velocity - met)) <= 1e-9 * scale)
+    p, p_t = found.impulses, found.tangential_impulses
+    pushed = J.T @ p + np.einsum("cmd,cm->d", T, p_t)
+    size = np.abs(J).T @ np.abs(p) + np.einsum("cmd,cm->d", np.abs(T), np.abs(p_t)) + np.abs(M @ v)
+    assert np.all(np.abs(M @ (found.velocity - v) - pushed) <= 1e-8 * size)
+    assert np.all(np.linalg.norm(p_t, axis=1) <= mu * np.maximum(p, 0.0) * (1 + 1e-9) + 1e-12 * np.abs(p).max())
+
+
+def test_a_block_sticks_or_slides() -> None:
+    """A point mass thrown at a floor: friction takes at most μ p of the tangential speed."""
+    M, J, T = np.eye(2), [[0.0, 1.0]], [[1.0, 0.0]]
+    slides = resolve_frictional_impact(M, J, T, [3.0, -1.0], 0.5, 0.4)
+    assert slides.velocity == pytest.approx([3.0 - 0.4 * 1.5, 0.5])
+    assert slides.tangential_impulses[0, 0] == pytest.approx(-0.6) and slides.friction_share == 1.0
+    sticks = resolve_frictional_impact(M, J, T, [0.3, -1.0], 0.5, 0.4)
+    assert sticks.velocity == pytest.approx([0.0, 0.5], abs=1e-15)
+
+
+def test_without_friction_it_is_the_papers_impact() -> None:
+    M, J, T, v, e, _ = drawn(5)
+    assert resolve_frictional_impact(M, J, T, v, e, 0.0).velocity == pytest.approx(resolve_impact(M, J, v, e).velocity)
+
+
+def test_the_clamp_is_what_prevents_the_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elastic impacts with friction: without the passive share some gain energy (Kane and Levinson), with it none."""
+    impacts = [(*drawn(seed)[:4], 1.0, 0.5) for seed in range(40)]
+    kept = [resolve_frictional_impact(*impact) for impact in impacts]
+    assert max(found.energy_change for found in kept) <= 1e-12
+    assert min(found.friction_share for found in kept) < 1.0
+    monkeypatch.setattr(impact_laws, "_passive_share", lambda split, moved, restitution: 1.0)
+    monkeypatch.setattr(impact_laws, "apply_change", _unclamped(impact_laws.apply_change))
+    assert max(resolve_frictional_impact(*impact).energy_change for impact in impacts) > 1e-3
+
+
+def _unclamped(apply: Any) -> Any:
+    def wrong(mass: Any, lower: Any, v: Any, clamped: bool, work: Any, v_plus: Any, momentum: Any) -> float:
+        return float(apply(mass, lower, v, False, work, v_plus, momentum))
+
+    return wrong
+
+
+@pytest.mark.parametrize(
+    ("argument", "change"),
+    [("tangents", {"tangents": [[1.0, 0.0, 0.0]]}), ("friction", {"friction": -0.1}), ("friction", {"friction": [0.1, 0.2]}),
+     ("restitution", {"restitution": -0.5}), ("restitution", {"restitution": [0.1]}),
+     ("tangents", {"tangents": [[np.nan, 0.0]]})],
+)  # fmt: skip
+def test_wrong_arguments_are_named(argument: str, change: dict[str, Any]) -> None:
+    given = {"mass_matrix": np.eye(2), "contact_jacobian": [[0.0, 1.0]], "tangents": [[1.0, 0.0]],
+             "velocity": [1.0, -1.0], "restitution": 0.5, "friction": 0.3} | change  # fmt: skip
+    with pytest.raises(ArgumentError, match=argument):
+        resolve_frictional_impact(**given)
+
+
+def test_no_contacts() -> None:
+    found = resolve_frictional_impact(np.eye(2), [], [], [1.0, -1.0], 0.5, 0.3)
+    assert np.array_equal(found.velocity, [1.0, -1.0]) and found.status == "complete"
