@@ -1,0 +1,171 @@
+"""C06 on an arm: the same impact in joint angles, in absolute angles, and in the hand's place up to the singular pose.
+
+With q = f(r), T = df/dr and v_q = T v_r, the outcome in r is brought back by T. In exact arithmetic nothing depends on
+f; in doubles M' = T^T M T is worse conditioned by up to kappa(T)^2, and nearly dependent rows amplify by 1/sigma_min.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb import resolve_impact
+from iapb.errors import IapbError
+from iapb.mechanics.mechanism import Mechanism
+from verification.claims.table import Column, Row, Table, table_of
+from verification.mechanics.planar_arm import Contact, PlanarArm
+from verification.mechanics.record import Finding, check_depth
+
+Floats = NDArray[np.float64]
+
+EPSILON = float(np.finfo(np.float64).eps)
+AGREEMENT = 1e-10  # of the velocity in the kinetic metric, where the conditions are moderate:
+MODERATE = 1e4  # largest kappa(M) and kappa(df/dr)^2 there
+SEPARATED = 0.1  # and least sigma_min of independent rows of unit length
+CONSTANT = (
+    100.0  # C of the bound, times d: a Cholesky factor, two solves and a projection, each some d roundings
+)
+SEED = 20050606
+
+ARM = PlanarArm((1.0, 1.0, 0.6), (1.0, 1.0, 0.5))
+ELBOWS = tuple(10.0**-k for k in range(13))  # angle of the second joint [rad]; 0 is the singular pose
+POSES = {"quick": 4, "full": 40}  # random other angles and velocities for each elbow
+RESTITUTIONS = (0.0, 0.7, 1.0)
+ACROSS = 0.5 * np.pi
+CONTACTS = {
+    "one": (Contact(2, 0.4, ACROSS),),
+    "two, separated": (Contact(1, 0.7, ACROSS), Contact(2, 0.4, 0.7)),
+    "three, two of them one contact twice": (
+        Contact(1, 0.7, ACROSS),
+        Contact(2, 0.4, 0.7),
+        Contact(1, 0.7, ACROSS),
+    ),
+    "one, pressed from both sides": (Contact(2, 0.4, ACROSS), Contact(2, 0.4, ACROSS - np.pi)),
+}
+# two contacts on one link, ever closer: nearly dependent rows
+CLOSE = {f"two, {gap:g} m apart": (Contact(1, 0.7, ACROSS), Contact(1, 0.7 + gap, ACROSS))
+         for gap in (1e-2, 1e-4, 1e-6, 1e-8)}  # fmt: skip
+
+COLUMNS = (
+    Column("coordinates", part=True),
+    Column("contacts", condition=True),
+    Column("elbow", "rad", condition=True),
+    Column("κ(M)"),
+    Column("κ(∂f/∂r)²"),
+    Column("σ_min"),
+    Column("error"),
+    Column("bound"),
+    Column("tolerance"),
+    Column("refused"),
+)
+ABSOLUTE, HAND = "absolute angles", "place of the hand"
+
+
+class Impact(NamedTuple):
+    """An impact of the arm in joint angles: pose, contacts, velocity and restitution."""
+
+    q: Floats
+    contacts: tuple[Contact, ...]
+    velocity: Floats
+    restitution: float
+
+
+def coordinate_invariance(depth: str = "quick", seed: int = SEED) -> Finding:
+    """Solve impacts in two kinds of coordinates, from a bent elbow to 1e-12 rad before the singular pose."""
+    check_depth(depth)
+    table = table_of(COLUMNS, _rows(POSES[depth], seed))
+    statement = "An impact has one outcome, whatever the coordinates it is solved in."
+    tolerance = (
+        f"{AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} and rows are "
+        f"redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, "
+        "which says nothing once it exceeds 1"
+    )
+    return Finding("Coordinate invariance (C06)", statement, tolerance, judged(table))
+
+
+def _rows(poses: int, seed: int) -> Iterator[dict[str, Any]]:
+    mechanism = ARM.mechanism()
+    for coordinates in (ABSOLUTE, HAND):
+        for label, contacts in {**CONTACTS, **CLOSE}.items():
+            for elbow in ELBOWS:
+                rng = np.random.default_rng([seed, ELBOWS.index(elbow)])
+                found = [
+                    compare(mechanism, impact, coordinates)
+                    for impact in _impacts(rng, elbow, contacts, poses)
+                ]
+                yield {"coordinates": coordinates, "contacts": label, "elbow": elbow, **_worst(found)}
+
+
+def _impacts(
+    rng: np.random.Generator, elbow: float, contacts: tuple[Contact, ...], poses: int
+) -> Iterator[Impact]:
+    for k in range(poses):
+        q = np.array([rng.uniform(-np.pi, np.pi), elbow, rng.uniform(-1.5, 1.5)])
+        yield Impact(q, contacts, rng.normal(size=ARM.links), RESTITUTIONS[k % len(RESTITUTIONS)])
+
+
+def compare(mechanism: Mechanism, impact: Impact, coordinates: str) -> dict[str, Any]:
+    """Return error, bound and condition numbers of one impact; `refused` 1 where the other solve was refused."""
+    q, v, e = impact.q, impact.velocity, impact.restitution
+    mass, rows = mechanism.mass_matrix(q), ARM.joint_rows(mechanism, q, impact.contacts)
+    here = resolve_impact(mass, rows, v, e)
+    new_mass, new_rows, change = _transformed(mechanism, impact, coordinates)
+    squared = float(np.linalg.cond(change)) ** 2
+    sigma, kappa = _separation(mass, rows, here.rank), float(np.linalg.cond(mass))
+    bound = CONSTANT * len(v) * EPSILON * kappa * squared / sigma
+    row = {"κ(M)": kappa, "κ(∂f/∂r)²": squared, "σ_min": sigma, "bound": bound, "refused": 0}
+    try:
+        there = resolve_impact(new_mass, new_rows, np.linalg.solve(change, v), e)
+    except IapbError:  # the mass matrix of these coordinates is not positive definite in doubles any more
+        return row | {"refused": 1, "error": None}
+    difference = here.velocity - change @ there.velocity
+    return row | {"error": float(np.sqrt((difference @ mass @ difference) / (v @ mass @ v)))}
+
+
+def _transformed(mechanism: Mechanism, impact: Impact, coordinates: str) -> tuple[Floats, Floats, Floats]:
+    """M', J' and T = df/dr in the other coordinates."""
+    q = impact.q
+    if coordinates == ABSOLUTE:
+        r = np.cumsum(q)
+        change = np.eye(ARM.links) - np.eye(ARM.links, k=-1)  # q_i = r_i - r_(i-1)
+        rows = np.array([ARM.absolute_row(r, contact) for contact in impact.contacts])
+        return ARM.absolute_mass_matrix(r), rows, change
+    change = np.linalg.inv(ARM.hand_jacobian(mechanism, q))
+    new_mass = change.T @ mechanism.mass_matrix(q) @ change
+    return 0.5 * (new_mass + new_mass.T), ARM.joint_rows(mechanism, q, impact.contacts) @ change, change
+
+
+def _separation(mass: Floats, rows: Floats, rank: int) -> float:
+    """Least singular value that counts, of J L^-T with rows of unit length."""
+    whitened = np.linalg.solve(np.linalg.cholesky(mass), rows.T)
+    values = np.linalg.svd(whitened / np.linalg.norm(whitened, axis=0), compute_uv=False)
+    return float(values[rank - 1])
+
+
+def _worst(found: list[dict[str, Any]]) -> dict[str, Any]:
+    """The impact that comes closest to its tolerance, and how many were refused."""
+    rows = [row | {"tolerance": tolerance_of(row)} for row in found]
+    solved = [row for row in rows if row["error"] is not None]
+    worst = max(solved or rows, key=lambda row: (row["error"] or 0.0) / row["tolerance"])
+    return worst | {"refused": sum(row["refused"] for row in rows)}
+
+
+def tolerance_of(row: Row) -> float:
+    """1e-10 where the conditions are moderate, else the bound."""
+    moderate = row["κ(M)"] <= MODERATE and row["κ(∂f/∂r)²"] <= MODERATE and row["σ_min"] >= SEPARATED
+    return AGREEMENT if moderate else float(row["bound"])
+
+
+def judged(table: Table) -> Table:
+    """Rows whose bound exceeds 1 cannot tell; a solve refused where it does not is a failure."""
+    outcomes: list[bool | None] = []
+    for row in table.records():
+        if row["tolerance"] >= 1.0:
+            outcomes.append(None)
+        else:
+            outcomes.append(row["refused"] == 0 and row["error"] <= row["tolerance"])
+    return replace(table, holds=tuple(outcomes))
