@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from iapb.effects.question import Effect, Question, numbers
 
+TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
+
 
 def gravity(question: Question) -> Effect:
     """G of (1)."""
@@ -55,5 +57,5 @@ def hand_force(question: Question) -> Effect:
 
 def _turning(question: Question) -> str:
     """Name the joints that turn something."""
-    turning = [body.name for body in question.scene.bodies if body.joint in ("revolute", "planar")]
+    turning = [body.name for body in question.scene.bodies if body.joint in TURNING_JOINTS]
     return f"the joint{'' if len(turning) == 1 else 's'} of {', '.join(turning)}"
