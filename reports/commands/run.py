@@ -63,7 +63,8 @@ def describe(run: Run, existed: bool) -> None:
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}.")
-    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {seconds:.3g} s ({seconds / steps * 1e6:.3g} µs a step).")
+    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {_duration(seconds)} "
+          f"({_duration(seconds / steps)} a step).")
     impacts = run.impacts
     if len(impacts.step):
         lost = float(np.sum(impacts.energy_lost))
@@ -75,6 +76,13 @@ def describe(run: Run, existed: bool) -> None:
         print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
     end = ", ".join(f"{name} {value:.6g}" for name, value in zip(run.coordinate_names, run.q[-1], strict=True))
     print(f"At the end: {end}.")
+
+
+def _duration(seconds: float) -> str:
+    for unit, factor in (("s", 1.0), ("ms", 1e3)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} µs"
 
 
 def _counted(count: int, noun: str) -> str:

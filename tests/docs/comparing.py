@@ -8,7 +8,7 @@ import re
 RELATIVE = 1e-3  # documents print a few digits
 ROUNDING = 1e-6  # numbers below it are rounding noise, which differs from machine to machine
 
-_TIME = re.compile(r"(?<![\w.])[\d.]+(?:e[-+]?\d+)? (?=s\b|ms\b|µs\b)")
+_TIME = re.compile(r"(?<![\w.])[\d.]+(?:e[-+]?\d+)? (?:s|ms|µs)\b")
 _HASH = re.compile(r"\b[0-9a-f]{16}(?:[0-9a-f]{48})?\b")
 _MEASURED = ("computed in", "it had taken", "seconds", "proved", "passed in", "failed in", " in 0.", "refuted")
 _NUMBER = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)")
@@ -39,7 +39,7 @@ def lines_of(text: str) -> list[str]:
     lines = []
     for line in text.splitlines():
         if any(word in line for word in _MEASURED):
-            line = _TIME.sub("T ", line)
+            line = _TIME.sub("TIME", line)
         words = _HASH.sub("HASH", line).split()
         if words:
             lines.append(" ".join(words))
