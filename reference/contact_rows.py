@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from iapb.contact.detection import detect_contacts
 from iapb.contact.geometry import WORLD, ContactBuffer, make_contact_buffer
+from iapb.errors import ArgumentError
 
 Floats = NDArray[np.float64]
 
@@ -54,8 +55,16 @@ def contact_jacobian(
 
 
 def tangent_rows(mechanism: Any, q: Floats, found: ContactRows) -> Floats:
-    """Rows tᵀ(J_a − J_b) (c, d) along t = z × n: the one tangent of a contact in the plane."""
+    """Rows tᵀ(J_a − J_b) (c, d) along t = z × n: the one tangent of a contact in the plane.
+
+    Raises
+    ------
+    ArgumentError
+        where a normal leaves the plane: a contact in space has two tangents
+    """
     normals = found.geometry.normal[: len(found.gap)]
+    if np.abs(normals[:, 2]).max(initial=0.0) > ROW_NOISE:
+        raise ArgumentError("friction", "in space", "a planar scene for the rigid worlds with friction")
     tangents = np.cross([0.0, 0.0, 1.0], normals)
     return _rows_along(tangents, mechanism, q, mechanism.placements(q)[1], found.geometry)
 

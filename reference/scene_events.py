@@ -123,13 +123,13 @@ class _Motion:
         """a (d,) with the held contacts held, and their λ (k,) [N], of either sign."""
         q, v, _, _ = self.split(state)
         mass = self.system.mechanism.mass_matrix(q)
-        free = np.linalg.solve(mass, self.force(state))
+        free: Floats = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
         if not self.held:
             return free, np.zeros(0)
         rows, drift = self._held_rows(q, v)
         response = np.linalg.solve(mass, rows.T)
-        push = np.linalg.lstsq(rows @ response, -(rows @ free + drift))[0]
-        return free + response @ push, push
+        push: Floats = np.asarray(np.linalg.lstsq(rows @ response, -(rows @ free + drift))[0], np.float64)
+        return np.asarray(free + response @ push, np.float64), push
 
     def _held_rows(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Rows (k, d) of the held contacts and J̇v (k,), by central difference along the motion."""
@@ -176,7 +176,7 @@ class _Motion:
         q, v, _, _ = self.split(state)
         rows, drift = self._held_rows(q, v)
         mass = self.system.mechanism.mass_matrix(q)
-        free = np.linalg.solve(mass, self.force(state))
+        free: Floats = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
         pushed = nearest_velocity(mass, free, rows, -drift).impulse
         least = _RELEASED * float(np.abs(self.force(state)).max(initial=0.0))
         self.held = [n for n, p in zip(resting, pushed, strict=True) if p > least]
@@ -195,7 +195,9 @@ def scene_truth(scene: Scene, duration: float, coupled: bool = False, most_event
     motion = _Motion(scene, coupled)
     start = motion.system.make_state()
     device = [start.q[motion.tool], start.v[motion.tool]] if coupled else []
-    state, now, segments, events = np.concatenate([start.q, start.v, *device]), 0.0, [], []
+    state, now = np.concatenate([start.q, start.v, *device]), 0.0
+    segments: list[tuple[float, float, Callable[[float], Floats]]] = []
+    events: list[float] = []
     for _ in range(most_events):
         state = motion.strike(state)
         solution = _until_event(motion, state, now, duration)
@@ -220,9 +222,10 @@ def _until_event(motion: _Motion, state: Floats, now: float, duration: float) ->
     def releasing(_time: float, y: Floats) -> float:
         return float(motion.acceleration(y)[1].min(initial=1.0))
 
-    for event in (closing, releasing):
-        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+    found: tuple[Any, Any] = (closing, releasing)
+    for event in found:  # scipy reads these attributes
+        event.terminal, event.direction = True, -1.0
     return solve_ivp(
-        motion.rate, (now, duration), state, "DOP853", rtol=_ACCURACY, atol=_ACCURACY, events=(closing, releasing),
+        motion.rate, (now, duration), state, "DOP853", rtol=_ACCURACY, atol=_ACCURACY, events=found,
         dense_output=True, max_step=duration / 20.0,
     )  # fmt: skip

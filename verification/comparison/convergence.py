@@ -22,6 +22,7 @@ _LEVELS = 4.0
 # Errors per step on the fine level up to this multiple of the coarse one's count as first order: the accident of
 # where impacts fall changes them by less than two on all scenes; errors that do not shrink at all would give four.
 BOUNDED = 2.5
+_ROUNDING = 1e-9  # per second of step: an error of rounding alone is as good as none
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,12 @@ class ConvergenceRow:
 
     @property
     def position_order(self) -> float:
-        """log₄ of the ratio of the largest position errors."""
+        """log₄ of the ratio of the largest position errors; infinite where they are rounding alone."""
         return _order(self.position_coarse, self.position_fine)
 
     @property
     def velocity_order(self) -> float:
-        """log₄ of the ratio of the largest velocity errors."""
+        """log₄ of the ratio of the largest velocity errors; infinite where they are rounding alone."""
         return _order(self.velocity_coarse, self.velocity_fine)
 
     @property
@@ -91,12 +92,11 @@ class ConvergenceRow:
 
 
 def _order(coarse: float, fine: float) -> float:
-    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if coarse > 0.0 and fine > 0.0 else np.inf
+    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if min(coarse, fine) > _ROUNDING else np.inf
 
 
 def _bounded(coarse: float, fine: float) -> bool:
-    """Errors of rounding alone (1e-9 per second of step) are as good as none."""
-    return fine <= max(BOUNDED * coarse, 1e-9)
+    return fine <= max(BOUNDED * coarse, _ROUNDING)
 
 
 def convergence(

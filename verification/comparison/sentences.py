@@ -136,8 +136,8 @@ def ideal_world(study: ComparisonStudy) -> str:
     apart = [row.scene for row in rows if not row.first_order]
     place = f"not on {', '.join(apart)}" if apart else "on all"
     orders = [order for row in rows for order in (row.position_order, row.velocity_order) if np.isfinite(order)]
-    return (f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes (positions in the sup "
-            f"norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
+    return (f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes (positions in the "
+            f"sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
             f"{np.median(orders):.2f}); without a truth: {', '.join(WITHOUT_TRUTH)}.")
 
 

@@ -104,7 +104,8 @@ def compare(
         single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy),
         cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
         friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
-        bar=struck_bar(), convergence=convergence(progress=say), impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
+        bar=struck_bar(), convergence=convergence(progress=say),
+        impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
         step_costs=world_cost(repeats=size.repeats, progress=say),
         problems=tuple(study_problems(folder, progress=say) for folder in folders),
     )  # fmt: skip

@@ -18,7 +18,8 @@ def drawn(seed: int) -> tuple[Any, ...]:
     d, c, m = int(rng.integers(2, 8)), int(rng.integers(1, 5)), int(rng.integers(1, 3))
     root = rng.normal(size=(d, d))
     rows, tangents, v = rng.normal(size=(c, d)), rng.normal(size=(c, m, d)), rng.normal(size=d)
-    return root @ root.T + 0.1 * np.eye(d), rows, tangents, v, float(rng.choice([0.0, 0.4, 1.0])), rng.uniform(0.0, 2.0, c)
+    e, mu = float(rng.choice([0.0, 0.4, 1.0])), rng.uniform(0.0, 2.0, c)
+    return root @ root.T + 0.1 * np.eye(d), rows, tangents, v, e, mu
 
 
 @given(st.integers(0, 100_000))
@@ -73,7 +74,8 @@ def _unclamped(apply: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("argument", "change"),
-    [("tangents", {"tangents": [[1.0, 0.0, 0.0]]}), ("friction", {"friction": -0.1}), ("friction", {"friction": [0.1, 0.2]}),
+    [("tangents", {"tangents": [[1.0, 0.0, 0.0]]}), ("friction", {"friction": -0.1}),
+     ("friction", {"friction": [0.1, 0.2]}),
      ("restitution", {"restitution": -0.5}), ("restitution", {"restitution": [0.1]}),
      ("tangents", {"tangents": [[np.nan, 0.0]]})],
 )  # fmt: skip

@@ -49,7 +49,8 @@ def test_two_contacts_agree_exactly_where_the_speed_ratio_exceeds_the_cosine(c: 
 
 def test_map_counts_its_cells_and_finds_the_border_on_the_grid() -> None:
     cells = agreement_map(FOUND)
-    assert sum(cell.cases for cell in cells) == len(FOUND) == 6 * 3 * sum(len(f.redundancies) for f in FAMILIES.values())
+    assert sum(cell.cases for cell in cells) == len(FOUND)
+    assert len(FOUND) == 6 * 3 * sum(len(family.redundancies) for family in FAMILIES.values())
     assert all(cell.contradictions == 0 for cell in cells)
     assert all(cell.predicted == cell.found for cell in two_contact_map())
 
