@@ -35,7 +35,9 @@ def body_in_space(body: SpatialBody) -> Body:
 
 def shapes_in_space(scene: SpatialScene) -> Shapes:
     """Return the shapes of the bodies in order, then the walls; those of bodies that nothing moves are static."""
-    placed = [(shape, _placement(scene, i)) for i, body in enumerate(scene.bodies) for shape in body.shapes]
+    placed: list[tuple[Any, Placement]] = [
+        (shape, _placement(scene, i)) for i, body in enumerate(scene.bodies) for shape in body.shapes
+    ]
     placed += [(wall, (STATIC, np.eye(3), np.zeros(3))) for wall in scene.walls]
     return spatial_geometry.make_spatial_shapes([_described(shape, *place) for shape, place in placed])
 

@@ -128,7 +128,7 @@ def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
     c = len(balls.contacts)
     yield _event_driven(balls, "all at once, Newton's LCP", np.zeros(c))
     if balls.name.startswith("cradle"):
-        yield _event_driven(balls, "one after the other along the row", _GAP * np.arange(c))
+        yield _event_driven(balls, "one after the other along the row", np.linspace(0.0, _GAP * (c - 1), c))
         return
     for order in permutations(balls.approaching()):
         start = np.zeros(c)

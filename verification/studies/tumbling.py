@@ -9,9 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from iapb.mechanics.mechanism import Mechanism
+    from iapb.run import Run
+    from iapb.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -68,14 +74,14 @@ def measured_order(drifts: Sequence[Drift], quantity: str) -> float:
     return float(np.log(ratio) / np.log(coarse.step / fine.step))
 
 
-def _run(scene: object, integrator: str, rate: float) -> object:
+def _run(scene: Scene, integrator: str, rate: float) -> Run:
     from iapb.contact.laws import ImpulseAugmented
     from iapb.simulation import simulate
 
-    return simulate(scene.with_values({"rate": rate}), ImpulseAugmented(integrator))  # type: ignore[attr-defined]
+    return simulate(scene.with_values({"rate": rate}), ImpulseAugmented(integrator))
 
 
-def _angular_momentum(mechanism: object, q: Floats, v: Floats) -> Floats:
+def _angular_momentum(mechanism: Mechanism, q: Floats, v: Floats) -> Floats:
     """About the centre of mass, world axes [N m s]."""
-    momentum: Floats = mechanism.centroidal_momentum(q, v)[3:]  # type: ignore[attr-defined]
+    momentum: Floats = mechanism.centroidal_momentum(q, v)[3:]
     return momentum
