@@ -11,6 +11,7 @@ takes a tenth of the one and a hundredth of the other. In Python a block has the
 from __future__ import annotations
 
 import hashlib
+import inspect
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -46,13 +47,21 @@ def _source_stamp() -> str:
 _STAMP = _source_stamp()
 
 
+def _stamp_of(function: Callable[..., Any]) -> str:
+    """What a kernel depends on: all kernels of the engine, and its own file where that lies elsewhere."""
+    path = Path(inspect.getfile(function))
+    if path.is_relative_to(Path(__file__).parent):
+        return _STAMP
+    return hashlib.sha256(_STAMP.encode() + path.read_bytes()).hexdigest()
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function as a kernel (see the file's docstring); cached until any file with kernels changes."""
     compiled = njit(fastmath=False, _nrt=False)(function)
     if config.DISABLE_JIT:
         return compiled
     compiled.enable_caching()
-    compiled._cache._cache_file._source_stamp = _STAMP  # numba has no public way to say what a kernel depends on
+    compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
     return compiled
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.compiled import block, copy_into, kernel
+from iapb.contact.kernels.step import contact_state
 from iapb.run import ContactTable, ImpactTable
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
@@ -96,19 +97,9 @@ def write_step(record, k, step, state, port):
     copy_into(record.impulse[k], state.impulse)
     copy_into(record.environment_force[k], port.environment_force)
     copy_into(record.device_force[k], port.device_force)
-    record.state[k] = state.state_of_tree[port.tool_tree] if port.tool_tree >= 0 else _busiest(state)
+    record.state[k] = contact_state(state, port.tool_tree)
     _write_contacts(record, k, state)
     _write_impacts(record, step, state)
-
-
-@kernel
-def _busiest(state):
-    """Without a hand: colliding if any tree collides, else resting if any rests."""
-    found = 0
-    for t in range(state.state_of_tree.shape[0]):
-        if state.state_of_tree[t] == 1 or (state.state_of_tree[t] == 2 and found == 0):
-            found = state.state_of_tree[t]
-    return found
 
 
 @kernel

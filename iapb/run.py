@@ -105,6 +105,7 @@ class Run:
     chunk_steps: Integers = field(default_factory=lambda: np.zeros(0, np.int64))  # steps per timed chunk
     chunk_seconds: Floats = field(default_factory=lambda: np.zeros(0))  # wall time of each chunk
     kernel: str = "compiled"  # or "python"
+    stopped: str = ""  # why an incomplete run ends where it does; empty for a complete one
 
     @property
     def steps(self) -> int:

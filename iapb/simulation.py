@@ -26,7 +26,7 @@ from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.kernels import couple, drive_device
 from iapb.mechanics.energy import energy_of_run
 from iapb.recording import Record, chunk_steps, contact_table, impact_table, joined, make_record, write_step
-from iapb.run import EffectRow, Run
+from iapb.run import COLLIDING, FREE, RESTING, EffectRow, Run
 from iapb.scene import Scene, load_scene
 from iapb.system import System
 
@@ -34,6 +34,12 @@ Floats = NDArray[np.float64]
 
 _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
                       "device_actuator_work")
+_STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
+
+INTERRUPTED = "interrupted"  # what `Run.stopped` says after Ctrl-C
+DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
+_FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
+                                              "for this coupling and delay"}
 
 
 class Checkpoint(Protocol):
@@ -59,7 +65,8 @@ def compiled_steps(  # type: ignore[no-untyped-def]
         status = advance(world, state, port.applied)
         if status:
             return k, status
-        drive_device(world, state, port)
+        if not drive_device(world, state, port):
+            return k, DEVICE_NOT_FINITE
         write_step(record, k, first + k, state, port)
     return steps, 0
 
@@ -82,11 +89,13 @@ class Simulation:
     def __init__(self, scene: Scene | str | Path, law: ContactLaw | None = None,
                  coupling: Coupling | None = None) -> None:
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        self.law: Any = ImpulseAugmented() if law is None else law
+        self.law: Any = ImpulseAugmented() if law is None else _checked_law(law)
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
+        if not isinstance(self.coupling, Coupling):
+            raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
         self.system = System(self.scene)
         self.state = self.system.make_state()
-        self.compiled = isinstance(self.law, ImpulseAugmented | Penalty)
+        self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.world = self.system.world_under(self.law if self.compiled else Penalty())
         self.port = self.system.make_port(self.coupling, getattr(self.law, "rendering", "full"))
         self.steps_done = 0
@@ -97,7 +106,7 @@ class Simulation:
         return self.steps_done * self.system.dt
 
     def step(self, hand_force: ArrayLike | None = None) -> StepResult:
-        """Do one step and return it.
+        """Do one step and return it; the arrays are copies, and q and v those at the end of the step.
 
         Parameters
         ----------
@@ -109,7 +118,7 @@ class Simulation:
         ArgumentError
             A force of the wrong shape or not finite, or a hand force in a scene without a hand.
         IapbError
-            The step cannot be done (see `iapb.contact.kernels.step`).
+            The step cannot be done (see `iapb.contact.kernels.step`), or the law returned what is no step.
         """
         if hand_force is not None:
             self._grip(hand_force)
@@ -117,9 +126,10 @@ class Simulation:
         result: StepResult = self.law.advance(self.system, self.state, self.port.applied, self.system.dt)
         if not self.compiled:
             self._take(result)
-        drive_device(self.world, self.state, self.port)
+        if not drive_device(self.world, self.state, self.port):
+            raise IapbError(_FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
-        return result
+        return result._replace(q=self.state.q.copy(), v=self.state.v.copy())
 
     def _grip(self, hand_force: ArrayLike) -> None:
         force = np.asarray(hand_force, dtype=np.float64)
@@ -132,29 +142,41 @@ class Simulation:
 
     def _take(self, result: StepResult) -> None:
         """Copy what a law written in Python returned into the state that the device and the record read."""
-        state = self.state
-        pairs = ((state.q, result.q), (state.v, result.v), (state.penalty_force, result.penalty_force),
-                 (state.friction_force, result.friction_force), (state.impulse, result.impulse))
-        for target, values in pairs:
-            if not np.all(np.isfinite(values)):
-                raise IapbError(f"the law {self.law.name!r} returned a value that is not finite at step "
-                                f"{self.steps_done}")
-            target[:] = values
+        state, law = self.state, f"the law {self.law.name!r} returned"
+        if not isinstance(result, StepResult):
+            raise ArgumentError(f"{law} result", result, "a StepResult")
+        if result.state not in (FREE, COLLIDING, RESTING):
+            raise ArgumentError(f"{law} state", result.state, "FREE, COLLIDING or RESTING")
+        for name in _STEP_VECTORS:
+            target, values = getattr(state, name), np.asarray(getattr(result, name))
+            if values.shape != target.shape or not np.all(np.isfinite(values)):
+                raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
+        for name in _STEP_VECTORS:
+            getattr(state, name)[:] = getattr(result, name)
         if self.system.tool_tree >= 0:
             state.state_of_tree[self.system.tool_tree] = result.state
         else:
             state.state_of_tree[:] = result.state
 
-    def advance_chunk(self, record: Record, steps: int) -> tuple[int, int]:
-        """Do up to `steps` steps and record them; return (steps done, status)."""
+    def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
+        """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
         if self.compiled:
             done, status = compiled_steps(self.world, self.state, self.port, record, self.steps_done, steps)
             self.steps_done += done
-            return done, status
+            return done, IapbError(_FAILURES[status]) if status else None
         for k in range(steps):
-            self.step()
+            try:
+                self.step()
+            except (IapbError, KeyboardInterrupt) as stop:
+                return k, stop
             write_step(record, k, self.steps_done - 1, self.state, self.port)
-        return steps, 0
+        return steps, None
+
+
+def _checked_law(law: Any) -> Any:
+    if isinstance(law, type) or not all(hasattr(law, name) for name in ("name", "settings", "advance")):
+        raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...)")
+    return law
 
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
@@ -168,39 +190,46 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     scene : Scene, or the path of a scene file.
     law, coupling : see `Simulation`.
     world : name of the combination for the record, such as ``"IAPB"``; default: law and coupling.
-    steps : number of steps; default: the scene's duration times its rate.
+    steps : number of steps, at least 1; default: the scene's duration times its rate.
     progress : called as progress(steps done, steps in all) after every chunk.
     checkpoint : called with the run so far after a chunk, where its ``due`` is true.
 
     Returns
     -------
     Run
-        ``complete`` is False where the loop was interrupted (Ctrl-C) or could not go on; the arrays then end at the
-        last whole chunk or step.
+        ``complete`` is False where the loop was interrupted (Ctrl-C) or could not go on, and ``stopped`` says why;
+        the arrays then end at the last whole chunk or step.
 
     Raises
     ------
     SceneError, ArgumentError
         The scene or the arguments cannot be used.
-    IapbError
-        The very first step cannot be done.
+    IapbError, KeyboardInterrupt
+        Stopped before the first step was done: there is nothing to return.
     """
     simulation = Simulation(scene, law, coupling)
-    total = simulation.scene.steps if steps is None else steps
+    total = simulation.scene.steps if steps is None else _step_count(steps)
     recording = _Recording(simulation)
-    status = 0
+    stop: BaseException | None = None
     try:
-        while recording.steps < total and status == 0:
-            status = recording.chunk(total)
+        while recording.steps < total and stop is None:
+            stop = recording.chunk(total)
             if progress is not None:
                 progress(recording.steps, total)
             if checkpoint is not None and recording.steps < total and checkpoint.due:
-                checkpoint(recording.run(world, complete=False))
-    except KeyboardInterrupt:
-        pass
-    if status and recording.steps == 0:
-        raise IapbError(STATUS_TEXT[status])
-    return recording.run(world, complete=recording.steps == total)
+                checkpoint(recording.run(world, "not finished when this was written"))
+    except KeyboardInterrupt as interrupt:
+        stop = interrupt
+    if stop is not None and recording.steps == 0:
+        raise stop
+    why = INTERRUPTED if isinstance(stop, KeyboardInterrupt) else str(stop)
+    return recording.run(world, "" if recording.steps == total else why)
+
+
+def _step_count(steps: Any) -> int:
+    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
+        raise ArgumentError("steps", steps, "a whole number >= 1")
+    return int(steps)
 
 
 class _Recording:
@@ -217,22 +246,22 @@ class _Recording:
         self.seconds: list[float] = []
         self.steps = 0
 
-    def chunk(self, total: int) -> int:
-        """Do the next chunk; return its status."""
+    def chunk(self, total: int) -> BaseException | None:
+        """Do and keep the next chunk; return what stopped it before its end."""
         system, port = self.simulation.system, self.simulation.port
         size = chunk_steps(system.capacity, total - self.steps)
         coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
         record = make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs))
         started = time.perf_counter()
-        done, status = self.simulation.advance_chunk(record, size)
+        done, stop = self.simulation.advance_chunk(record, size)
         self.seconds.append(time.perf_counter() - started)
         self.records.append(record)
         self.sizes.append(done)
         self.steps += done
-        return status
+        return stop
 
-    def run(self, world: str, complete: bool) -> Run:
-        """Everything recorded so far as a Run."""
+    def run(self, world: str, stopped: str) -> Run:
+        """Everything recorded so far as a Run; `stopped` says why it is not complete."""
         simulation, system = self.simulation, self.simulation.system
         states = {
             name: np.concatenate([first[None], joined(self.records, self.sizes, name)])
@@ -246,7 +275,7 @@ class _Recording:
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
-            coupling_settings=dict(coupling.settings), dt=system.dt, complete=complete,
+            coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
             coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
             velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
             body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
@@ -254,7 +283,7 @@ class _Recording:
             contacts=contact_table(self.records, self.sizes), impacts=impact_table(self.records, self.sizes),
             energy={}, effects=_effects(simulation),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
-            kernel="compiled" if simulation.compiled else "python",
+            kernel="compiled" if simulation.compiled else "python", stopped=stopped,
         )  # fmt: skip
         return replace(run, energy=_energy(run, system))
 

@@ -70,7 +70,7 @@ class System:
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""
-        key = (type(law).__name__, law.integrator, law.rendering)
+        key = (law.impulses, law.integrator, law.rendering)
         if key not in self._worlds:
             self._worlds[key] = make_world(self, law)
         return self._worlds[key]
@@ -196,6 +196,9 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Po
         wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
         point[: len(hand.point)] = hand.point
     gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
+    for name, values in gains.items():
+        if len(values) != size:  # the kernels would read past the end
+            raise ArgumentError(f"coupling {name}", values, f"{size} values, one for each coordinate of the tool")
     zeros = {name: np.zeros(d) for name in ("hand_force", "coupling_force", "environment_force", "applied")}
     tool_zeros = {name: np.zeros(size) for name in (
         "device_hand_force", "device_force", "error", "acceleration", "measured_v")}
@@ -205,9 +208,9 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Po
         hand_point=point, wrench=wrench, stiffness=_per_coordinate(gains.get("stiffness"), size),
         damping=_per_coordinate(gains.get("damping"), size), mechanism=device.arrays, body=device.workspace(),
         varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
-        device_lower=lower, device_damping=_per_coordinate(damping, size), damped=damping is not None,
+        device_lower=lower, device_damping=_per_coordinate(damping, size), damped=any(damping or ()),
         force_limit=_per_coordinate(limit, size, np.inf), limited=limit is not None and rendering != "full",
-        resolution=_per_coordinate(resolution, nq), quantised=resolution is not None,
+        resolution=_per_coordinate(resolution, nq), quantised=any(resolution or ()),
         delayed_force=np.zeros((slots, size)), delayed_q=np.zeros((slots, nq)), delayed_v=np.zeros((slots, size)),
         sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_), clock=np.zeros(1, np.int64),
         **zeros, **tool_zeros,

@@ -13,7 +13,7 @@ from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
 LAW_USES = {
     "impulse-augmented penalty": frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS}),
-    "penalty": frozenset({PENALTY, FRICTION, CLUSTERS}),
+    "penalty": frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS}),  # new contacts are marked in the record
     "rigid constraints": frozenset[str](),
 }
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}

@@ -10,6 +10,7 @@ PD = K (x_d − x_t) + B (ẋ_d − ẋ_t):
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,8 +39,9 @@ class _PositionCoupling:
 
     def __post_init__(self) -> None:
         for name, values in (("stiffness", self.stiffness), ("damping", self.damping)):
-            if not all(value >= 0.0 for value in values) or len(values) != len(self.stiffness):
-                raise ArgumentError(name, values, "one value >= 0 for each coordinate of the tool")
+            good = all(math.isfinite(value) and value >= 0.0 for value in values)
+            if not good or len(values) != len(self.stiffness):
+                raise ArgumentError(name, values, "one finite value >= 0 for each coordinate of the tool")
 
     @property
     def settings(self) -> dict[str, Any]:

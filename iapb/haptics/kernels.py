@@ -9,6 +9,7 @@ import numpy as np
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.cholesky import cholesky, solve_mass
 from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.step import LARGEST_SPEED
 from iapb.mechanics.kernels import (
     MechanismArrays,
     Workspace,
@@ -89,14 +90,25 @@ def couple(world, state, port):
 
 @kernel
 def feel_hand(world, state, port):
-    """J_hᵀF_h on the tool where it is, and on the device where it is."""
+    """J_hᵀF_h on the tool where it is, and on the device where it is; nothing while the hand holds still."""
     port.hand_force[:] = 0.0
+    port.device_hand_force[:] = 0.0
+    if not pushes(port):
+        return
     forward_kinematics(world.mechanism, state.q, state.body)
     press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
     if port.coupling != NO_COUPLING:
-        port.device_hand_force[:] = 0.0
         forward_kinematics(port.mechanism, port.device_q, port.body)
         press(port.mechanism, port.body, port.device_body, port, port.device_hand_force)
+
+
+@kernel
+def pushes(port):
+    """Does the hand do anything?"""
+    pushing = False
+    for k in range(port.wrench.shape[0]):
+        pushing = pushing or port.wrench[k] != 0.0
+    return pushing
 
 
 @kernel
@@ -135,12 +147,16 @@ def measure(world, port):
 
 @kernel
 def sense(world, port, velocity):
-    """Positions rounded to the sensors' resolution; velocity as their difference over one step."""
+    """Positions rounded to the sensors' resolution, and their difference over one step as velocity.
+
+    Exact where the resolution is 0; at the first reading, which has none to differ from, the velocity is exact too.
+    """
     first = port.clock[0] == 0
     for k in range(port.sensed_q.shape[0]):
         step = port.resolution[k]
         read = round(port.device_q[k] / step) * step if step > 0.0 else port.device_q[k]
-        velocity[k] = 0.0 if first else (read - port.sensed_q[k]) / world.dt
+        exact = first or step == 0.0
+        velocity[k] = port.device_v[k] if exact else (read - port.sensed_q[k]) / world.dt
         port.sensed_q[k] = read
 
 
@@ -160,31 +176,35 @@ def coordinate(state, port):
 
 @kernel
 def drive_device(world, state, port):
-    """Render F_env (26) and move the device: M ẍ = F_h + F_env,applied − PD − b ẋ."""
+    """Render F_env (26) and move the device: M ẍ = F_h + F_env,applied − PD − b ẋ. False: it left all bounds."""
     for k in range(port.environment_force.shape[0]):
         contact = state.penalty_force[k] + state.friction_force[k]
         port.environment_force[k] = contact + state.impulse[k] / world.dt
     if port.coupling == NO_COUPLING:
-        return
+        return True
     command(port)
     a = port.acceleration
     for i in range(a.shape[0]):
         a[i] = port.device_hand_force[i] + port.device_force[i]
         if port.damped:
             a[i] -= port.device_damping[i] * port.device_v[i]
+    finite = True
     if port.varying_inertia:
+        forward_kinematics(port.mechanism, port.device_q, port.body)
         mass_matrix(port.mechanism, port.body, port.device_mass)
-        cholesky(port.device_mass, port.device_lower)
+        finite = cholesky(port.device_mass, port.device_lower) == 0
         bias(port.mechanism, port.body, port.device_v, port.error)
         for i in range(a.shape[0]):
             a[i] -= port.error[i]
     solve_mass(port.device_lower, a, a)
     for i in range(a.shape[0]):
         port.device_v[i] += world.dt * a[i]
+        finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
     integrate(port.mechanism, port.device_q, port.device_v, world.dt, port.device_q)
     port.clock[0] += 1
-    if port.coupling == UNILATERAL:
+    if port.coupling == UNILATERAL and finite:
         engage(world, state, port)
+    return finite
 
 
 @kernel

@@ -116,7 +116,8 @@ def resolve_group(world, state, group):
     minimum_norm_impulses(work.rows, work.length, count, work.basis, rank, work.change[:size], state.row_impulse,
                           work.columns, state.triangle, state.target)
     for r in range(count):
-        state.contact_impulse[state.rows[r]] += share * state.row_impulse[r]
+        if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
+            state.contact_impulse[state.rows[r]] = share * state.row_impulse[r]
     log_impact(state, group, count, rank, share, clamp, lost, size)
 
 

@@ -6,8 +6,6 @@ The Penalty law is the same page with the impulses switched off (e = −1, claim
 
 from __future__ import annotations
 
-import math
-
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
@@ -17,7 +15,11 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.mechanics.kernels import bias, forward_kinematics, gravity, integrate, mass_matrix
-from iapb.run import COLLIDING, RESTING
+from iapb.run import COLLIDING, FREE, RESTING
+
+# Faster than this [m/s, rad/s] no product of masses, stiffnesses, displacements and speeds is sure to be finite: the
+# motion has diverged. (Scenes hold numbers up to 1e9.)
+LARGEST_SPEED = 1e100
 
 OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
 STATUS_TEXT = {
@@ -39,6 +41,20 @@ def advance(world, state, applied):
         if world.switches.impulses:
             resolve_collisions(world, state)
     return move(world, state, applied)
+
+
+@kernel
+def contact_state(state, tool_tree):
+    """State of the tool's group; without a hand: colliding if any tree collides, else resting if any rests."""
+    if tool_tree >= 0:
+        return state.state_of_tree[tool_tree]
+    found = FREE
+    for t in range(state.state_of_tree.shape[0]):
+        if state.state_of_tree[t] == COLLIDING:
+            return COLLIDING
+        if state.state_of_tree[t] == RESTING:
+            found = RESTING
+    return found
 
 
 @kernel
@@ -128,7 +144,7 @@ def move(world, state, applied):
     finite = True
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
-        finite = finite and math.isfinite(state.v[k])
+        finite = finite and abs(state.v[k]) < LARGEST_SPEED  # False for NaN too
     velocity = state.v if world.semi_implicit else state.mean_v
     integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
     return OK if finite else NOT_FINITE
@@ -172,6 +188,8 @@ def rest(world, state, stage):
     if stage > 0:
         contacts = state.stage_contacts
         count = touching(world, state, contacts)
+        if world.switches.clustering:
+            count = cluster(contacts, count, world.cluster_distance)
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0

@@ -1,0 +1,233 @@
+"""Blocks hand whole rooms of arrays to kernels; kernels cannot allocate, and that is checked by the compiler."""
+
+from __future__ import annotations
+
+import ast
+import gc
+import importlib.util
+import math
+import pickle
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+from numba.core.errors import NumbaError
+
+import iapb.run
+from iapb.compiled import Block, block, copy_into, kernel
+
+ENGINE = Path(iapb.run.__file__).parent
+
+
+def zeros(x):
+    made = np.zeros(3)
+    made[0] = x[0]
+    return made[0]
+
+
+def empty_like(x):
+    made = np.empty_like(x)
+    made[0] = x[0]
+    return made[0]
+
+
+def copy(x):
+    return x.copy()[0]
+
+
+def expression(x):
+    return (x + x)[0]
+
+
+def fancy(x):
+    return x[x > 0.0][0]
+
+
+def growing_list(x):
+    made = [x[0]]
+    made.append(x[1])
+    return made[-1]
+
+
+def view(x):
+    """A slice is no allocation."""
+    return x[1:][0]
+
+
+def tuples(x):
+    """Nor is a tuple."""
+    y = (x[0], x[1])
+    return y[0] + y[1]
+
+
+@pytest.mark.parametrize("function", [zeros, empty_like, copy, expression, fancy, growing_list])
+def test_a_kernel_that_would_allocate_does_not_compile(function):
+    x = np.array([1.0, 2.0, 3.0])
+    assert njit(function)(x) == function(x)  # numba itself would
+    with pytest.raises(NumbaError):
+        kernel(function)(x)
+
+
+@pytest.mark.parametrize("function", [view, tuples])
+def test_a_kernel_without_allocation_compiles(function):
+    x = np.array([1.0, 2.0, 3.0])
+    assert kernel(function)(x) == function(x)
+
+
+def imported_modules(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("iapb"):
+            found |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
+    return found
+
+
+def reached_from(start: str) -> dict[str, Path]:
+    """Modules of the engine that a module imports, directly or not."""
+    found: dict[str, Path] = {}
+    waiting = [start]
+    while waiting:
+        name = waiting.pop()
+        stem = ENGINE.parent.joinpath(*name.split("."))
+        path = next((p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()), None)
+        if path is not None and name not in found:
+            found[name] = path
+            waiting += imported_modules(path)
+    return found
+
+
+def test_every_kernel_that_the_loop_can_reach_is_compiled_without_an_allocator():
+    """`njit` alone, which may allocate, is named nowhere but where `kernel` is made of it."""
+    reached = reached_from("iapb.haptics.kernels") | reached_from("iapb.recording")
+    assert {"iapb.contact.kernels.step", "iapb.contact.kernels.collide", "iapb.mechanics.kernels"} <= reached.keys()
+    for name, path in reached.items():
+        if name != "iapb.compiled":
+            names = {node.id for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Name)}
+            assert "njit" not in names, name
+
+
+def test_kernels_are_compiled_without_fastmath_and_call_no_blas():
+    dots = (ast.MatMult,)
+    for path in ENGINE.rglob("*.py"):
+        if "kernels" not in path.parts and path.name != "kernels.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            assert not (isinstance(node, ast.BinOp) and isinstance(node.op, dots)), path
+            assert not (isinstance(node, ast.Attribute) and node.attr in ("dot", "linalg", "matmul", "einsum")), path
+            assert not (isinstance(node, ast.keyword) and node.arg == "fastmath"), path
+    assert kernel(view).targetoptions["fastmath"] is False
+
+
+# --- blocks -----------------------------------------------------------------------------------------------------------
+
+
+class Inner(NamedTuple):
+    flag: bool
+    table: np.ndarray  # (n, m)
+
+
+class Outer(NamedTuple):
+    count: int
+    inner: Inner
+    weight: float
+    vector: np.ndarray
+    mask: np.ndarray
+    small: np.ndarray
+
+
+@kernel
+def read(b, out):
+    out[0] = b.count
+    out[1] = b.weight
+    out[2] = 1.0 if b.inner.flag else 0.0
+    out[3] = b.inner.table.shape[0]
+    out[4] = b.inner.table.shape[1]
+    total = 0.0
+    for i in range(b.inner.table.shape[0]):
+        for j in range(b.inner.table.shape[1]):
+            total += (i + 1) * (j + 2) * b.inner.table[i, j]
+    out[5] = total
+    out[6] = b.vector[-1]
+    hits = 0
+    for k in range(b.mask.shape[0]):
+        if b.mask[k]:
+            hits += k + 1
+    out[7] = hits
+    out[8] = b.small[0]
+
+
+@kernel
+def write(b):
+    b.vector[0] = 42.0
+    b.inner.table[0, 0] = -1.0
+    b.mask[0] = not b.mask[0]
+
+
+def outer(count=3, flag=True, weight=0.5, shape=(2, 3), mask=(True, False, True)):
+    table = np.arange(float(math.prod(shape))).reshape(shape)
+    return Outer(count, Inner(flag, table), weight, np.array([1.5, -2.5]), np.array(mask), np.array([7], np.int8))
+
+
+@given(st.integers(-(2**62), 2**62), st.booleans(), st.floats(allow_nan=False), st.tuples(*[st.integers(1, 4)] * 2),
+       st.lists(st.booleans(), min_size=1, max_size=5))  # fmt: skip
+def test_a_kernel_reads_from_a_block_what_python_reads(count, flag, weight, shape, mask):
+    made, out = block(outer(count, flag, weight, shape, mask)), np.zeros(9)
+    read(made, out)
+    table = made.inner.table
+    total = sum((i + 1) * (j + 2) * table[i, j] for i in range(shape[0]) for j in range(shape[1]))
+    hits = sum(k + 1 for k, on in enumerate(mask) if on)
+    assert out.tolist() == [float(count), weight, float(flag), *shape, total, -2.5, hits, 7.0]
+
+
+def test_a_kernel_writes_to_the_arrays_themselves():
+    plain = outer()
+    write(block(plain))
+    assert plain.vector[0] == 42.0 and plain.inner.table[0, 0] == -1.0 and not plain.mask[0]
+
+
+def test_a_block_keeps_its_arrays_alive():
+    made, out = block(outer(shape=(60, 60))), np.zeros(9)
+    gc.collect()
+    churn = [np.full(3600, np.nan) for _ in range(200)]
+    read(made, out)
+    assert len(churn) == 200 and np.isfinite(out).all() and out[3] == 60
+
+
+def test_a_block_is_made_once_and_has_the_tuples_names_alone():
+    made = block(outer())
+    assert block(made) is made and isinstance(made.inner, Block)
+    with pytest.raises(AttributeError):
+        made.nothing  # noqa: B018
+    with pytest.raises(NumbaError, match="nothing"):
+        kernel(lambda b: b.nothing)(made)
+
+
+def test_types_of_blocks_differ_where_their_fields_do_and_survive_a_file():
+    same, other = block(outer()), block(outer()._replace(small=np.array([7], np.int64)))
+    assert block(outer(count=9, shape=(5, 1))).block_type == same.block_type
+    assert other.block_type != same.block_type
+    out = np.zeros(9)
+    read(other, out)
+    assert out[8] == 7.0  # compiled anew, with another width
+    assert pickle.loads(pickle.dumps(same.block_type)) == same.block_type
+
+
+@given(st.lists(st.floats(allow_nan=False), max_size=6))
+def test_copy_into_copies(values):
+    source, target = np.array(values, float), np.zeros(len(values))
+    copy_into(target, source)
+    assert np.array_equal(source, target)
+
+
+def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(tmp_path):
+    path, x = tmp_path / "own_kernel.py", np.array([2.0])
+    for factor in (3.0, 5.0):
+        path.write_text(f"from iapb.compiled import kernel\n\n\n@kernel\ndef scaled(x):\n    return {factor} * x[0]\n")
+        spec = importlib.util.spec_from_file_location("own_kernel", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        assert module.scaled(x) == factor * 2.0

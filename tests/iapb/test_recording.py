@@ -1,0 +1,72 @@
+"""What the loop writes is what the step did, chunk by chunk, contact by contact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.contact.laws import ImpulseAugmented
+from iapb.recording import chunk_steps
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from iapb.simulation import Simulation, simulate
+from iapb.system import coupling_of
+
+STEPS = 300
+CONTACT_FIELDS = ("body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
+                  "is_new")  # fmt: skip
+
+
+@given(st.integers(0, 10_000_000), st.integers(1, 100_000))
+def test_chunks_go_forward_and_bound_time_and_memory(contacts, remaining):
+    steps = chunk_steps(contacts, remaining)
+    assert 1 <= steps <= min(remaining, 512)
+    assert steps == 1 or steps * contacts <= 200_000
+
+
+@pytest.mark.parametrize(
+    ("name", "coupling"), [("peg_corner", "four-channel"), ("arm_pushing", "unilateral"), ("newton_cradle", "none")]
+)
+def test_the_record_holds_what_each_step_did(name, coupling):
+    scene = load_scene(find_scene(name))
+    chosen = coupling_of(scene, coupling)
+    run = simulate(scene, ImpulseAugmented(), chosen, steps=STEPS)
+    simulation = Simulation(scene, ImpulseAugmented(), chosen)
+    impact = 0
+    for k in range(STEPS):
+        simulation.step()
+        state, port = simulation.state, simulation.port
+        rows = slice(run.contacts.offsets[k], run.contacts.offsets[k + 1])
+        count = state.contact_count[0]
+        assert rows.stop - rows.start == count
+        for field in CONTACT_FIELDS:
+            assert np.array_equal(getattr(run.contacts, field)[rows], getattr(state.contacts, field)[:count]), field
+        assert np.array_equal(run.contacts.impulse[rows], state.contact_impulse[:count])
+        for field in ("hand_force", "coupling_force", "environment_force"):
+            assert np.array_equal(getattr(run, field)[k], getattr(port, field)), field
+        for i in range(state.impacts.logged[0]):
+            assert run.impacts.step[impact] == k
+            for field in ("group", "rows", "rank", "scale", "clamp", "energy_lost", "v_minus", "v_plus", "impulse"):
+                assert np.array_equal(getattr(run.impacts, field)[impact], getattr(state.impacts, field)[i]), field
+            impact += 1
+    assert impact == len(run.impacts.step)
+    assert len(run.contacts.gap) == run.contacts.offsets[-1] > 0
+
+
+def test_rendered_force_is_contact_forces_and_impulse_over_the_step():
+    """(26)"""
+    run = simulate(load_scene(find_scene("peg_corner")), steps=STEPS)
+    rendered = run.penalty_force + run.friction_force + run.impulse / run.dt
+    assert run.environment_force == pytest.approx(rendered, rel=1e-14, abs=1e-14)
+
+
+def test_time_and_names_fit_the_arrays():
+    scene = load_scene(find_scene("arm_pushing"))
+    run = simulate(scene, coupling=coupling_of(scene, "four-channel"), steps=5)
+    assert run.time == pytest.approx(np.arange(6) / scene.rate, rel=1e-15)
+    assert len(run.coordinate_names) == len(run.coordinate_units) == run.q.shape[1]
+    assert run.device_q.shape == (6, 2) and run.device_force.shape == (5, 2)
+    assert run.scene_source == scene.source_text and run.scene_resolved == scene.resolved()
+    assert run.world == f"{run.law} + {run.coupling}" and run.coupling == "four-channel"

@@ -1,0 +1,109 @@
+"""From a scene to arrays: the tool, the device, the switches, and mistakes that only show here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError
+from iapb.haptics.coupling import FourChannel, NoCoupling
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene, scene_names
+from iapb.system import System, coupling_of
+
+PEG = load_scene(find_scene("peg_corner"))
+ARM = load_scene(find_scene("arm_pushing"))
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_state_starts_where_the_scene_says(name):
+    scene = load_scene(find_scene(name))
+    system = System(scene)
+    state = system.make_state()
+    assert state.q.tolist() == [x for body in scene.bodies for x in body.position]
+    assert state.v.tolist() == [x for body in scene.bodies for x in body.velocity]
+    assert state.mass_matrix == pytest.approx(system.mechanism.mass_matrix(state.q), abs=0.0)
+    assert np.tril(state.lower) @ np.tril(state.lower).T == pytest.approx(state.mass_matrix, rel=1e-14)
+    assert system.dt == 1.0 / scene.rate
+
+
+@pytest.mark.parametrize("scene", [PEG, ARM], ids=lambda scene: scene.name)
+def test_the_device_is_the_hand_held_tree_alone(scene):
+    system = System(scene)
+    device, q = system.device_mechanism(), system.make_state().q
+    tool, coordinates = slice(*system.tool_dofs), slice(*system.tool_coordinates)
+    assert device.nv == tool.stop - tool.start
+    assert device.mass_matrix(q[coordinates]) == pytest.approx(system.mechanism.mass_matrix(q)[tool, tool], abs=1e-15)
+    port = system.make_port(coupling_of(scene, "four-channel"))
+    assert np.array_equal(port.device_q, q[coordinates])
+
+
+def test_the_tool_is_found_behind_other_bodies():
+    """The hand may hold any tree: ranges follow the bodies, not the first place."""
+    bodies = [body.model_dump() for body in ARM.bodies]
+    turned = ARM.with_values({"bodies": [bodies[2], bodies[0], bodies[1]]})
+    assert System(ARM).tool_dofs == (0, 2) and System(turned).tool_dofs == (3, 5)
+    first, second = System(ARM).device_mechanism(), System(turned).device_mechanism()
+    assert first.names == second.names
+    assert first.mass_matrix([0.3, 0.4]) == pytest.approx(second.mass_matrix([0.3, 0.4]), abs=0.0)
+
+
+def test_the_hand_pulls_with_the_transpose_of_the_jacobian_where_it_holds():
+    """J_hᵀF_h against the mechanism's own Jacobian, with a torque."""
+    from iapb.haptics.kernels import couple
+
+    scene = ARM.with_values({"hand.force": [2.0, -1.0, 0.3]})
+    system = System(scene)
+    world, state, port = system.world_under(Penalty()), system.make_state(), system.make_port(NoCoupling())
+    couple(world, state, port)
+    body = system.mechanism.index("forearm")
+    rotation, origin = system.mechanism.placements(state.q)
+    point = origin[body] + rotation[body] @ np.array([*scene.hand.point, 0.0])
+    expected = system.mechanism.point_jacobian(state.q, body, point).T @ [2.0, -1.0, 0.0]
+    expected += 0.3 * system.mechanism.frame_jacobian(state.q, body)[5]
+    assert port.hand_force == pytest.approx(expected, abs=1e-13)
+    assert np.array_equal(port.applied, port.hand_force)
+
+
+def test_worlds_differ_by_what_a_law_sets_and_are_made_once():
+    system = System(PEG)
+    assert system.world_under(Penalty()) is system.world_under(Penalty())
+    laws = [Penalty(), ImpulseAugmented(), ImpulseAugmented(rendering="scale"), ImpulseAugmented("midpoint")]
+    assert len({id(system.world_under(law)) for law in laws}) == 4
+    switches = [system.world_under(law).switches for law in laws]
+    assert [each.impulses for each in switches] == [False, True, True, True]
+    assert [each.impulse_limit for each in switches] == [False, False, True, False]
+    assert np.all(np.isinf(system.world_under(laws[1]).impulse_limit))
+    assert system.world_under(laws[2]).impulse_limit.tolist() == list(PEG.device.force_limit)
+
+
+def test_limits_are_those_of_the_tools_coordinates_alone():
+    limit = System(ARM).world_under(ImpulseAugmented(rendering="spread")).impulse_limit
+    assert limit.tolist() == [5.0, 5.0, np.inf, np.inf, np.inf]
+
+
+def test_couplings_come_from_the_scene_and_their_absence_is_said():
+    assert coupling_of(PEG, "four-channel").settings["stiffness"] == [100.0, 100.0, 0.5]
+    assert coupling_of(PEG, "none") == NoCoupling()
+    with pytest.raises(ArgumentError, match="coupling = 'spring': expected one of none, four-channel, unilateral"):
+        coupling_of(PEG, "spring")
+    with pytest.raises(ArgumentError, match="two_discs gives no gains"):
+        coupling_of(load_scene(find_scene("two_discs")), "unilateral")
+
+
+@pytest.mark.parametrize("gains", [((1.0,), (1.0,)), ((1.0,) * 4, (1.0,) * 4)])
+def test_gains_for_another_tool_are_refused_before_a_kernel_reads_them(gains):
+    with pytest.raises(ArgumentError, match="coupling stiffness = .*expected 3 values"):
+        System(PEG).make_port(FourChannel(*gains))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0])
+def test_gains_that_are_no_gains_are_refused(value):
+    with pytest.raises(ArgumentError, match="damping = .*one finite value >= 0"):
+        FourChannel((1.0,), (value,))
+
+
+def test_a_device_needs_a_hand():
+    with pytest.raises(ArgumentError, match="has no hand, so no device"):
+        System(load_scene(find_scene("two_discs"))).make_port(FourChannel((1.0,), (1.0,)))
