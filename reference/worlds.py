@@ -15,11 +15,11 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.simulation import simulate
+from iapb.simulation import INTERRUPTED, simulate
 from iapb.system import coupling_of
 
 
@@ -56,7 +56,10 @@ def find_world(name: str, rendering: str = "full") -> World:
     """The world of that name; `rendering` says how IAPB meets the device's limits (``full`` ignores them)."""
     if name not in WORLDS:
         raise ArgumentError("world", name, "one of " + ", ".join(WORLDS))
-    return WORLDS[name](rendering)
+    world = WORLDS[name](rendering)
+    if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
+        raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")
+    return world
 
 
 def run_world(
@@ -64,9 +67,21 @@ def run_world(
     name: str,
     rendering: str = "full",
     progress: Callable[[int, int], None] | None = None,
+    *,
+    partial: bool = False,
     **options: Any,
 ) -> Run:
-    """Simulate a scene in one of the paper's worlds."""
+    """Simulate a scene in one of the paper's worlds; `partial` says that an incomplete run will do too."""
     world = find_world(name, rendering)
     label = name if rendering == "full" else f"{name} {rendering}"
-    return simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
+    run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
+    return run if partial else require_complete(run)
+
+
+def require_complete(run: Run) -> Run:
+    """Return the run, or raise what stopped it: half a run is no evidence."""
+    if run.complete:
+        return run
+    if run.stopped == INTERRUPTED:
+        raise KeyboardInterrupt
+    raise IapbError(f"{run.scene_name} in the world {run.world} stopped after {run.time[-1]:g} s: {run.stopped}")

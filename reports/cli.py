@@ -62,16 +62,18 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _usage(error: Exception) -> int:
-    """Print a mistake in the command line and return its status; anything else is a fault of ours."""
-    import click
+    """Print a mistake in the command line and return its status; anything else is a fault of ours.
 
-    if isinstance(error, click.exceptions.Abort):
+    Such a mistake is known by its `show` and `exit_code`: typer brings a click of its own, or uses the one installed.
+    """
+    if isinstance(error, typer.Abort):
         print("iapb: stopped; what was finished is kept.", file=sys.stderr)
         return 130
-    if isinstance(error, click.ClickException):
-        error.show(file=sys.stderr)
-        return error.exit_code
-    raise error
+    show, status = getattr(error, "show", None), getattr(error, "exit_code", None)
+    if show is None or status is None:
+        raise error
+    show(file=sys.stderr)
+    return int(status)
 
 
 if __name__ == "__main__":

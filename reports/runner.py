@@ -28,13 +28,22 @@ class Runner:
         self.used: dict[str, Path] = {}  # label -> file, in the order of use
         self._held: dict[str, Run] = {}
 
-    def __call__(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Run:
-        """Return the run of `scene` in `world`; an interrupted run comes back with ``complete=False``."""
+    def __call__(
+        self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True, partial: bool = False
+    ) -> Run:
+        """Return the run of `scene` in `world`.
+
+        An incomplete run is stored as partial; then what stopped it is raised, or with `partial` the run returned.
+        """
+        from reference.worlds import require_complete
+
         inputs, label = self.inputs(scene, world, rendering), self.label(scene, world, rendering)
         path = self.store.path_of(inputs, label)
         if path.name not in self._held:
             run = self.store.get_or_run(inputs, self._computer(scene, world, rendering), label)
-            if not keep:
+            if not partial:
+                require_complete(run)
+            if not (keep and run.complete):
                 return run
             self._held[path.name] = run
         self.used[f"{label} {path.stem[-16:]}"] = path
@@ -61,6 +70,6 @@ class Runner:
         def compute(checkpoint: Checkpoint) -> Run:
             from reference.worlds import run_world
 
-            return run_world(scene, world, rendering, progress=self.progress, checkpoint=checkpoint)
+            return run_world(scene, world, rendering, progress=self.progress, partial=True, checkpoint=checkpoint)
 
         return compute

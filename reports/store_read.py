@@ -95,6 +95,7 @@ def _head(file: Any) -> dict[str, Any]:
     return {
         "dt": float(file.attrs["dt"]),
         "complete": file.attrs["status"] == "complete",
+        "stopped": str(file.attrs.get("stopped", "")),
         **ranges,
     }
 

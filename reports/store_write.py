@@ -75,6 +75,7 @@ def _write_head(file: Any, run: Run, key: str) -> None:
     file.attrs["format_version"] = FORMAT_VERSION
     file.attrs["title"] = f"{run.scene_name} · {run.world}"
     file.attrs["status"] = "complete" if run.complete else "partial"
+    file.attrs["stopped"] = run.stopped
     file.attrs["run_key"] = key
     file.attrs["content_hash"] = content_hash(run)
     file.attrs["dt"] = float(run.dt)

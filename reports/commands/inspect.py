@@ -18,7 +18,7 @@ def inspect(
 
     run, head = read_run(file), read_head(file)
     describe(run, existed=True)
-    print("Complete." if run.complete else "Partial: the simulation was interrupted after these steps.")
+    print("Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}.")
     if impacts and len(run.impacts.step):
         _list_impacts(run, impacts)
     print("\nEnergy at the end [J] (iapb.mechanics.energy):")

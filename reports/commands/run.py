@@ -22,21 +22,23 @@ def run(
 ) -> None:
     """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again."""
     from iapb import find_scene, load_scene
+    from iapb.simulation import INTERRUPTED
     from reports.commands.progress import step_progress
     from reports.runner import Runner
 
     source = load_scene(find_scene(scene)).with_values(parsed(set_)) if set_ else load_scene(find_scene(scene))
-    with step_progress(f"{source.name} in {world}") as progress:
-        runner = Runner(out, progress)
-        existed = runner.inputs(source, world, rendering) in runner.store
-        result = runner(source, world, rendering)
-        path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
+    runner = Runner(out)
+    inputs, label = runner.inputs(source, world, rendering), runner.label(source, world, rendering)
+    existed = inputs in runner.store
+    with step_progress(f"{source.name} in {world}") as runner.progress:
+        result = runner(source, world, rendering, partial=True)
+    path = runner.store.path_of(inputs, label)
     describe(result, existed)
     if result.complete:
         print(f"Stored in {path}")
     else:
-        print(f"Interrupted: the {result.steps} steps done are readable in {path}.partial")
-        raise typer.Exit(130)
+        print(f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {path}.partial")
+        raise typer.Exit(130 if result.stopped == INTERRUPTED else 1)
 
 
 def parsed(assignments: list[str] | None) -> dict[str, Any]:

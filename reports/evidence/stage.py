@@ -58,11 +58,12 @@ class Stage:
             return adapter.validate_python(json.loads(read_table(self.path, _RECORDS)["json"][0]))
         records = compute()
         text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
+        read_back = adapter.validate_python(json.loads(text))  # what is no such record is not written
         title = f"Records of the stage {self.name}"
         table = Table(_RECORDS, (Column("json", (text,), "1", "the records as JSON"),), title, command="iapb reproduce")
         self.path.parent.mkdir(parents=True, exist_ok=True)
         write_tables(self.path, (table, *numbers_tables(records)))
-        return adapter.validate_python(json.loads(text))
+        return read_back
 
 
 def plain_records(records: Any) -> Any:

@@ -1,0 +1,78 @@
+"""The paper's worlds by name: laws, couplings, and that half a run is no evidence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError, IapbError
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from iapb.simulation import INTERRUPTED, simulate
+from reference.worlds import WORLDS, find_world, require_complete, run_world
+
+PEG = load_scene(find_scene("peg_corner"))
+STEPS = 60
+
+COUPLINGS = {"ideal": "four-channel", "IAPB": "four-channel", "PB": "four-channel", "CBuc": "unilateral"}
+LAWS = {"ideal": "rigid constraints", "IAPB": "impulse-augmented penalty", "PB": "penalty", "CBuc": "rigid constraints"}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name):
+    world = find_world(name)
+    coupling = world.coupling_in(PEG)
+    assert (world.law.name, coupling.name) == (LAWS[name], COUPLINGS[name])
+    gains = getattr(PEG.couplings, coupling.name.replace("-", "_"))
+    assert coupling.settings == {"stiffness": list(gains.stiffness), "damping": list(gains.damping)}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_runs_as_its_parts_do(name):
+    world = find_world(name)
+    run = run_world(PEG, name, steps=STEPS)
+    parts = simulate(PEG, world.law, world.coupling_in(PEG), steps=STEPS)
+    assert run.world == name and run.complete
+    assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
+
+
+def test_without_hand_or_gains_there_is_no_coupling():
+    for name in WORLDS:
+        assert find_world(name).coupling_in(load_scene(find_scene("two_discs"))).name == "none"
+        assert find_world(name).coupling_in(PEG.with_values({"couplings": {}})).name == "none"
+
+
+def test_gains_for_the_other_coupling_alone_are_not_taken_instead():
+    with pytest.raises(ArgumentError, match="gives no gains"):
+        find_world("CBuc").coupling_in(PEG.with_values({"couplings.unilateral": None}))
+
+
+def test_a_rendering_belongs_to_iapb_and_goes_into_the_label():
+    assert find_world("IAPB", "spread").law == ImpulseAugmented(rendering="spread")
+    assert find_world("PB").law == Penalty()
+    assert run_world(PEG, "IAPB", "scale", steps=3).world == "IAPB scale"
+    for name in ("ideal", "PB", "CBuc"):
+        with pytest.raises(ArgumentError, match=f"rendering = 'spread': expected full.*{name}"):
+            find_world(name, "spread")
+    with pytest.raises(ArgumentError, match="rendering = 'clip'"):
+        find_world("IAPB", "clip")
+    with pytest.raises(ArgumentError, match="world = 'best': expected one of ideal, IAPB, PB, CBuc"):
+        find_world("best")
+
+
+def interrupt(done, total):
+    raise KeyboardInterrupt
+
+
+def test_an_incomplete_run_is_handed_on_only_to_who_asks_for_it():
+    with pytest.raises(KeyboardInterrupt):
+        run_world(PEG, "PB", progress=interrupt)
+    run = run_world(PEG, "PB", progress=interrupt, partial=True)
+    assert not run.complete and run.stopped == INTERRUPTED and 0 < run.steps < PEG.steps
+    with pytest.raises(IapbError, match="peg_corner in the world PB stopped after .* s: too fast"):
+        require_complete(replace(run, stopped="too fast"))
+    whole = replace(run, complete=True, stopped="")
+    assert require_complete(whole) is whole

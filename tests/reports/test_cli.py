@@ -1,0 +1,196 @@
+"""The command line, in process: what it does, what it says, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+
+from iapb.errors import SceneError
+from reports import cli
+from reports.commands import progress as progress_bars
+
+SHORT = ("--set", "duration=0.4")
+HEAVY = {"numpy", "numba", "cvxpy", "pinocchio", "sympy", "matplotlib", "h5py", "scipy", "coal", "flint", "hypothesis"}
+
+
+@pytest.fixture
+def iapb(capsys):
+    """Run a command line; return (status, what it printed, what it complained about)."""
+
+    def call(*arguments):
+        status = cli.main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return call
+
+
+def test_help_loads_nothing_heavy_and_lists_every_command():
+    """By imports rather than by time, which other programs share."""
+    code = ("import sys; from reports.cli import main; status = main(['--help']); "
+            "print('LOADED', *sorted({name.split('.')[0] for name in sys.modules})); sys.exit(status)")  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    text, loaded = done.stdout.split("LOADED")
+    assert not HEAVY & set(loaded.split())
+    for command in cli.COMMANDS:
+        assert command in text
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_every_command_explains_itself(command, iapb):
+    status, out, _ = iapb(command, "--help")
+    assert status == 0 and "Usage" in out
+
+
+@pytest.mark.parametrize("arguments", [["walk"], ["run"], ["run", "peg_corner", "--speed", "3"], ["inspect"], []])
+def test_wrong_usage_ends_with_2_and_says_what_is_wrong(arguments, iapb):
+    status, out, err = iapb(*arguments)
+    assert status == 2
+    assert "Usage" in out + err and "Traceback" not in err
+
+
+def test_run_stores_a_run_and_a_second_call_reads_it(iapb, tmp_path):
+    status, out, _ = iapb("run", "peg_corner", *SHORT, "--out", tmp_path)
+    [file] = tmp_path.glob("*.h5")
+    written = file.stat().st_mtime_ns
+    assert status == 0 and "computed in" in out and str(file) in out
+    status, out, _ = iapb("run", "peg_corner", *SHORT, "--out", tmp_path)
+    assert status == 0 and "read from its file" in out
+    assert [file] == list(tmp_path.glob("*.h5")) and file.stat().st_mtime_ns == written
+    iapb("run", "peg_corner", *SHORT, "--set", "contact.stiffness=900", "--out", tmp_path)
+    iapb("run", "peg_corner", *SHORT, "--world", "PB", "--out", tmp_path)
+    iapb("run", "peg_corner", *SHORT, "--rendering", "spread", "--out", tmp_path)
+    assert len(list(tmp_path.glob("*.h5"))) == 4
+
+
+def test_inspect_tells_from_the_file_alone_what_is_in_it(iapb, tmp_path):
+    iapb("run", "peg_corner", "--out", tmp_path)
+    [file] = tmp_path.glob("*.h5")
+    status, out, _ = iapb("inspect", file, "--impacts", "1")
+    assert status == 0
+    for text in ("peg_corner", "Complete.", "The first 1 of", "impact_loss", "friction", "run key", "content hash"):
+        assert text in out, text
+
+
+def test_an_interrupted_run_leaves_a_readable_partial_file_and_ends_with_130(iapb, tmp_path, monkeypatch):
+    @contextmanager
+    def interrupting(title):
+        def progress(done, total):
+            raise KeyboardInterrupt
+
+        yield progress
+
+    monkeypatch.setattr(progress_bars, "step_progress", interrupting)
+    status, out, err = iapb("run", "peg_corner", "--out", tmp_path)
+    [file] = tmp_path.glob("*.partial")
+    assert status == 130 and str(file) in out and "Stopped: interrupted" in out and "Traceback" not in err
+    assert not list(tmp_path.glob("*.h5"))
+    status, out, _ = iapb("inspect", file)
+    assert status == 0 and "Partial: interrupted." in out
+    monkeypatch.undo()
+    assert iapb("run", "peg_corner", "--out", tmp_path)[0] == 0  # done from the start, and the partial file is gone
+    assert len(list(tmp_path.glob("*.h5"))) == 1 and not list(tmp_path.glob("*.partial"))
+
+
+def test_a_run_that_diverges_says_why_and_ends_with_1(iapb, tmp_path):
+    walls = [{"name": f"wall_{n}", "kind": "half_plane", "point": [0.05 * n, 0], "normal": [-n, 0]} for n in (1, -1)]
+    status, out, _ = iapb("run", "peg_corner", "--world", "PB", "--set", "contact.stiffness=1e9", "--set",
+                          "contact.damping=0", "--set", f"walls={json.dumps(walls)}", "--out", tmp_path)  # fmt: skip
+    assert status == 1 and "Stopped: the" in out and "range of numbers" in out
+    assert len(list(tmp_path.glob("*.partial"))) == 1
+
+
+WRONG_SCENE = """\
+name: wrong
+rate: -5
+duration: 1.0
+bodies:
+  - {name: peg, joint: hinge, mass: 1.0, inertia: 1.0}
+contact: {stiffness: soft}
+"""
+
+
+def test_a_wrong_scene_shows_all_its_mistakes_with_their_places(iapb, tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(WRONG_SCENE)
+    for command in ("run", "effects"):
+        status, out, err = iapb(command, path)
+        assert status == 1 and "Traceback" not in out + err
+        assert f"{path}:2:" in err and "rate" in err
+        assert f"{path}:5:" in err and "bodies[0].joint" in err and "hinge" in err
+        assert f"{path}:6:" in err and "contact.stiffness" in err
+        assert err.count("expected") >= 3
+
+
+def test_debug_shows_the_traceback(tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(WRONG_SCENE)
+    with pytest.raises(SceneError):
+        cli.main(["--debug", "run", str(path)])
+    assert cli.main(["run", str(path)]) == 1  # and only where it was asked for
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "no_such_scene"], "no_such_scene"),
+        (["run", "peg_corner", "--world", "best"], "world = 'best': expected one of ideal, IAPB, PB, CBuc"),
+        (["run", "peg_corner", "--rendering", "clip"], "rendering = 'clip'"),
+        (["run", "peg_corner", "--world", "PB", "--rendering", "spread"], "rendering = 'spread'"),
+        (["run", "peg_corner", "--set", "friction"], "--set = 'friction': expected path=value"),
+        (["run", "peg_corner", "--set", "contact.friction=-1"], "contact.friction"),
+        (["run", "peg_corner", "--set", "contact.frictoin=1"], "frictoin"),
+        (["run", "peg_corner", "--set", "contact.friction=[1"], "--set"),
+        (["inspect", "no_such_file.h5"], "no_such_file.h5: no such file"),
+        (["prove", "no_such_statement"], "no_such_statement"),
+        (["reproduce", "--figure", "fig99"], "fig99"),
+        (["verify", "--resolver", "nothing"], "package.module:function"),
+        (["verify", "--resolver", "no_such_module:f"], "can be imported"),
+    ],
+)
+def test_an_error_is_one_sentence_with_value_and_expectation(arguments, said, iapb, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = iapb(*arguments)
+    assert status == 1
+    assert err.startswith("iapb: ") and said in err and "Traceback" not in out + err
+    assert not list(tmp_path.rglob("*.h5*"))
+
+
+def test_a_file_that_is_no_run_is_refused(iapb, tmp_path):
+    path = tmp_path / "notes.h5"
+    path.write_text("not HDF5")
+    status, _, err = iapb("inspect", path)
+    assert status == 1 and str(path) in err
+
+
+def test_effects_lists_each_with_its_reason(iapb):
+    status, out, _ = iapb("effects", "peg_corner", "--world", "PB")
+    words = " ".join(out.split())
+    assert status == 0 and "impulses" in words and "the law 'penalty' does not use it" in words
+    status, out, _ = iapb("effects", "peg_corner")
+    assert status == 0 and "without it" in out and "Off, because" in out
+
+
+def test_schema_prints_a_json_schema(iapb):
+    status, out, _ = iapb("schema")
+    assert status == 0 and "bodies" in json.loads(out)["properties"]
+
+
+def test_prove_prints_one_proof(iapb):
+    from verification.proofs import all_proofs
+
+    status, out, _ = iapb("prove", all_proofs()[0])
+    assert status == 0 and "proved" in out
+
+
+def test_a_fault_of_ours_is_not_hidden(monkeypatch):
+    def broken(**options):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("iapb.scene.scene_schema", broken)
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["schema"])

@@ -1,0 +1,105 @@
+"""A stage: records go to a file once, come back as they were, and their tables can be read by anybody."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from iapb.errors import RunFileError
+from reports.evidence import stage as stages
+from reports.evidence.stage import Stage, plain_records
+from reports.evidence.tables import numbers_table, numbers_tables
+from reports.figures.figure import Numbers
+from reports.store_tables import read_table
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record as the stages have them."""
+
+    id: str
+    value: float
+    holds: bool
+    note: str | None = None
+    numbers: Numbers | None = None
+
+
+TABLE = Numbers(("scene", "time [s]", "gain", "holds"), (("peg", 0.25, None, True), ("arm", 1.5, 1e-16, False)),
+                note="of the peg")  # fmt: skip
+RECORDS = (Record("C01", 1.5, True, "é", TABLE), Record("C02", math.inf, False), Record("C03", math.nan, False))
+
+
+def same(first, second):
+    return repr(first) == repr(second)
+
+
+def test_records_come_back_as_they_were_and_are_computed_once(tmp_path):
+    calls = []
+
+    def compute():
+        calls.append(1)
+        return RECORDS
+
+    for _ in range(2):
+        found = Stage(tmp_path, "claims", tuple[Record, ...], {"depth": "quick"}).get_or_compute(compute)
+        assert same(found, RECORDS), found  # infinities and missing numbers included
+    assert len(calls) == 1 and len(list(tmp_path.iterdir())) == 1
+
+
+def test_numpy_values_become_plain_ones(tmp_path):
+    record = Record("C04", np.float64(0.1), np.bool_(True), None, Numbers(("n",), ((np.int64(3),), (np.float32(0.5),))))
+    stage = Stage(tmp_path, "one", Record, {})
+    [computed, read] = [stage.get_or_compute(lambda: record) for _ in range(2)]
+    assert same(computed, read) and type(read.value) is float and type(read.holds) is bool
+    assert plain_records({"a": (np.int64(1),)}) == {"a": [1]}
+
+
+def test_another_depth_name_or_source_is_another_file(tmp_path, monkeypatch):
+    made = [Stage(tmp_path, "a", int, {"depth": "quick"}), Stage(tmp_path, "a", int, {"depth": "full"}),
+            Stage(tmp_path, "b", int, {"depth": "quick"})]  # fmt: skip
+    monkeypatch.setattr(stages, "evidence_version", lambda: "another line of code")
+    made.append(Stage(tmp_path, "a", int, {"depth": "quick"}))
+    assert len({stage.path for stage in made}) == 4
+
+
+def test_a_stage_that_fails_or_is_interrupted_leaves_nothing(tmp_path):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    stage = Stage(tmp_path, "a", Record, {})
+    with pytest.raises(KeyboardInterrupt):
+        stage.get_or_compute(interrupted)
+    with pytest.raises(ValueError, match="Record"):
+        stage.get_or_compute(lambda: {"id": 3})  # what is computed must be what is read
+    assert not list(tmp_path.iterdir())
+    assert stage.get_or_compute(lambda: RECORDS[0]) == RECORDS[0]
+
+
+def test_a_damaged_file_is_an_error_not_a_result(tmp_path):
+    stage = Stage(tmp_path, "a", Record, {})
+    stage.get_or_compute(lambda: RECORDS[0])
+    content = bytearray(stage.path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    stage.path.write_bytes(bytes(content))
+    with pytest.raises(RunFileError):
+        stage.get_or_compute(lambda: RECORDS[0])
+
+
+def test_tables_are_columns_with_units_and_missing_numbers_are_nan(tmp_path):
+    stage = Stage(tmp_path, "claims", tuple[Record, ...], {})
+    stage.get_or_compute(lambda: RECORDS)
+    columns = read_table(stage.path, "C01")
+    assert [column.name for column in columns.columns] == ["00 scene", "01 time_s", "02 gain", "03 holds"]
+    assert list(columns["00 scene"]) == ["peg", "arm"] and columns["01 time_s"].tolist() == [0.25, 1.5]
+    assert math.isnan(columns["02 gain"][0]) and columns["02 gain"][1] == 1e-16
+    assert columns["03 holds"].tolist() == [1.0, 0.0]
+    units = [column.unit for column in numbers_table("C01", TABLE).columns]
+    assert units == ["1", "s", "1", "1"]
+
+
+def test_every_table_is_found_and_none_replaces_another():
+    records = (RECORDS[0], {"C01": TABLE, "part b": [TABLE, Numbers(("empty",), ())]}, RECORDS[1])
+    assert [table.name for table in numbers_tables(records)] == ["C01", "C01_2", "part_b"]

@@ -1,0 +1,97 @@
+"""Runs through the store: computed once, kept, and never half a run taken for a whole one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import reference.worlds
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from iapb.simulation import INTERRUPTED
+from reports.runner import Runner
+from reports.store import read_run
+
+PEG = load_scene(find_scene("peg_corner")).with_values({"duration": 1.2})
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    """Names of the worlds that were simulated."""
+    names = []
+    simulate = reference.worlds.run_world
+
+    def counting(scene, name, *arguments, **options):
+        names.append(name)
+        return simulate(scene, name, *arguments, **options)
+
+    monkeypatch.setattr(reference.worlds, "run_world", counting)
+    return names
+
+
+def test_a_run_is_computed_once_by_all_runners_of_a_folder(tmp_path, computed):
+    first = Runner(tmp_path)(PEG, "IAPB")
+    runner = Runner(tmp_path)
+    second = runner(PEG, "IAPB")
+    assert computed == ["IAPB"]
+    assert np.array_equal(first.q, second.q) and runner(PEG, "IAPB") is second
+    [path] = runner.used.values()
+    assert np.array_equal(read_run(path).q, first.q)
+
+
+def test_whatever_changes_a_run_changes_its_key(tmp_path):
+    store = Runner(tmp_path).store
+    cases = [(PEG, "IAPB", "full"), (PEG, "IAPB", "scale"), (PEG, "PB", "full"), (PEG, "ideal", "full"),
+             (PEG, "CBuc", "full"), (PEG.with_values({"contact.friction": 0.123}), "IAPB", "full"),
+             (PEG.with_values({"couplings.four_channel.damping": [1, 1, 1]}), "IAPB", "full")]  # fmt: skip
+    assert len({store.key(Runner.inputs(*case)) for case in cases}) == len(cases)
+    assert len({Runner.label(*case) for case in cases}) == 5
+
+
+def test_runs_that_are_not_kept_are_stored_all_the_same(tmp_path, computed):
+    runner = Runner(tmp_path)
+    run = runner(PEG, "PB", keep=False)
+    assert runner(PEG, "PB", keep=False) is not run and computed == ["PB"]
+    assert len(list(tmp_path.glob("*.h5"))) == 1
+
+
+def interrupt(done, total):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(keep, tmp_path, computed):
+    runner = Runner(tmp_path, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        runner(PEG, "IAPB", keep=keep)
+    [partial] = tmp_path.glob("*.partial")
+    kept = read_run(partial)
+    assert not kept.complete and kept.stopped == INTERRUPTED and 0 < kept.steps < PEG.steps
+    assert not runner.used
+    runner.progress = None
+    assert runner(PEG, "IAPB", keep=keep).complete and computed == ["IAPB", "IAPB"]
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_who_asks_for_partial_runs_gets_them_and_they_are_not_taken_for_whole_ones_later(tmp_path):
+    runner = Runner(tmp_path, interrupt)
+    run = runner(PEG, "IAPB", partial=True)
+    assert not run.complete
+    with pytest.raises(KeyboardInterrupt):
+        runner(PEG, "IAPB")
+
+
+def test_claims_are_not_computed_from_interrupted_runs(tmp_path):
+    """Ctrl-C during the claims must not leave a verdict from half a run in the table of claims."""
+    from reports.evidence import claims
+
+    runner = Runner(tmp_path, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        claims.compute(runner, "quick", lambda done, total: None)
+    assert len(list(tmp_path.glob("*.partial"))) == 1
+
+
+def test_progress_counts_to_the_end(tmp_path):
+    seen = []
+    Runner(tmp_path, lambda done, total: seen.append((done, total)))(PEG, "PB")
+    assert seen[-1] == (PEG.steps, PEG.steps) and [done for done, _ in seen] == sorted(done for done, _ in seen)
