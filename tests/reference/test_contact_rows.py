@@ -64,5 +64,5 @@ def test_the_rigid_law_runs_as_a_world() -> None:
     simulation = Simulation(SCENE, RigidConstraints())
     states = {simulation.step().state for _ in range(400)}
     assert states == {FREE, COLLIDING, RESTING}
-    gaps = simulation.state.contacts.gap[: simulation.state.count[0]]
+    gaps = simulation.state.contacts.gap[: simulation.state.contact_count[0]]
     assert gaps.min(initial=0.0) >= -1e-5

@@ -140,13 +140,13 @@ def peg_world(position, velocity, restitution=0.0):  # type: ignore[no-untyped-d
         gravity=np.zeros(3), scene=SimpleNamespace(contact=contact),
     )  # fmt: skip
     log = SimpleNamespace(
-        count=np.zeros(1, int), group=np.zeros(1, int), rows=np.zeros(1, int), rank=np.zeros(1, int),
+        logged=np.zeros(1, int), group=np.zeros(1, int), rows=np.zeros(1, int), rank=np.zeros(1, int),
         scale=np.zeros(1), clamp=np.zeros(1), energy_lost=np.zeros(1),
         v_minus=np.zeros((1, 3)), v_plus=np.zeros((1, 3)), impulse=np.zeros((1, 3)),
     )  # fmt: skip
     state = SimpleNamespace(
         q=np.array(position, float), v=np.array(velocity, float), contacts=make_contact_buffer(capacity),
-        count=np.zeros(2, int), contact_impulse=np.zeros(capacity), impacts=log,
+        contact_count=np.zeros(2, int), contact_impulse=np.zeros(capacity), impacts=log,
     )  # fmt: skip
     return system, state
 
@@ -159,7 +159,7 @@ def test_the_pushed_peg_comes_to_rest_in_the_corner_and_never_overlaps() -> None
         result = RigidConstraints().advance(system, state, force, DT)
         state.q[:], state.v[:] = result.q, result.v
         states.add(result.state)
-        deepest = min(deepest, state.contacts.gap[: state.count[0]].min(initial=0.0))
+        deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))
     assert states == {FREE, COLLIDING, RESTING}
     assert state.q == pytest.approx([0.1 - 0.0105, 0.00525, 0.0], abs=1e-5)
     assert np.abs(state.v).max() <= 1e-9
@@ -175,7 +175,7 @@ def test_the_parts_of_a_step_add_up_to_the_change_of_momentum() -> None:
         result = RigidConstraints().advance(system, state, force, DT)
         total = DT * (force + result.penalty_force) + result.impulse
         assert np.abs(mass @ (result.v - before) - total).max() <= 1e-12
-        if state.impacts.count[0]:
+        if state.impacts.logged[0]:
             assert state.impacts.energy_lost[0] >= 0.0 and result.state == COLLIDING
         state.q[:], state.v[:] = result.q, result.v
 
