@@ -139,8 +139,8 @@ SCENES = {
 
 
 COARSE, FINE = (
-    (97, 130, 231),
-    (1203, 1610, 2777),
+    (97, 130, 200, 231, 310),
+    (1603, 2010, 2777, 3200, 4099),
 )  # odd counts: impacts fall anywhere in a step
 
 
