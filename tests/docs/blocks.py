@@ -14,6 +14,9 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("iapb", "reference", "verification", "reports")
+
 _FILE_LINE = re.compile(r"^# ([\w./-]+\.(?:py|yaml))$")
 _FENCE = "```"
 

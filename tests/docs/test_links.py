@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from blocks import ROOT
 
 PAGES = ("README.md", "docs/tutorial.md", "docs/extending.md", "docs/notation.md")
 LINK = re.compile(r"\]\(([^)\s]+)\)")

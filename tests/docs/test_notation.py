@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from conftest import PACKAGES, ROOT
+from blocks import PACKAGES, ROOT
 
 from iapb import find_scene, simulate
 from reports.store_layout import GROUPS

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+from blocks import ROOT
 from comparing import differs
-from conftest import ROOT
 
 from reports.cli import main
 
