@@ -75,8 +75,11 @@ class _EngineLaw:
         status = advance(world, state, applied_force)
         if status:
             raise IapbError(STATUS_TEXT[status])
-        vectors = (state.q, state.v, state.penalty_force, state.friction_force, state.impulse)
-        return StepResult(*(vector.copy() for vector in vectors), int(contact_state(state, system.tool_tree)))
+        return StepResult(
+            q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
+            friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
+            state=int(contact_state(state, system.tool_tree)),
+        )  # fmt: skip
 
     @classmethod
     def runs_compiled(cls) -> bool:

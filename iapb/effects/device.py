@@ -23,7 +23,8 @@ def coupling(question: Question) -> Effect:
 def device_limits(question: Question) -> Effect:
     """Largest forces that the device renders, and what is done about larger ones (section VI)."""
     limit = question.scene.device.force_limit if question.scene.device else None
-    absent = question.without_device()
+    scaled = question.rendering in ("scale", "spread")  # the tool's impulse is scaled, device or not
+    absent = None if scaled else question.without_device()
     if absent is None and limit is None:
         absent = "the scene gives no device.force_limit"
     if absent is None and question.rendering == "full":

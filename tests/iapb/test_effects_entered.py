@@ -142,6 +142,14 @@ def test_the_table_of_effects_agrees_with_what_runs(effect, found):
         assert effect not in found[case]["on"], case
 
 
+@pytest.mark.parametrize("case", CASES)
+def test_nothing_runs_whose_effect_is_off(case, found):
+    for effect, (texts, _, _) in ONLY.items():
+        shared = "def add_point_force(" if effect == "hand_force" else None  # friction applies its force by it too
+        ran = [text for text in texts if text != shared and found[case]["counted"].get(text, 0)]
+        assert effect in found[case]["on"] or not ran, (effect, ran)
+
+
 def test_the_unilateral_coupler_is_entered_by_its_own_world_only(found):
     assert found["unilateral"]["counted"]["def engage("] > 0
     assert "def engage(" not in found["everything"]["counted"]
