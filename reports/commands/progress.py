@@ -29,9 +29,20 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    console = Console(stderr=True)
+    if not console.is_terminal:  # a log: a line per stage, as it begins
+        begun: set[str] = set()
+
+        def log(stage: str, done: int, total: int) -> None:
+            if stage not in begun:
+                console.print(f"{stage} ...", highlight=False)
+                begun.add(stage)
+
+        yield log
+        return
     columns = (TextColumn("{task.description:<48}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
                TimeElapsedColumn())  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(*columns, console=console) as bar:
         tasks: dict[str, object] = {}
 
         def progress(stage: str, done: int, total: int) -> None:
