@@ -15,7 +15,7 @@ def step_progress(title: str) -> Iterator[Callable[[int, int], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total} steps"),
                TimeRemainingColumn())  # fmt: skip
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"{title} (the first time, half a minute of compiling)", total=None)
+        task = bar.add_task(f"{title} (the first time, a minute or two of compiling)", total=None)
 
         def progress(done: int, total: int) -> None:
             bar.update(task, description=title, completed=done, total=total)
