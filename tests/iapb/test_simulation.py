@@ -247,10 +247,16 @@ def test_motion_that_leaves_the_range_of_numbers_stops_the_run_and_says_why():
 
 
 def test_an_unstable_device_stops_the_run_before_its_numbers_run_out():
-    coupling = FourChannel((1e12,) * 3, (0.0,) * 3)
-    run = simulate(PEG.with_values({"device.delay": 40}), ImpulseAugmented(), coupling)
-    assert run.stopped
+    """Its own damping b makes it diverge, by b dt / m = 1e6 a step, while nothing couples it to the tool."""
+    loose, scene = FourChannel((0.0,) * 3, (0.0,) * 3), PEG.with_values({"device.damping": [1e9, 0, 0]})
+    run = simulate(scene, ImpulseAugmented(), loose, steps=STEPS)
+    assert "the device's motion" in run.stopped
     assert_readable(run, run.steps)
+    simulation = Simulation(scene, ImpulseAugmented(), loose)
+    with pytest.raises(IapbError, match="the device's motion"):
+        for _ in range(STEPS):
+            simulation.step()
+    assert simulation.steps_done == run.steps
 
 
 def test_a_step_that_cannot_be_done_is_an_error():
