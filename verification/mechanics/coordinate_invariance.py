@@ -80,7 +80,8 @@ def coordinate_invariance(depth: str = "quick", seed: int = SEED) -> Finding:
     statement = "An impact has one outcome, whatever the coordinates it is solved in."
     tolerance = (
         f"{AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} "
-        f"and rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, "
+        f"and rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); "
+        f"elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, "
         "which says nothing once it exceeds 1"
     )
     return Finding("Coordinate invariance (C06)", statement, tolerance, judged(table))

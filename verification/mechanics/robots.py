@@ -63,13 +63,15 @@ def compare_trees(depth: str = "quick", seed: int = SEED) -> Finding:
     return Finding("Random trees against Pinocchio", statement, _TOLERANCE, _judged(table_of(COLUMNS, rows)))
 
 
-def compare_robots(folder: str | Path | None = None, seed: int = SEED) -> Finding:
+def compare_robots(folder: str | Path | None = None, depth: str = "quick", seed: int = SEED) -> Finding:
     """Compare every URDF file of a folder, with a fixed and with a floating base, at 100 states each.
 
     Parameters
     ----------
     folder : default `shared/robots` beside the checkout; where it is absent the finding says that it was skipped
+    depth : both depths are the same here
     """
+    check_depth(depth)
     files, skipped = robot_files(folder)
     rows = list(_robot_rows(files, seed))
     statement = "Robots read by the engine are those that Pinocchio reads, in every quantity."

@@ -1,0 +1,67 @@
+"""A hand leads the arm through its singular poses: finite, bounded, balanced; a hand that pumps is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from verification.mechanics import operating as study
+from verification.mechanics.hand_paths import PATHS
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene(find_scene(study.SCENE))
+
+
+def outcome(row):
+    table = study.table_of(study.COLUMNS, [row])
+    return study.judged(table).holds[0]
+
+
+def test_lengths_are_those_of_the_scene(scene):
+    assert {body.name: 2 * body.center_of_mass[0] for body in scene.bodies} == study.LENGTHS
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("body", study.LENGTHS)
+def test_any_link_is_led_through_the_singular_pose(scene, path, body):
+    row = study.operate(scene, study.Grip(body, study.LENGTHS[body]), path, 2.0, 1000.0)
+    assert outcome(row), row
+    assert row["steps near singular"] > 0 or path != "whirl"
+
+
+def test_a_link_pulled_along_itself_stays(scene):
+    row = study.operate(scene, study.Grip("upper_arm", 0.3), "stretch", 1.0, 1000.0)
+    assert row["largest joint speed"] < 1e-12 and row["closest to singular"] == 0.0 and outcome(row)
+
+
+def test_the_residual_falls_with_the_step(scene):
+    grip = study.Grip("forearm", 0.25)
+    slow, fast = (study.operate(scene, grip, "stretch", 2.0, rate)["residual"] for rate in (1000.0, 4000.0))
+    assert abs(fast) < 0.4 * abs(slow)
+
+
+def test_a_hand_that_pushes_with_the_motion_is_seen(scene, monkeypatch):
+    monkeypatch.setattr(study, "DAMPING", -30.0)
+    row = study.operate(scene, study.Grip("forearm", 0.25), "stretch", 2.0, 1000.0)
+    assert not outcome(row)
+
+
+def test_a_fault_or_a_number_that_is_not_finite_fails():
+    whole = {column.name: 0.0 for column in study.COLUMNS} | {"fault": "", "tolerance": 1.0}
+    assert outcome(whole)
+    assert not outcome(whole | {"largest joint speed": np.inf})
+    assert not outcome(whole | {"fault": "the motion left the range of numbers"})
+
+
+def test_paths_start_where_the_hand_is_and_have_their_length():
+    start = np.array([0.3, 0.2])
+    for make in PATHS.values():
+        path = make(start, 0.5)
+        np.testing.assert_allclose(path.place(0.0), start)
+        ways = np.linspace(0.0, path.length, 2001)
+        places = np.array([path.place(s) for s in ways])
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).sum() == pytest.approx(path.length, rel=1e-3)

@@ -1,0 +1,63 @@
+"""Where a hand goes that leads an arm by one of its points: paths through the arm's singular poses.
+
+A path is a function of the way gone s [m], from the place where the hand starts; it ends at `length`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BEYOND = 1.15  # the hand is pulled this much further than the arm reaches
+
+
+class Path(NamedTuple):
+    """Place (2,) [m] after the way s [m]; its length [m]."""
+
+    place: Callable[[float], Floats]
+    length: float
+
+
+def stretch(start: Floats, reach: float) -> Path:
+    """Straight away from the base, beyond the arm's reach, and back: the straight arm, twice."""
+    out = BEYOND * reach * start / np.linalg.norm(start)
+    return along([start, out, start])
+
+
+def across(start: Floats, reach: float) -> Path:
+    """Straight through the base to the other side and back: the folded arm, and the base itself."""
+    return along([start, -0.9 * reach * start / np.linalg.norm(start), start])
+
+
+def whirl(start: Floats, reach: float) -> Path:
+    """Out to the full reach and once around the base: the straight arm all the while."""
+    direction = start / np.linalg.norm(start)
+    way_out = abs(reach - float(np.linalg.norm(start)))
+    first = float(np.arctan2(direction[1], direction[0]))
+
+    def place(s: float) -> Floats:
+        if s < way_out:
+            return start + s / way_out * (reach * direction - start)
+        angle = first + (s - way_out) / reach
+        return reach * np.array([np.cos(angle), np.sin(angle)])
+
+    return Path(place, way_out + 2.0 * np.pi * reach)
+
+
+PATHS: dict[str, Callable[[Floats, float], Path]] = {"stretch": stretch, "across": across, "whirl": whirl}
+
+
+def along(corners: list[Floats]) -> Path:
+    """The polyline through the corners."""
+    points = np.array(corners)
+    ways = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+    def place(s: float) -> Floats:
+        return np.array([np.interp(s, ways, points[:, axis]) for axis in range(2)])
+
+    return Path(place, float(ways[-1]))

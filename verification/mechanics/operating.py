@@ -1,0 +1,186 @@
+"""Operating a linkage: a hand holds any link at any point and leads the arm through its singular poses.
+
+The hand is a spring and a damper to a place that moves along a path at a given speed; its force reaches the arm
+through `Simulation.step(hand_force=...)`. The compiled step uses J_h^T alone, never its inverse: nothing there can blow
+up where J_h loses rank. The force is constant over a step, so that its work on the arm is F . dx exactly, and what the
+balance lacks is the integrator's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import IapbError
+from iapb.scene import Scene
+from iapb.simulation import Simulation
+from verification.claims.table import Column, Table, table_of
+from verification.mechanics.hand_paths import PATHS, Path
+from verification.mechanics.record import Finding, check_depth
+
+Floats = NDArray[np.float64]
+
+SCENE = "held_arm"
+LENGTHS = {"upper_arm": 0.3, "forearm": 0.25, "hand_link": 0.15}  # [m] of the scene's links
+STIFFNESS, DAMPING = 400.0, 30.0  # of the hand [N/m, N s/m]
+AFTER = 0.3  # [s] that the hand stays at the end of its path
+HOLDS = {"quick": (0.5, 1.0), "full": (0.2, 0.5, 0.8, 1.0)}  # fractions of the held link
+SPEEDS = {"quick": (0.5, 4.0), "full": (0.1, 0.5, 1.0, 4.0, 8.0)}  # [m/s]
+RATES = {"quick": (1000.0,), "full": (1000.0, 2000.0, 4000.0)}  # [Hz]
+NOTHING = 1e-12  # [J] less energy than this is none: a link pulled along itself does not move at all
+ROUNDING = 1e-12  # relative, where hardly anything turns
+# σ_min / σ_max of the hand's Jacobian: the arm within about a degree of straight or folded.
+SINGULAR = 0.02
+
+COLUMNS = (
+    Column("path", condition=True),
+    Column("held link", condition=True),
+    Column("held at", "m", condition=True),
+    Column("speed", "m/s", condition=True),
+    Column("rate", "Hz", condition=True),
+    Column("closest to singular", "σ_min/σ_max"),
+    Column("steps near singular"),
+    Column("largest joint speed", "rad/s"),
+    Column("largest hand force", "N"),
+    Column("largest stored energy", "J"),
+    Column("energy put in", "J"),
+    Column("stored beyond what was put in", "relative"),
+    Column("residual", "relative"),
+    Column("tolerance", "relative"),
+    Column("fault"),
+)
+
+
+class Grip(NamedTuple):
+    """Held body, and the point [m] along it."""
+
+    body: str
+    distance: float
+
+    @property
+    def reach(self) -> float:
+        """How far from the base the held point can be [m]."""
+        links = list(LENGTHS)
+        return sum(LENGTHS[link] for link in links[: links.index(self.body)]) + self.distance
+
+
+def operating(depth: str = "quick") -> Finding:
+    """Lead the arm by every link and point along every path at every speed."""
+    check_depth(depth)
+    table = table_of(COLUMNS, _rows(depth))
+    statement = (
+        "Led by any link and point, the arm passes its singular poses with finite motion and bounded energy."
+    )
+    tolerance = (
+        "every number finite; of the energy exchanged the integrator makes up at most the largest turn per step [rad], "
+        "as a first-order method may, and arm and spring hold at most so much more than the hand has put in"
+    )
+    return Finding("Operating a linkage through singular poses", statement, tolerance, judged(table))
+
+
+def _rows(depth: str) -> Iterator[dict[str, Any]]:
+    from iapb.scene import load_scene
+    from iapb.scene_files import find_scene
+
+    scene = load_scene(find_scene(SCENE))
+    for path in PATHS:
+        for grip in (Grip(body, part * length) for body, length in LENGTHS.items() for part in HOLDS[depth]):
+            for speed in SPEEDS[depth]:
+                for rate in RATES[depth]:
+                    head = {
+                        "path": path,
+                        "held link": grip.body,
+                        "held at": grip.distance,
+                        "speed": speed,
+                        "rate": rate,
+                    }
+                    yield head | operate(scene, grip, path, speed, rate)
+
+
+def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> dict[str, Any]:
+    """Lead the arm along one path and return what was largest on the way."""
+    held = {
+        "hand.body": grip.body,
+        "hand.point": [grip.distance, 0.0],
+        "hand.force": [0.0, 0.0, 0.0],
+        "rate": rate,
+    }
+    arm = Led(Simulation(scene.with_values(held)), grip)
+    way = PATHS[path](arm.place(), grip.reach)
+    try:
+        for k in range(int((way.length / speed + AFTER) * rate)):
+            arm.follow(way, speed * k / rate, speed * (k + 1) / rate)
+    except IapbError as error:
+        return {"fault": str(error)}
+    return arm.measured()
+
+
+class Led:
+    """An arm that the hand leads, and what has been measured so far."""
+
+    def __init__(self, simulation: Simulation, grip: Grip) -> None:
+        self.simulation, self.mechanism, self.grip = simulation, simulation.system.mechanism, grip
+        self.work = self.exchanged = self.put_in = 0.0
+        self.largest = self.excess = self.fastest = self.strongest = 0.0
+        self.ratios: list[float] = []
+
+    def place(self) -> Floats:
+        """Where the held point is (2,) [m]."""
+        rotations, positions = self.mechanism.placements(self.simulation.state.q)
+        b = self.mechanism.index(self.grip.body)
+        return (positions[b] + self.grip.distance * rotations[b][:, 0])[:2]
+
+    def follow(self, path: Path, way: float, next_way: float) -> None:
+        """One step with the hand on its path, from `way` to `next_way` [m]."""
+        state, dt = self.simulation.state, self.simulation.system.dt
+        here, target, next_target = self.place(), path.place(way), path.place(next_way)
+        jacobian = self.mechanism.point_jacobian(state.q, self.grip.body, [*here, 0.0])[:2]
+        spring = STIFFNESS * (target - here)
+        force = spring + DAMPING * ((next_target - target) / dt - jacobian @ state.v)
+        self.simulation.step(hand_force=[*force, 0.0])
+        self._account(force, self.place() - here, next_target - target, jacobian)
+        tension = float(np.linalg.norm(next_target - self.place()))
+        stored = self.mechanism.kinetic_energy(state.q, state.v) + 0.5 * STIFFNESS * tension**2
+        self.excess = max(self.excess, stored - self.put_in)
+        self.largest = max(self.largest, stored)
+
+    def _account(self, force: Floats, moved: Floats, led: Floats, jacobian: Floats) -> None:
+        """Add up the work of one step, and keep what is largest."""
+        work = float(force @ moved)
+        self.work += work
+        self.exchanged += abs(work)
+        self.put_in += float(force @ led)
+        self.strongest = max(self.strongest, float(np.linalg.norm(force)))
+        self.fastest = max(self.fastest, float(np.max(np.abs(self.simulation.state.v))))
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        self.ratios.append(float(values[1] / values[0]) if values[0] > 0.0 else 0.0)
+
+    def measured(self) -> dict[str, Any]:
+        """The figures of the table."""
+        state = self.simulation.state
+        kinetic, whole = self.mechanism.kinetic_energy(state.q, state.v), max(self.exchanged, NOTHING)
+        return {
+            "closest to singular": min(self.ratios), "steps near singular": sum(r <= SINGULAR for r in self.ratios),
+            "largest joint speed": self.fastest, "largest hand force": self.strongest,
+            "largest stored energy": self.largest, "energy put in": self.put_in,
+            "stored beyond what was put in": self.excess / max(self.largest, NOTHING),
+            "residual": (kinetic - self.work) / whole,
+            "tolerance": max(self.fastest * self.simulation.system.dt, ROUNDING), "fault": "",
+        }  # fmt: skip
+
+
+def judged(table: Table) -> Table:
+    """Finite, without a fault, and with an energy balance that closes."""
+    return replace(table, holds=tuple(_holds(row) for row in table.records()))
+
+
+def _holds(row: dict[str, Any]) -> bool:
+    if row["fault"]:
+        return False
+    figures = [value for value in row.values() if isinstance(value, float)]
+    made_up = max(abs(row["residual"]), row["stored beyond what was put in"])
+    return bool(np.all(np.isfinite(figures)) and made_up <= row["tolerance"])

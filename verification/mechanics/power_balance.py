@@ -1,0 +1,158 @@
+"""d(KE + PE)/dt = tau . v on random trees, to the order of each integrator; and M positive definite.
+
+Over one step of dt the energy changes by the work of tau, integrated by Simpson's rule from the velocities at start,
+half and end. What is missing, per dt, falls as dt^order if M, B, G and the energies belong together; with any term
+wrong it stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.mechanics.integrators import INTEGRATORS, Integrator
+from iapb.mechanics.mechanism import Mechanism
+from reference.random_mechanisms import random_mechanism, random_state
+from verification.claims.table import Column, Row, Table, table_of
+from verification.mechanics.record import Finding, check_depth
+
+Floats = NDArray[np.float64]
+
+FIELD = np.array([0.5, -9.81, 2.0])  # [m/s^2], along no axis
+SIZES = (1, 3, 10, 30)  # joints
+TREES = {"quick": 15, "full": 200}
+LONGEST = 2e-2  # [s]; halved until the defect is below SMALL^order, where the leading error term rules
+HALVINGS = 14
+SMALL = 0.02
+NEGLIGIBLE = 1e-10  # a relative defect below this would soon meet rounding
+SPEED = 0.3  # [m/s, rad/s]: the motion is smooth over such a step
+ORDER_TOLERANCE = 0.25  # of the median over trees: next error terms, larger in long chains
+# Of M scaled to a unit diagonal: beyond it rounding decides the sign of an eigenvalue.
+LARGEST_CONDITION = 1e12
+LEAST_SHARE = 0.5  # of the trees must show an order: where a term is missing none does
+SEED = 20050603
+
+COLUMNS = (
+    Column("integrator", condition=True),
+    Column("joints", condition=True),
+    Column("trees", condition=True),
+    Column("trees that show an order"),
+    Column("step", "s"),
+    Column("median defect", "of |τ|·|v| dt"),
+    Column("median order"),
+    Column("declared order"),
+)
+DEFINITE_COLUMNS = (
+    Column("joints", condition=True),
+    Column("mass matrices", condition=True),
+    Column("judged, condition ≤ 1e12"),
+    Column("largest condition judged"),
+    Column("least eigenvalue × condition"),
+)
+
+
+def power_balance(depth: str = "quick", seed: int = SEED) -> Finding:
+    """Measure the order with which the power balance closes, for every integrator and size of tree."""
+    check_depth(depth)
+    rows = [
+        _row(method, joints, TREES[depth], np.random.default_rng([seed, joints]))
+        for method in INTEGRATORS.values()
+        for joints in SIZES
+    ]
+    statement = "Energy changes by the work of the generalized forces, to the order of the integrator."
+    tolerance = f"median order within {ORDER_TOLERANCE} of the declared order"
+    return Finding("Power balance of random trees", statement, tolerance, judged(table_of(COLUMNS, rows)))
+
+
+def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) -> dict[str, Any]:
+    found, tried = [], 0
+    for _ in range(trees):
+        mechanism = random_mechanism(rng, joints)
+        q, v = random_state(rng, mechanism, SPEED)
+        tau = mechanism.inverse_dynamics(q, v, rng.normal(size=mechanism.nv), FIELD)
+        if np.any(tau * v) and _condition(mechanism.mass_matrix(q)) <= LARGEST_CONDITION:
+            tried += 1
+            found += order_of(mechanism, method, q, v, tau)
+    medians = np.median(found, axis=0) if found else np.full(3, np.nan)
+    return {"integrator": method.name, "joints": joints, "trees": tried, "trees that show an order": len(found),
+            "step": float(medians[0]), "median defect": float(medians[1]), "median order": float(medians[2]),
+            "declared order": method.order}  # fmt: skip
+
+
+def order_of(
+    mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: Floats
+) -> list[tuple[float, float, float]]:
+    """Return (step, defect, order) at the longest step whose defect is small; nothing where there is none."""
+    coarse = np.inf
+    for k in range(HALVINGS):
+        dt = LONGEST * 0.5**k
+        fine = defect(mechanism, method, q, v, tau, dt)
+        if NEGLIGIBLE <= coarse <= SMALL**method.order and fine > 0.0:
+            return [(2.0 * dt, coarse, float(np.log2(coarse / fine)))]
+        coarse = fine
+    return []
+
+
+def defect(mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: Floats, dt: float) -> float:
+    """Energy that one step of dt makes up, relative to |tau| . |v| dt."""
+
+    def acceleration(q: Floats, v: Floats) -> Floats:
+        force = tau - mechanism.bias(q, v) - mechanism.gravity(q, FIELD)
+        return np.linalg.solve(mechanism.mass_matrix(q), force)
+
+    def energy(q: Floats, v: Floats) -> float:
+        return mechanism.kinetic_energy(q, v) + mechanism.potential_energy(q, FIELD)
+
+    _, v_half = method.step(mechanism.integrate, acceleration, q, v, 0.5 * dt)
+    q_next, v_next = method.step(mechanism.integrate, acceleration, q, v, dt)
+    work = float(tau @ (v + 4.0 * v_half + v_next)) * dt / 6.0
+    return abs(energy(q_next, v_next) - energy(q, v) - work) / (float(np.abs(tau) @ np.abs(v)) * dt)
+
+
+def _scaled(mass: Floats) -> Floats:
+    """M with a diagonal of ones: the units of the coordinates taken out."""
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    return mass * np.outer(scale, scale)
+
+
+def _condition(mass: Floats) -> float:
+    return float(np.linalg.cond(_scaled(mass))) if np.all(np.diag(mass) > 0.0) else np.inf
+
+
+def judged(table: Table) -> Table:
+    """The median order must be the declared one, and most trees must show one at all."""
+    return replace(table, holds=tuple(_holds(row) for row in table.records()))
+
+
+def _holds(row: Row) -> bool:
+    enough = row["trees that show an order"] >= LEAST_SHARE * row["trees"]
+    return bool(enough and abs(row["median order"] - row["declared order"]) <= ORDER_TOLERANCE)
+
+
+def positive_definite(depth: str = "quick", seed: int = SEED) -> Finding:
+    """Judge the least eigenvalue of random trees' mass matrices, scaled to a unit diagonal."""
+    check_depth(depth)
+    table = table_of(DEFINITE_COLUMNS, _definite_rows(10 * TREES[depth], seed))
+    holds = tuple(bool(row["least eigenvalue × condition"] > 0.0) for row in table.records())
+    statement = "The mass matrix is positive definite wherever rounding leaves that to be judged."
+    tolerance = f"least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}"
+    return Finding("Mass matrices positive definite", statement, tolerance, replace(table, holds=holds))
+
+
+def _definite_rows(count: int, seed: int) -> Iterator[dict[str, Any]]:
+    for joints in SIZES:
+        rng = np.random.default_rng([seed, joints, 1])
+        conditions, least = [], []
+        for _ in range(count):
+            mechanism = random_mechanism(rng, joints)
+            mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
+            condition = _condition(mass) if mechanism.nv else np.inf
+            if condition <= LARGEST_CONDITION:
+                conditions.append(condition)
+                least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
+        yield {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
+               "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
