@@ -100,7 +100,7 @@ def test_fclib_round_trip(tmp_path: Path, friction: list[float] | None) -> None:
         ("size.lcp", b"2.5 1", "size 2.5"),
         ("huge.lcp", b"1e9 1", "size 1e\\+09"),
         ("empty.lcp", b"", "is empty"),
-        ("torn.lcp.gz", gzip.compress(b"1 1 -1")[:-6], "cannot be read"),
+        ("torn.lcp.gz", gzip.compress(b"1 1 -1", mtime=0)[:-6], "cannot be read"),
         ("binary.lcp", b"\xff\xfe\x00", "not a text file"),
         ("sparse.dat", b"2 1 2 2 2 2 1 1", "storage flag 1"),
         ("sizes.dat", b"2 0 3 3 3 3 1 1", "differ from"),
