@@ -134,7 +134,7 @@ def _transformed(mechanism: Mechanism, impact: Impact, coordinates: str) -> tupl
         change = np.eye(ARM.links) - np.eye(ARM.links, k=-1)  # q_i = r_i - r_(i-1)
         rows = np.array([ARM.absolute_row(r, contact) for contact in impact.contacts])
         return ARM.absolute_mass_matrix(r), rows, change
-    change = np.linalg.inv(ARM.hand_jacobian(mechanism, q))
+    change = np.array(np.linalg.inv(ARM.hand_jacobian(mechanism, q)), np.float64)
     new_mass = change.T @ mechanism.mass_matrix(q) @ change
     return 0.5 * (new_mass + new_mass.T), ARM.joint_rows(mechanism, q, impact.contacts) @ change, change
 

@@ -102,7 +102,7 @@ def defect(mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: 
 
     def acceleration(q: Floats, v: Floats) -> Floats:
         force = tau - mechanism.bias(q, v) - mechanism.gravity(q, FIELD)
-        return np.linalg.solve(mechanism.mass_matrix(q), force)
+        return np.array(np.linalg.solve(mechanism.mass_matrix(q), force), np.float64)
 
     def energy(q: Floats, v: Floats) -> float:
         return mechanism.kinetic_energy(q, v) + mechanism.potential_energy(q, FIELD)
