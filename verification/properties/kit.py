@@ -183,6 +183,13 @@ def as_test(case: ImpactCase, law: str) -> str:
     lines = [f"    {name} = np.array({array.tolist()!r}).reshape({array.shape})" for name, array in arrays.items()]
     return "\n".join(
         [
+            "import numpy as np",
+            "from verification.properties import LAWS, ImpactCase",
+            "from verification.properties.bounds import KIT",
+            "",
+            "# resolver = ...  the one under test",
+            "",
+            "",
             f"def test_{law}():",
             *lines,
             f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r})",
