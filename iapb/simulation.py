@@ -8,9 +8,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,20 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import kernel
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult
-from iapb.effects import decide_effects
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.kernels import couple, drive_device
-from iapb.mechanics.energy import energy_of_run
-from iapb.recording import Record, chunk_steps, contact_table, impact_table, joined, make_record, write_step
-from iapb.run import COLLIDING, FREE, RESTING, EffectRow, Run
+from iapb.recorder import Recorder
+from iapb.recording import Record, write_step
+from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, load_scene
 from iapb.system import System
 
 Floats = NDArray[np.float64]
 
-_KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
-                      "device_actuator_work")
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
 INTERRUPTED = "interrupted"  # what `Run.stopped` says after Ctrl-C
@@ -209,7 +204,7 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     """
     simulation = Simulation(scene, law, coupling)
     total = simulation.scene.steps if steps is None else _step_count(steps)
-    recording = _Recording(simulation)
+    recording = Recorder(simulation)
     stop: BaseException | None = None
     try:
         while recording.steps < total and stop is None:
@@ -230,74 +225,3 @@ def _step_count(steps: Any) -> int:
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
         raise ArgumentError("steps", steps, "a whole number >= 1")
     return int(steps)
-
-
-class _Recording:
-    """The chunks of a simulation in the making."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self.simulation = simulation
-        port, state = simulation.port, simulation.state
-        device = simulation.coupling.kind != 0
-        self.start = (state.q.copy(), state.v.copy(), port.device_q.copy(), port.device_v.copy())
-        self.device = device
-        self.records: list[Record] = []
-        self.sizes: list[int] = []
-        self.seconds: list[float] = []
-        self.steps = 0
-
-    def chunk(self, total: int) -> BaseException | None:
-        """Do and keep the next chunk; return what stopped it before its end."""
-        system, port = self.simulation.system, self.simulation.port
-        size = chunk_steps(system.capacity, total - self.steps)
-        coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
-        record = make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs))
-        started = time.perf_counter()
-        done, stop = self.simulation.advance_chunk(record, size)
-        self.seconds.append(time.perf_counter() - started)
-        self.records.append(record)
-        self.sizes.append(done)
-        self.steps += done
-        return stop
-
-    def run(self, world: str, stopped: str) -> Run:
-        """Everything recorded so far as a Run; `stopped` says why it is not complete."""
-        simulation, system = self.simulation, self.simulation.system
-        states = {
-            name: np.concatenate([first[None], joined(self.records, self.sizes, name)])
-            for name, first in zip(("q", "v", "device_q", "device_v"), self.start, strict=True)
-        }
-        forces = {name: joined(self.records, self.sizes, name) for name in (
-            "hand_force", "coupling_force", "penalty_force", "friction_force", "impulse", "environment_force",
-            "device_force", "state")}
-        law, coupling = simulation.law, simulation.coupling
-        run = Run(
-            scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
-            scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
-            law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
-            coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
-            coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
-            velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
-            body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.steps + 1, dtype=np.float64) * system.dt, **states, **forces,
-            contacts=contact_table(self.records, self.sizes), impacts=impact_table(self.records, self.sizes),
-            energy={}, effects=_effects(simulation),
-            chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
-            kernel="compiled" if simulation.compiled else "python", stopped=stopped,
-        )  # fmt: skip
-        return replace(run, energy=_energy(run, system))
-
-
-def _energy(run: Run, system: System) -> dict[str, Floats]:
-    """The ledger; without the tool's balance under a unilateral coupler, where the tool is carried at times."""
-    device = system.device_mechanism() if run.coupling != "none" else None
-    ledger = energy_of_run(run, system.mechanism, system.gravity, device)
-    if run.coupling != "unilateral":
-        return ledger
-    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED}
-
-
-def _effects(simulation: Simulation) -> tuple[EffectRow, ...]:
-    found = decide_effects(simulation.scene, simulation.law.name, simulation.coupling.name,
-                           getattr(simulation.law, "rendering", None))
-    return tuple(EffectRow(effect.name, effect.active, effect.reason) for effect in found)
