@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ def mechanism_of(scene: Scene) -> Mechanism:
     A planar moment of inertia I about z becomes diag(I/2, I/2, I): the inertia of a flat body, so that the
     spatial engine sees a physical one. Only its zz entry ever moves in the plane.
     """
-    lay_out = body_in_space if isinstance(scene, SpatialScene) else _spatial_body
+    lay_out: Callable[[Any], Body] = body_in_space if isinstance(scene, SpatialScene) else _spatial_body
     return Mechanism(lay_out(body) for body in scene.bodies)
 
 
