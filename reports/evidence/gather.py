@@ -9,9 +9,10 @@ from typing import Any
 from reports.evidence import accuracy, claims, cross_checks, effects, hard_cases, proofs, properties, runs
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage
+from reports.evidence.topics import TOPICS, compute_topic
 from reports.evidence.verdicts import verdicts
 from reports.figures.figure import Numbers
-from reports.pages.records import Claim, CrossCheck, Evidence, HardCase, Property, SceneEffect
+from reports.pages.records import Claim, CrossCheck, Evidence, HardCase, Property, SceneEffect, Topic
 from reports.provenance import collect_provenance
 from reports.runner import Runner
 
@@ -36,14 +37,20 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
     hard = kept.stage("hard cases", tuple[HardCase, ...], hard_cases.compute)
     timed = kept.stage("accuracy", Numbers, accuracy.compute)
+    topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
     inputs |= {"work_precision": timed, "energy_gains": bulk}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, cross_checks=checks,
-        hard_cases=hard, effects=needed, provenance=collect_provenance(seeds=(properties.SEED,)),
+        hard_cases=hard, effects=needed, topics=topics, provenance=collect_provenance(seeds=(properties.SEED,)),
         manifest=manifest(runner, kept.paths, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)
+
+
+def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
+    topic: Topic = kept.stage(name, Topic, lambda done: compute_topic(name, runner, depth, done))
+    return topic
 
 
 def _with_verdicts(evidence: Evidence) -> Evidence:

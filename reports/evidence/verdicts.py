@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from reports.pages.records import LIMITED, OUTCOMES, REFUTED, REPRODUCED, Evidence, Verdict
+from reports.pages.records import (
+    LIMITED,
+    NOT_COMPUTED,
+    NOT_TESTABLE,
+    OUTCOMES,
+    REFUTED,
+    REPRODUCED,
+    Evidence,
+    Verdict,
+)
+
+_WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 
 
 def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
@@ -74,3 +85,10 @@ def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
     stable = sum(result[3].startswith("stable") for result in ours)
     sentence = f"The engine is stable on {stable} of {len(ours)} hard cases with exact answers."
     yield Verdict("Hard cases", REPRODUCED if stable == len(ours) else LIMITED, sentence, "hard-cases")
+
+
+def _topics(evidence: Evidence) -> Iterator[Verdict]:
+    for topic in evidence.topics:
+        if topic.verdict:
+            outcome = min((finding.outcome for finding in topic.findings), key=_WORST_FIRST.index)
+            yield Verdict(topic.title, outcome, topic.verdict, topic.id)

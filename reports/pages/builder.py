@@ -9,11 +9,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.figures import RECIPES
-from reports.figures.figure import Figure, NotComputed, Recipe, draw
+from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.legend import swatch
-from reports.pages.records import OUTCOMES, Claim, Evidence, HardCase, Verdict
+from reports.pages.records import OUTCOMES, Claim, Evidence, HardCase, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 
@@ -42,7 +42,8 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
-    return {**scenes, "energy_gains": evidence.bulk, **evidence.inputs}
+    tables = {f"{topic.id}/{name}": table for topic in evidence.topics for name, table in topic.tables.items()}
+    return {**scenes, **tables, "energy_gains": evidence.bulk, **evidence.inputs}
 
 
 def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
@@ -61,6 +62,12 @@ def outcomes_by_method(results: Sequence[tuple[str, float | None, float | None, 
     return {method: outcome for method, _, _, outcome in results}
 
 
+def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Numbers], ...]:
+    """Return the tables of a topic, with their names, that no figure was drawn from."""
+    drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
+    return tuple((name, table) for name, table in topic.tables.items() if f"{topic.id}/{name}" not in drawn)
+
+
 def known(value: float | None) -> float | None:
     """Return the value, or None for one that a method did not deliver (its outcome says why)."""
     return None if value is None or value != value else value
@@ -74,7 +81,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, known=known, outcomes_by_method=outcomes_by_method,
+        as_finding=FINDINGS.__getitem__, known=known, tables_without=tables_without, outcomes_by_method=outcomes_by_method,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

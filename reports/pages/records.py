@@ -85,6 +85,31 @@ class HardCase:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One sentence that a topic found, with its number in it, and what that means."""
+
+    sentence: str
+    outcome: str
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A section of the report: what it asks, what it found, and the tables behind that.
+
+    lead : two or three sentences that say what is asked and how
+    tables : by name; a figure asks for one as "<id>/<name>", and those that none asks for are printed
+    verdict : the sentence of the first page, empty for none; its outcome is the worst of the findings
+    """
+
+    id: str
+    title: str
+    lead: str
+    findings: tuple[Finding, ...]
+    tables: Mapping[str, Numbers] = field(default_factory=dict)
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
 class SceneEffect:
     """One effect of a scene: on or off, why, what it costs and what leaving it out would change."""
 
@@ -122,6 +147,7 @@ class Evidence:
     hard_cases: tuple[HardCase, ...] = ()
     bulk: Numbers | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
+    topics: tuple[Topic, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     manifest: tuple[StoredFile, ...] = ()
     figure_command: str = "iapb reproduce --figure {key}"

@@ -15,14 +15,19 @@ class Section:
     id: str
     title: str
     ready: Callable[[Evidence], bool]
+    topic: bool = False  # drawn from a Topic, by the template that all of them share
 
     @property
     def template(self) -> str:
-        return f"{self.id}.html.j2"
+        return "topic.html.j2" if self.topic else f"{self.id}.html.j2"
 
 
 def _always(_: Evidence) -> bool:
     return True
+
+
+def _topic(id: str, title: str) -> Section:
+    return Section(id, title, lambda evidence: any(topic.id == id for topic in evidence.topics), topic=True)
 
 
 SECTIONS: tuple[Section, ...] = (
@@ -33,8 +38,14 @@ SECTIONS: tuple[Section, ...] = (
     Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs)),
     Section("properties", "Properties", lambda evidence: bool(evidence.properties)),
     Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks)),
+    _topic("mechanics", "Linkages and free bodies"),
+    _topic("scenes", "The scenes"),
+    _topic("complementarity", "Against complementarity"),
     Section("accuracy", "Accuracy against time", _always),
     Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases)),
+    _topic("stability", "Stability of contact"),
+    _topic("engines", "Other engines"),
+    _topic("haptic-rate", "The haptic rate"),
     Section("effects", "Effects", lambda evidence: bool(evidence.effects)),
     Section("provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
     Section("manifest", "Manifest", lambda evidence: bool(evidence.manifest)),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from iapb.errors import ArgumentError
+from reports.evidence.verdicts import verdicts as first_page
 from reports.figures.fig03_energy_loss import arm_energies
 from reports.figures.figure import Numbers
 from reports.pages.builder import OUTCOME_MARKS
@@ -21,10 +22,12 @@ from reports.pages.records import (
     Claim,
     CrossCheck,
     Evidence,
+    Finding,
     HardCase,
     Property,
     SceneEffect,
     StoredFile,
+    Topic,
     Verdict,
 )
 from reports.pages.sections import SECTIONS
@@ -76,6 +79,8 @@ def full() -> Evidence:
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(HardCase("bar", "ours", "$0.5$", (("factored", 1e-16, None, "exact"),)),),
+        topics=(Topic("mechanics", "Linkages", "Asked <here>.", (Finding("It holds to 1e-14.", REPRODUCED),),
+                      {"trees": Numbers(("joints", "error"), ((3, 1e-14),))}, "All hold."),),
         effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
@@ -168,6 +173,19 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
     assert '<span class="good">✓</span> stable' in page
     assert '<span class="bad">✕</span> refused' in page
     assert "not a number" not in page
+
+
+def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Evidence) -> None:
+    page = build_report(full)
+    assert "Asked &lt;here&gt;." in page
+    assert "It holds to 10<sup>−14</sup>." in page
+    assert "<summary>Trees</summary>" in page
+
+
+def test_a_topic_with_a_verdict_stands_on_the_first_page_with_the_worst_of_its_findings() -> None:
+    findings = (Finding("a", REPRODUCED), Finding("b", LIMITED))
+    topics = (Topic("mechanics", "Linkages", "", findings, {}, "Most hold."), Topic("scenes", "Scenes", "", findings))
+    assert first_page(Evidence(topics=topics)) == (Verdict("Linkages", LIMITED, "Most hold.", "mechanics"),)
 
 
 def test_prose_keeps_a_lone_dollar() -> None:
