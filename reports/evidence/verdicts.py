@@ -22,7 +22,7 @@ _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
     """One verdict for each topic that was computed."""
     return (*_claims(evidence), *_passivity(evidence), *_proofs(evidence), *_laws(evidence), *_checks(evidence),
-            *_hard_cases(evidence))  # fmt: skip
+            *_hard_cases(evidence), *_topics(evidence))  # fmt: skip
 
 
 def _claims(evidence: Evidence) -> Iterator[Verdict]:

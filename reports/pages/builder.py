@@ -81,7 +81,8 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, known=known, tables_without=tables_without, outcomes_by_method=outcomes_by_method,
+        as_finding=FINDINGS.__getitem__, known=known, outcomes_by_method=outcomes_by_method,
+        tables_without=tables_without,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

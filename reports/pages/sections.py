@@ -39,7 +39,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("properties", "Properties", lambda evidence: bool(evidence.properties)),
     Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks)),
     _topic("mechanics", "Linkages and free bodies"),
-    _topic("scenes", "The scenes"),
+    _topic("scene-ledger", "The scenes"),
     _topic("complementarity", "Against complementarity"),
     Section("accuracy", "Accuracy against time", _always),
     Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases)),
