@@ -1,0 +1,45 @@
+"""One fault for each law of `engine_laws`: a subject that the law must catch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from verification.properties.case import Floats
+from verification.properties.engine_laws import ENGINE_LAWS, EngineLaw, judge_engine_law
+from verification.properties.engine_laws.device_limits import saturated
+from verification.properties.engine_laws.hand_port import Wall
+from verification.properties.planted import sound_resolver
+
+__all__ = ["ENGINE_LAWS", "PLANTED_ENGINE_FAULTS", "EngineLaw", "judge_engine_law"]
+
+
+def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Floats:
+    """The first rows as they are, each with the impulse it would need alone: exact for one row, not for more."""
+    lower = np.linalg.cholesky(M)
+    rows, u = np.linalg.solve(lower, J[:budget].T).T, lower.T @ v
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
+    return v - (1.0 + e) * np.linalg.solve(lower.T, rows.T @ (rows @ u))
+
+
+def makes_late_wall() -> Wall:
+    """Pushes by the reading before the last one."""
+    before = [0.0]
+
+    def late_wall(depth: float, rate: float, K: float, B: float) -> float:
+        late, before[0] = before[0], depth
+        return max(0.0, K * late + B * rate) if depth > 0.0 else 0.0
+
+    return late_wall
+
+
+# law -> (name of the fault, how to make its subject)
+PLANTED_ENGINE_FAULTS: dict[str, tuple[str, Callable[[], Callable[..., Any]]]] = {
+    "truncation": ("rows not made orthogonal", lambda: not_orthogonal),
+    "device_limits": ("saturation, component by component", lambda: saturated),
+    "hand_port": ("a wall one reading late", makes_late_wall),
+    "extremes": ("plain numpy without checks", lambda: sound_resolver),
+}
