@@ -1,0 +1,43 @@
+"""`iapb sweep STUDY`: one scene, many values; resumable, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def sweep(
+    study: Annotated[str, typer.Argument(help="A study file, or the name of one that comes with the project.")],
+    workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one per core.", min=0)] = 0,
+    scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler to use instead.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder of the sweeps.")] = Path("out/sweeps"),
+) -> None:
+    """Simulate every point of STUDY that is not there yet, one run file each, and write a table of them all.
+
+    Stop it whenever you like; the same command goes on where it stopped.
+    """
+    import os
+    from collections import Counter
+
+    from reports.commands.progress import stage_progress
+    from reports.sweeps.files import find_study, scene_of
+    from reports.sweeps.schedule import cluster, processes
+    from reports.sweeps.study import load_study
+    from reports.sweeps.sweep import SUMMARY, run_sweep
+
+    path = find_study(study)
+    chosen = load_study(path)
+    who = cluster(scheduler) if scheduler else processes(workers or os.cpu_count() or 1)
+    with stage_progress() as progress:
+        outcome = run_sweep(chosen, str(scene_of(chosen, path)), out, who,
+                            lambda done, total: progress(f"points of {chosen.name}", done, total))
+    made, failed = len(outcome.results) - outcome.reused, outcome.failed
+    print(f"{chosen.name}: {len(outcome.results)} points, {made} computed now, {outcome.reused} found.")
+    for note, count in Counter(result.note for result in failed).most_common(5):
+        print(f"  {count} without a run: {note}")
+    print(f"All results together: {outcome.content_hash[:16]}")
+    print(f"Table in {out / chosen.name / SUMMARY}, runs in {out / chosen.name / 'runs'}")
+    if failed:
+        raise typer.Exit(1)

@@ -1,0 +1,127 @@
+"""Study: what a sweep file may say. Read like a scene: every mistake at once, with its line and column."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+from pydantic_core import InitErrorDetails
+
+from iapb.errors import ArgumentError, Mistake, SceneError
+from iapb.scene.document import MAX_CHARACTERS, DocumentError, read_document
+from iapb.scene.parts import Name, Number, Part, Text, located
+from iapb.scene.reading import mistakes_of, written
+
+MAX_POINTS = 1_000_000  # files in one folder: more is no sweep but a slip of the pen
+MAX_VALUES = 100_000  # of one axis
+
+Value = Annotated[Number | bool | Text | tuple[Number, ...], Field()]
+Values = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MAX_VALUES)]
+
+
+class Range(Part):
+    """Evenly spaced values, on a line or by a factor."""
+
+    start: Number = Field(alias="from", description="first value")
+    stop: Number = Field(alias="to", description="last value")
+    count: Annotated[int, Field(ge=2, le=MAX_VALUES, strict=True)] = Field(description="how many, both ends included")
+    scale: Literal["linear", "log"] = Field("linear", description="equal steps, or equal factors")
+
+    @classmethod
+    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+        ends = [given.get(name) for name in ("from", "to")] if isinstance(given, dict) else []
+        positive = all(isinstance(end, int | float) and end > 0.0 for end in ends)
+        if ends and given.get("scale") == "log" and not positive:
+            return [located(("scale",), "log", "linear where an end is not positive")]
+        return []
+
+    def values(self) -> tuple[float, ...]:
+        """The values, ends exact."""
+        shares = [i / (self.count - 1) for i in range(self.count)]
+        if self.scale == "log":
+            factor = math.log(self.stop / self.start)
+            inner = [self.start * math.exp(share * factor) for share in shares]
+        else:
+            inner = [self.start + share * (self.stop - self.start) for share in shares]
+        return (self.start, *inner[1:-1], self.stop)
+
+
+class Span(Part):
+    """Where random values lie."""
+
+    start: Number = Field(alias="from", description="least value")
+    stop: Number = Field(alias="to", description="largest value")
+
+
+class Draws(Part):
+    """Random points: each draws every one of its values, evenly between two ends."""
+
+    count: Annotated[int, Field(ge=1, le=MAX_POINTS, strict=True)] = Field(description="how many points")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1, strict=True)] = Field(0, description="of the random numbers")
+    values: Annotated[dict[str, Span], Field(min_length=1)] = Field(description="value path: {from, to}")
+
+
+class Study(Part):
+    """A sweep: every combination of the grid, times the random draws, in every world.
+
+    Paths are those of a scene (``contact.stiffness``, ``bodies.peg.velocity.0``), or ``law.`` and a setting of the
+    contact law (``law.integrator``).
+    """
+
+    name: Name = Field(description="the folder of the results")
+    title: Text = Field("", description="one line for people")
+    scene: Text = Field(description="name of a scene that comes with the project, or a file beside this one")
+    worlds: Annotated[tuple[str, ...], Field(min_length=1, max_length=20)] = Field(("IAPB",), description="worlds")
+    rendering: str = Field("full", description="how impulses meet the device's limits")
+    values: dict[str, Value] = Field(default_factory=dict, description="values that hold at every point")
+    grid: dict[str, Range | Values] = Field(default_factory=dict, description="value path: list, or {from, to, count}")
+    random: Draws | None = Field(None, description="random draws; default: none")
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        combinations = math.prod(len(values) for values in self.axes().values())
+        return len(self.worlds) * combinations * (self.random.count if self.random else 1)
+
+    def axes(self) -> dict[str, tuple[Any, ...]]:
+        """The values of each axis of the grid."""
+        return {path: axis.values() if isinstance(axis, Range) else axis for path, axis in self.grid.items()}
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study from a YAML file.
+
+    Raises
+    ------
+    ArgumentError
+        The file cannot be read.
+    SceneError
+        It is not a study, or one of more than MAX_POINTS points; carries all of its mistakes.
+    """
+    try:
+        with open(path, "rb") as file:
+            text = file.read(4 * MAX_CHARACTERS + 1).decode("utf-8-sig")
+    except (OSError, ValueError) as failure:
+        raise ArgumentError("study", str(path), f"a readable file of text in UTF-8 ({failure})") from failure
+    return study_from_text(text, str(path))
+
+
+def study_from_text(text: str, file: str = "(text)") -> Study:
+    """Read a study from YAML text; see `load_study`."""
+    try:
+        root, repeated = read_document(text)
+    except DocumentError as failure:
+        mistake = Mistake(file, failure.line, failure.column, "(file)", failure.value, failure.expected)
+        raise SceneError([mistake]) from failure
+    mistakes = [Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated]
+    try:
+        study = Study.model_validate(root.value)
+    except ValidationError as failure:
+        raise SceneError(mistakes + mistakes_of(failure, file, root)) from failure
+    if study.size > MAX_POINTS:
+        mistakes.append(Mistake(file, 1, 1, "(file)", f"{study.size} points", f"at most {MAX_POINTS}"))
+    if mistakes:
+        raise SceneError(mistakes)
+    return study

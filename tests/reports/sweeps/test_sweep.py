@@ -1,0 +1,129 @@
+"""A sweep gives the same whatever interrupts it and whoever computes it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+from iapb import find_scene
+from iapb.errors import ArgumentError, IapbError
+from reports.store_tables import read_table
+from reports.sweeps.points import Point
+from reports.sweeps.schedule import cluster, here, processes
+from reports.sweeps.study import Study, study_from_text
+from reports.sweeps.sweep import JOURNAL, RUNS, SUMMARY, SweepOutcome, run_sweep
+from reports.sweeps.work import FAILED, Result, compute_point
+
+SCENE = str(find_scene("two_discs"))
+
+
+@pytest.fixture
+def undisturbed(study: Study, tmp_path: Path) -> SweepOutcome:
+    return run_sweep(study, SCENE, tmp_path / "undisturbed")
+
+
+class Stopped(Exception):
+    """Stands for whatever ends a process."""
+
+
+def stopping_after(count: int):  # type: ignore[no-untyped-def]
+    """A scheduler that computes backwards and dies after `count` points."""
+
+    def compute(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
+        for done, result in enumerate(here(reversed(list(points)), folder, code)):
+            if done == count:
+                raise Stopped
+            yield result
+
+    return compute
+
+
+def test_a_sweep_that_was_stopped_goes_on_and_ends_alike(
+    study: Study, undisturbed: SweepOutcome, tmp_path: Path
+) -> None:
+    with pytest.raises(Stopped):
+        run_sweep(study, SCENE, tmp_path, stopping_after(4))
+    outcome = run_sweep(study, SCENE, tmp_path)
+    assert outcome.reused == 4
+    assert outcome.content_hash == undisturbed.content_hash
+    assert [r.file for r in outcome.results] == [r.file for r in undisturbed.results]
+
+
+def test_a_finished_sweep_computes_nothing(study: Study, tmp_path: Path) -> None:
+    first = run_sweep(study, SCENE, tmp_path)
+    again = run_sweep(study, SCENE, tmp_path, stopping_after(0))
+    assert (again.reused, again.content_hash) == (6, first.content_hash)
+
+
+def test_a_torn_line_and_a_lost_file_are_computed_again(study: Study, undisturbed: SweepOutcome) -> None:
+    folder = undisturbed.folder
+    (folder / RUNS / undisturbed.results[0].file).unlink()
+    journal = folder / JOURNAL
+    journal.write_bytes(journal.read_bytes()[:-40])
+    outcome = run_sweep(study, SCENE, folder.parent)
+    assert outcome.reused == 4
+    assert outcome.content_hash == undisturbed.content_hash
+
+
+def test_other_values_give_another_hash(text: str, undisturbed: SweepOutcome, tmp_path: Path) -> None:
+    other = run_sweep(study_from_text(text.replace("seed: 3", "seed: 4")), SCENE, tmp_path)
+    assert other.content_hash != undisturbed.content_hash
+
+
+def test_processes_give_the_same(study: Study, undisturbed: SweepOutcome, tmp_path: Path) -> None:
+    assert run_sweep(study, SCENE, tmp_path, processes(2)).content_hash == undisturbed.content_hash
+
+
+def test_a_dask_cluster_gives_the_same(study: Study, undisturbed: SweepOutcome, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:
+        outcome = run_sweep(study, SCENE, tmp_path, cluster(local.scheduler_address))
+    assert outcome.content_hash == undisturbed.content_hash
+
+
+def test_an_address_where_nobody_answers_is_refused(study: Study, tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    with pytest.raises(ArgumentError, match="--scheduler"):
+        run_sweep(study, SCENE, tmp_path, cluster("nonsense://nowhere"))
+
+
+def test_a_worker_of_another_version_does_not_take_part(study: Study, tmp_path: Path) -> None:
+    from reports.sweeps.points import points_of
+
+    with pytest.raises(IapbError, match="another version"):
+        compute_point(next(points_of(study, SCENE)), str(tmp_path), "other code")
+
+
+def test_a_point_that_cannot_be_run_is_told_and_the_others_are_done(study: Study, tmp_path: Path) -> None:
+    wrong = study.model_copy(update={"grid": {"law.integrator": ("midpoint", "euler")}})
+    outcome = run_sweep(wrong, SCENE, tmp_path)
+    assert [result.status == FAILED for result in outcome.results] == [False] * 3 + [True] * 3
+    assert "one of semi_implicit_euler" in outcome.failed[0].note
+
+
+def test_the_table_has_a_row_for_each_point(undisturbed: SweepOutcome) -> None:
+    table = read_table(undisturbed.folder / SUMMARY, "small")
+    assert list(table["file"]) == [result.file for result in undisturbed.results]
+    assert list(table["contact.restitution"]) == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    assert table["energy_lost"][0] > 0.0 >= table["energy_lost"][-1] - 1e-12
+
+
+def test_a_killed_command_goes_on_and_ends_alike(text: str, undisturbed: SweepOutcome, tmp_path: Path) -> None:
+    (tmp_path / "small.yaml").write_text(text)
+    command = [sys.executable, "-m", "reports.cli", "sweep", str(tmp_path / "small.yaml"), "--workers", "1",
+               "--out", str(tmp_path / "out")]
+    journal = tmp_path / "out" / "small" / JOURNAL
+    killed = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    while killed.poll() is None and not (journal.is_file() and journal.stat().st_size):
+        time.sleep(0.01)
+    os.killpg(killed.pid, signal.SIGKILL)
+    killed.wait()
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert f"All results together: {undisturbed.content_hash[:16]}" in again.stdout
