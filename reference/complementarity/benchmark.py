@@ -23,7 +23,8 @@ Floats = NDArray[np.float64]
 class SolverRow:
     """One solver on one problem.
 
-    verdict : "solved", "refused", "failed" or "missing" (the solver is not installed)
+    verdict : "solved", "refused", "failed", "missing" (the solver is not installed) or "left out" (it was slower than
+        `longest` on a problem before)
     spread : largest difference of contact velocities from the best solution, relative to the velocity scale;
         NaN where this solver or no solver solved it. Impulses are not compared: they are not unique
     asymmetry : of the problem's W, beyond rounding, else 0
@@ -46,21 +47,37 @@ def run_solvers(
     *,
     tolerance: float = SOLVED_TOLERANCE,
     repeats: int = 1,
+    longest: float = np.inf,
     progress: Callable[[str, str], None] | None = None,
 ) -> list[SolverRow]:
-    """Solve every problem by every solver that takes its kind (or by `solvers`); the least time of `repeats`."""
+    """Solve every problem by every solver that takes its kind (or by `solvers`); the least time of `repeats`.
+
+    A solver that needs more than `longest` [s] for one problem is not asked again: give the smallest problems first.
+    """
     rows: list[SolverRow] = []
+    slow: dict[str, float] = {}
     for problem in problems:
-        rows += _rows(problem, solvers or solver_names(problem), tolerance, repeats, progress)
+        names = solvers or solver_names(problem)
+        found = _rows(problem, [name for name in names if name not in slow], tolerance, repeats, progress)
+        slow |= {row.solver: row.seconds for row in found if row.seconds > longest}
+        rows += found + [_unasked(problem, name, slow[name]) for name in names if name in slow
+                         and name not in {row.solver for row in found}]  # fmt: skip
     return rows
+
+
+def _unasked(problem: ImpactProblem, solver: str, seconds: float) -> SolverRow:
+    asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
+    note = f"left out: {seconds:.3g} s for a problem before"
+    return SolverRow(problem.name, problem.size, solver, "left out", Residuals(), np.nan, np.nan, asymmetry, note)
 
 
 def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
     """Per solver, the share of problems solved within each factor (>= 1) of the fastest solver's time.
 
-    Problems that no solver solved count as solved by none.
+    Problems that no solver solved count as solved by none. A solver that is not installed has no curve.
     """
-    names, problems = sorted({row.solver for row in rows}), sorted({row.problem for row in rows})
+    names = sorted({row.solver for row in rows if row.verdict != "missing"})
+    problems = sorted({row.problem for row in rows})
     times = np.full((len(names), len(problems)), np.inf)
     for row in rows:
         if row.verdict == "solved":

@@ -26,7 +26,8 @@ class MapCell:
 
     agree : share whose motions are one; adhesive, artefact : shares whose impulses truly pull, or only as chosen
     nearest : least distance among those that differ (how sharp the border is), farthest : largest of all
-    typical : median distance among those that differ; extra_loss : largest share of KE⁻ that IAPB loses in addition
+    typical : median distance among those that differ
+    extra_loss, least_extra_loss : largest and least share of KE⁻ that IAPB loses in addition
     left_approaching, left_approaching_law : share with a contact (given or touching) left approaching
     contradictions : cases in which the motions are one without a p >= 0 for it, or the other way round
     defect : largest defect of statements 1 and 3 (`agreement`), momentum : largest momentum residual
@@ -45,6 +46,7 @@ class MapCell:
     typical: float
     farthest: float
     extra_loss: float
+    least_extra_loss: float
     left_approaching: float
     left_approaching_law: float
     contradictions: int
@@ -84,6 +86,7 @@ def _cell(key: tuple[str, str, float, int], members: Sequence[Comparison]) -> Ma
         nearest=min(apart, default=np.nan), typical=float(np.median(apart)) if apart else np.nan,
         farthest=max(m.distance for m in members),
         extra_loss=max(m.energy_lost - m.energy_lost_law for m in members),
+        least_extra_loss=min(m.energy_lost - m.energy_lost_law for m in members),
         left_approaching=_share(m.approaching > 0 for m in members),
         left_approaching_law=_share(m.approaching_law > 0 for m in members),
         contradictions=sum(contradicts(m) for m in members) if newton else 0,

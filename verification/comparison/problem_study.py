@@ -6,7 +6,7 @@ out in silence. Solutions are compared by velocities: the impulses of hyperstati
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-VERDICTS = ("solved", "refused", "failed", "missing")
+VERDICTS = ("solved", "refused", "failed", "missing", "left out")
 FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # of the fastest solver's time
 
 
@@ -34,7 +34,7 @@ class UnreadFile:
 
 @dataclass(frozen=True)
 class ProblemLine:
-    """One problem: format, unknowns, whether hyperstatic, asymmetry of W (0 where symmetric), verdicts by solver.
+    """One problem: format, friction, unknowns, rank of W, asymmetry of W (0 where symmetric), verdicts by solver.
 
     stored : worst recomputed residual of the multipliers that the file itself carries; NaN where it carries none
     spread : largest difference of contact velocities among the solvers that solved it, relative
@@ -42,6 +42,7 @@ class ProblemLine:
 
     problem: str
     format: str
+    friction: bool
     unknowns: int
     rank: int
     asymmetry: float
@@ -74,41 +75,79 @@ class ProblemStudy:
         return tuple(dict.fromkeys(row.solver for row in self.rows))
 
 
+Progress = Callable[[str, int, int], None]
+
+
 def study_problems(
-    folder: Path | str, repeats: int = 1, progress: Callable[[str, int, int], None] | None = None
+    folder: Path | str, repeats: int = 1, longest: float = np.inf, progress: Progress | None = None
 ) -> ProblemStudy:
     """Read every problem file below `folder` and solve it by every solver that takes its kind.
+
+    Parameters
+    ----------
+    repeats : solves of each pair, of which the fastest counts
+    longest : a solver that needs more seconds than this for a problem is not asked for one with more unknowns
 
     Raises
     ------
     ArgumentError
         If the folder does not exist.
     """
+    from reference.datasets import DatasetError, problem_files, read_problem
+
+    read, unread = list["StoredProblem"](), list[UnreadFile]()
+    for path in problem_files(folder):
+        try:
+            read.append(read_problem(path))
+        except DatasetError as error:
+            unread.append(UnreadFile(path.name, str(error)))
+    return study_read(str(folder), read, unread, repeats, longest, progress)
+
+
+def study_read(
+    name: str, problems: Sequence[StoredProblem], unread: Sequence[UnreadFile] = (), repeats: int = 1,
+    longest: float = np.inf, progress: Progress | None = None,
+) -> ProblemStudy:
+    """Solve every problem of a collection called `name` by every solver that takes its kind."""
     from threadpoolctl import threadpool_limits
 
     from reference.complementarity.benchmark import run_solvers
-    from reference.datasets import DatasetError, problem_files, read_problem
 
-    lines, unread = list[ProblemLine](), list[UnreadFile]()
-    rows: list[SolverRow] = []
+    with threadpool_limits(1):
+        _warm(problems)
+        small_first = sorted((stored.problem for stored in problems), key=lambda problem: problem.size)
+        done = 0
+
+        def tell(_: str, solver: str) -> None:
+            nonlocal done
+            done += 1
+            if progress is not None:
+                progress(f"problems of {name}", done, done + 1)
+
+        rows = run_solvers(small_first, repeats=repeats, longest=longest, progress=tell)
     kinds: dict[str, list[SolverRow]] = {}
-    files = problem_files(folder)
-    for done, path in enumerate(files):
-        if progress is not None:
-            progress("problem files", done, len(files))
-        try:
-            stored = read_problem(path)
-        except DatasetError as error:
-            unread.append(UnreadFile(path.name, str(error)))
-            continue
-        with threadpool_limits(1):
-            found = run_solvers([stored.problem], repeats=repeats)
-        rows += found
-        kinds.setdefault("frictionless" if stored.problem.friction is None else "friction", []).extend(found)
-        lines.append(_line(stored, found))
-    if progress is not None and files:
-        progress("problem files", len(files), len(files))
-    return ProblemStudy(str(folder), tuple(lines), tuple(rows), tuple(unread), _profiles(kinds))
+    for stored in problems:
+        kind = "frictionless" if stored.problem.friction is None else "friction"
+        kinds.setdefault(kind, []).extend(_of(stored, rows))
+    lines = tuple(_line(stored, _of(stored, rows)) for stored in problems)
+    if progress is not None and problems:
+        progress(f"problems of {name}", 1, 1)
+    return ProblemStudy(name, lines, tuple(rows), tuple(unread), _profiles(kinds))
+
+
+def _warm(problems: Sequence[StoredProblem]) -> None:
+    """Import and compile every solver on a problem of one contact, so that none of that counts as its time."""
+    from reference.complementarity.benchmark import run_solvers
+    from reference.complementarity.problem import ImpactProblem
+
+    for friction in {stored.problem.friction is not None for stored in problems}:
+        size = 3 if friction else 1
+        w, b = np.eye(size), -np.eye(size)[0]
+        run_solvers([ImpactProblem.from_delassus(w, b, 0.0, 0.5 if friction else None)])
+
+
+def _of(stored: StoredProblem, rows: Sequence[SolverRow]) -> list[SolverRow]:
+    return [row for row in rows if row.problem == stored.problem.name]
 
 
 def _line(stored: StoredProblem, rows: list[SolverRow]) -> ProblemLine:
@@ -116,8 +155,9 @@ def _line(stored: StoredProblem, rows: list[SolverRow]) -> ProblemLine:
     spreads = [row.spread for row in rows if row.verdict == "solved"]
     rank = int(np.linalg.matrix_rank(problem.delassus, hermitian=problem.asymmetry == 0.0)) if problem.size else 0
     return ProblemLine(
-        problem.name, stored.format, problem.size, rank, rows[0].asymmetry if rows else 0.0,
-        tuple((row.solver, row.verdict) for row in rows), max(spreads, default=np.nan), _stored_residual(stored),
+        problem.name, stored.format, problem.friction is not None, problem.size, rank,
+        rows[0].asymmetry if rows else 0.0, tuple((row.solver, row.verdict) for row in rows),
+        max(spreads, default=np.nan), _stored_residual(stored),
     )  # fmt: skip
 
 

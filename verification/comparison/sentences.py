@@ -180,16 +180,29 @@ def problems(study: ProblemStudy) -> tuple[str, ...]:
     )
     skew = [f"{line.problem} ({line.asymmetry:.1g})" for line in study.lines if line.asymmetry > 0.0]
     unsolved = [line.problem for line in study.lines if all(verdict != "solved" for _, verdict in line.verdicts)]
-    spread = np.nanmax([line.spread for line in study.lines], initial=0.0)
+    smooth, rough = _spread(study, 0), _spread(study, 1)
     found = [
         f"{study.folder}: {len(study.lines)} problems read, {len(study.unread)} files not. Solved/refused/failed by "
-        f"recomputed residuals: {counts}.",
-        f"Solved by nobody: {', '.join(unsolved) or 'none'}. Those who solve a problem agree on its contact velocities "
-        f"to {spread:.0e} (impulses are not compared: they are not unique).",
+        f"recomputed residuals: {counts}." + _left_out(study),
+        f"Solved by nobody: {', '.join(unsolved) or 'none'}. Those who solve a frictionless problem agree on its "
+        f"contact velocities to {smooth:.0e} (impulses are not unique and not compared)"
+        + (f"; with friction, where Coulomb's law leaves even velocities open, to {rough:.0e}." if rough else "."),
     ]
     if skew:
         found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
     return tuple(found)
+
+
+def _spread(study: ProblemStudy, friction: int) -> float:
+    """Largest spread of contact velocities among the problems without (0) or with friction (1)."""
+    spreads = [line.spread for line in study.lines if line.friction == bool(friction)]
+    return float(np.nanmax(spreads, initial=0.0))
+
+
+def _left_out(study: ProblemStudy) -> str:
+    """What a limit of time kept from being tried."""
+    count = sum(row.verdict == "left out" for row in study.rows)
+    return f" {count} pairs were left out: that solver was too slow on a smaller problem." if count else ""
 
 
 def _seconds(value: float) -> str:

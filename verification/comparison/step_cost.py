@@ -24,8 +24,7 @@ CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
 SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
 IAPB, KERNEL, PRINTED = "IAPB", "IAPB kernel", "IAPB printed formula"
 REPEATS = 5
-# A solver that needs longer than this for one impact is not asked for a larger one; the row says so.
-LONGEST = 2.0
+LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked for a larger one; the row says so
 _SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
 # |v⁺ − v⁺_reference| in the kinetic metric below which an impact counts as solved; first-order solvers reach 1e-6.
 _SOLVED = 1e-5
@@ -81,6 +80,7 @@ def impact_cost(
     solvers: Sequence[str] = SOLVERS,
     repeats: int = REPEATS,
     seed: int = 22,
+    longest: float = LONGEST,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[CostRow, ...]:
     """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
@@ -92,14 +92,14 @@ def impact_cost(
         for make in (patch, pile):
             case = make(count, np.random.default_rng([seed, count]))
             with threadpool_limits(1):
-                rows += _time_case(case, solvers, max(3, repeats), too_slow)
+                rows += _time_case(case, solvers, max(3, repeats), longest, too_slow)
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))
     return tuple(rows)
 
 
 def _time_case(
-    case: ImpactCase, solvers: Sequence[str], repeats: int, too_slow: dict[tuple[str, str], float]
+    case: ImpactCase, solvers: Sequence[str], repeats: int, longest: float, too_slow: dict[tuple[str, str], float]
 ) -> list[CostRow]:
     calls, answers, notes = _warm(case, solvers, too_slow)
     samples: dict[str, list[float]] = {name: [] for name in calls}
@@ -109,7 +109,7 @@ def _time_case(
         for name in names[turn % len(names) :] + names[: turn % len(names)]:
             samples[name].append(_seconds(calls[name], inner[name]))
     for name, times in samples.items():
-        if np.median(times) > LONGEST:
+        if np.median(times) > longest:
             too_slow[case.family, name] = float(np.median(times))
     return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, *solvers)]
 

@@ -12,7 +12,7 @@ from iapb.scene import Scene
 from verification.comparison.agreement import Comparison, compare_case, compare_cases
 from verification.comparison.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
 from verification.comparison.cases import random_cases
-from verification.comparison.convergence import ConvergenceRow, convergence
+from verification.comparison.convergence import CASES, ConvergenceRow, TruthCase, convergence
 from verification.comparison.extensions import (
     FrictionCell,
     UnequalCell,
@@ -20,7 +20,8 @@ from verification.comparison.extensions import (
     compare_unequal,
     struck_bar,
 )
-from verification.comparison.problem_study import ProblemStudy, study_problems
+from verification.comparison.own_problems import own_problems
+from verification.comparison.problem_study import ProblemStudy, study_problems, study_read
 from verification.comparison.scene_cases import impacts_of_run, scene_impacts
 from verification.comparison.step_cost import CONTACTS, CostRow, impact_cost
 from verification.comparison.world_cost import StepCostRow, world_cost
@@ -32,19 +33,28 @@ SCENE_RESTITUTIONS = (None, 0.5)  # as the scene says, and half elastic: more im
 
 @dataclass(frozen=True)
 class Depth:
-    """How much is computed: impacts per cell of the map, friction impacts, sizes and repeats of the timings."""
+    """How much is computed.
+
+    cases, frictional, unequal : impacts per cell of the map, with friction, with unequal restitution
+    contacts, repeats : of the timings; longest : a solver slower than this [s] is not asked for larger problems
+    truths : scenes of the convergence study, None for all
+    """
 
     cases: int
     frictional: int
     unequal: int
     contacts: tuple[int, ...]
     repeats: int
+    longest: float
+    truths: tuple[str, ...] | None
 
 
+QUICK_TRUTHS = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing")
 DEPTHS = {
-    "quick": Depth(25, 40, 100, CONTACTS, 3),
-    "full": Depth(250, 300, 1000, CONTACTS, 7),
+    "quick": Depth(25, 40, 100, CONTACTS, 3, 0.4, QUICK_TRUTHS),
+    "full": Depth(250, 300, 1000, CONTACTS, 7, 60.0, None),
 }
+OWN = "own problems"  # name of the collection that is always there
 
 
 @dataclass(frozen=True)
@@ -56,7 +66,7 @@ class ComparisonStudy:
     scenes : the map over impacts of the project's scenes; left_out : scene impacts that cannot be compared
     friction, unequal, bar : the engine's extensions beside their complementarity counterparts
     convergence : of the rigid world to event-driven truth, scene by scene
-    impact_costs, step_costs : C22; problems : folders of problem files
+    impact_costs, step_costs : C22; problems : our own collection, and folders of problem files
     """
 
     depth: str
@@ -104,11 +114,16 @@ def compare(
         single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy),
         cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
         friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
-        bar=struck_bar(), convergence=convergence(progress=say),
-        impact_costs=impact_cost(size.contacts, repeats=size.repeats, progress=say),
+        bar=struck_bar(), convergence=convergence(_truths(size), progress=say),
+        impact_costs=impact_cost(size.contacts, repeats=size.repeats, longest=size.longest, progress=say),
         step_costs=world_cost(repeats=size.repeats, progress=say),
-        problems=tuple(study_problems(folder, progress=say) for folder in folders),
+        problems=(study_read(OWN, own_problems(), longest=size.longest, progress=say),
+                  *(study_problems(folder, longest=size.longest, progress=say) for folder in folders)),
     )  # fmt: skip
+
+
+def _truths(size: Depth) -> list[TruthCase]:
+    return [case for case in CASES if size.truths is None or case.scene in size.truths]
 
 
 def _random_comparisons(count: int, say: Progress) -> tuple[Comparison, ...]:

@@ -31,8 +31,7 @@ def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monke
         return (lambda: case.velocity) if name == "lemke" else original(case, name)
 
     monkeypatch.setattr(step_cost, "_solver_call", wrong)
-    monkeypatch.setattr(step_cost, "LONGEST", 0.0)
-    rows = {(r.family, r.contacts, r.solver): r for r in impact_cost((1, 2), ("daqp", "lemke"), repeats=1)}
+    rows = {(r.family, r.contacts, r.solver): r for r in impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0)}
     assert rows["patch", 1, "lemke"].verdict == "failed"
     assert rows["patch", 2, "daqp"].verdict == "left out"
 

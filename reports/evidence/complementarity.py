@@ -1,0 +1,65 @@
+"""Topic: what the three assumptions of IAPB buy against complementarity, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from reports.evidence import complementarity_tables as tables
+from reports.pages.records import OUTCOMES, Finding, Topic
+from reports.runner import Runner
+
+if TYPE_CHECKING:
+    from verification.comparison.study import ComparisonStudy
+
+ID, TITLE = "complementarity", "Against complementarity"
+LEAD = (
+    "IAPB gives every colliding contact its reflected velocity and lets impulses pull; a complementarity solver lets "
+    "contacts only push, and decides which do. Both were tried on the same impacts: random families of known geometry, "
+    "every impact of the project's scenes, and problems that solvers find hard. A solution counts only when residuals, "
+    "recomputed from the problem, say so; motions are compared in the kinetic metric, as shares of |v⁻|."
+)
+# Contact problems that others wrote, beside the project where somebody has put them; a clone has none and needs none.
+FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
+FOLDER_NAME = "problems of others"
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+    """Compare, judge each sentence from the records, and keep what is behind it."""
+    from verification.comparison.judgement import judge
+    from verification.comparison.study import compare
+
+    stages: list[str] = []
+
+    def say(stage: str, done: int, total: int) -> None:
+        if stage not in stages:
+            stages.append(stage)
+        progress(len(stages) - 1, STAGES)
+
+    study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
+    findings = tuple(Finding(judged.sentence, judged.verdict) for judged in judge(study))
+    progress(STAGES, STAGES)
+    return Topic(ID, TITLE, LEAD, findings, tables.all_tables(study) | {"worlds": tables.worlds(runner)},
+                 verdict(study, findings))  # fmt: skip
+
+
+STAGES = 9  # of `compare`, with a folder of problems
+
+
+def _renamed(study: ComparisonStudy) -> ComparisonStudy:
+    """Folders by name, not by where they are on this machine."""
+    own, *others = study.problems
+    return replace(study, problems=(own, *(replace(each, folder=FOLDER_NAME) for each in others)))
+
+
+def verdict(study: ComparisonStudy, findings: tuple[Finding, ...]) -> str:
+    """The sentence of the first page."""
+    cells = study.cells + study.scenes
+    cases = sum(cell.cases for cell in cells)
+    agree = sum(cell.agree * cell.cases for cell in cells) / cases
+    against = sum(cell.contradictions for cell in cells)
+    held = sum(finding.outcome == OUTCOMES[0] for finding in findings)
+    return (f"IAPB moves as the Newton LCP in {agree:.0%} of {cases} impacts, and exactly where some p >= 0 gives its "
+            f"motion ({against} exceptions); {held} of {len(findings)} findings hold without limits.")

@@ -1,0 +1,183 @@
+"""The tables of the comparison with complementarity, as the report prints and draws them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from reports.evidence.runs import shipped_scene
+from reports.figures.figure import Numbers
+from reports.runner import Runner
+
+if TYPE_CHECKING:
+    from verification.comparison.problem_study import ProblemStudy
+    from verification.comparison.study import ComparisonStudy
+
+WORLD_SCENE = "peg_corner"
+
+
+def all_tables(study: ComparisonStudy) -> dict[str, Numbers]:
+    """Every table of the topic but the worlds, by name."""
+    made = {
+        "map": agreement(study), "two contacts": two_contacts(study), "time per impact": impact_costs(study),
+        "time per step": step_costs(study), "profile": profile(study.problems), "convergence": convergence(study),
+        "friction": friction(study), "unequal restitution": unequal(study), "struck bar": bar(study), "laws": laws(),
+        "solvers": solvers(),
+    }  # fmt: skip
+    return made | {each.folder: problems(each) for each in study.problems}
+
+
+def agreement(study: ComparisonStudy) -> Numbers:
+    """The map, random families and then scenes."""
+    rows = tuple(
+        (c.family, c.restitution, c.redundancy, c.cases, c.agree, c.adhesive, c.artefact, c.adhesive_share,
+         _known(c.typical) if c.agree < 1.0 else None, c.farthest, max(c.extra_loss, 0.0), c.left_approaching,
+         c.left_approaching_law)
+        for c in study.cells + study.scenes
+    )  # fmt: skip
+    return Numbers(
+        ("impacts", "e", "redundant rows", "cases", "share that agrees", "share that truly pulls",
+         "share that pulls as chosen", "negative share of p", "median distance where they differ", "largest distance",
+         "largest extra loss of KE⁻", "left approaching by IAPB", "left approaching by the LCP"),
+        rows, 3, "IAPB and the Newton LCP; distances in the kinetic metric, of |v⁻|. A contact truly pulls where no "
+        "p >= 0 gives the motion; as chosen, where only the p of least norm does. Left approaching: share of impacts, "
+        "contacts that touch without a row included.")  # fmt: skip
+
+
+def two_contacts(study: ComparisonStudy) -> Numbers:
+    """The exact border of two contacts."""
+    rows = tuple((c.cosine, c.speed_ratio, c.predicted, c.found, c.distance) for c in study.two_contacts)
+    return Numbers(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
+                   "Two contacts whose rows have this cosine in the kinetic metric, closing at speeds 1 and r.")
+
+
+def impact_costs(study: ComparisonStudy) -> Numbers:
+    """A row per solver and size."""
+    rows = tuple(
+        (r.family, r.contacts, r.coordinates, r.solver, r.verdict, _known(r.median * 1e6), _known(r.least * 1e6),
+         _known(r.largest * 1e6), r.repeats, _known(r.distance), r.note)
+        for r in study.impact_costs
+    )  # fmt: skip
+    return Numbers(
+        ("impacts", "contacts", "coordinates", "solver", "outcome", "median [µs]", "least [µs]", "largest [µs]",
+         "samples", "distance", "note"), rows, 3,
+        "From M, J, v to v⁺, one thread, in turns. Kernels are called from compiled code, all others from Python, "
+        "their checks included.")  # fmt: skip
+
+
+def step_costs(study: ComparisonStudy) -> Numbers:
+    """A row per scene and world."""
+    rows = tuple((r.scene, r.way, *(1e6 * value for value in (r.median, r.least, r.largest)), r.repeats)
+                 for r in study.step_costs)  # fmt: skip
+    return Numbers(("scene", "world", "median [µs]", "least [µs]", "largest [µs]", "samples"), rows, 3)
+
+
+def profile(studies: Iterable[ProblemStudy]) -> Numbers:
+    """Dolan and Moré's profile, in long form."""
+    from verification.comparison.problem_study import FACTORS
+
+    rows = tuple(
+        (each.folder, kind, solver, float(factor), float(share))
+        for each in studies for kind, solver, shares in each.profile
+        for factor, share in zip(FACTORS, shares, strict=True)
+    )  # fmt: skip
+    return Numbers(("collection", "kind", "solver", "factor", "share solved"), rows, 3)
+
+
+def problems(study: ProblemStudy) -> Numbers:
+    """A row per problem, a column per solver."""
+    names = study.solvers
+    rows: list[tuple[Any, ...]] = []
+    for line in study.lines:
+        by = dict(line.verdicts)
+        rows.append((line.problem, line.unknowns, line.rank, line.asymmetry or None,
+                     *(by.get(name) for name in names), _known(line.spread), _known(line.stored)))  # fmt: skip
+    rows += [(file.file, None, None, None, *("not read" for _ in names), None, None) for file in study.unread]
+    return Numbers(
+        ("problem", "unknowns", "rank", "asymmetry of W", *names, "spread of velocities", "residual as stored"),
+        tuple(rows), 2, "Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. "
+        "Spread: of contact velocities among those who solved it.")  # fmt: skip
+
+
+def convergence(study: ComparisonStudy) -> Numbers:
+    """Errors of the rigid world, a row per scene and step."""
+    from verification.comparison.convergence import COARSE, FINE
+
+    rows = []
+    for r in study.convergence:
+        for rates, position, velocity in ((COARSE, r.position_coarse, r.velocity_coarse),
+                                          (FINE, r.position_fine, r.velocity_fine)):  # fmt: skip
+            step = len(rates) / sum(rates)
+            rows.append((r.scene, r.events, 1e3 * step, position * step, velocity * step,
+                         _known(r.position_order), _known(r.velocity_order)))  # fmt: skip
+    return Numbers(
+        ("scene", "events", "step [ms]", "error of positions", "error of velocities", "order, positions",
+         "order, velocities"), tuple(rows), 3,
+        "Largest of three steps near each; positions in the sup norm [m, rad], velocities in L¹ over time [m, rad]. "
+        "A dash: the error is rounding alone.")  # fmt: skip
+
+
+def friction(study: ComparisonStudy) -> Numbers:
+    """The extension by dry friction."""
+    rows = tuple(
+        (c.restitution, c.friction, c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains,
+         c.largest_gain, c.largest_gain_ncp, c.largest_gain_ccp, _known(c.typical_distance))
+        for c in study.friction
+    )  # fmt: skip
+    return Numbers(
+        ("e", "μ", "cases", "all contacts push", "of these as the NCP", "friction reduced", "unsolved", "NCP gains",
+         "CCP gains", "largest change of KE, IAPB", "NCP", "CCP", "median distance from the NCP"), rows, 2,
+        "Changes of energy as shares of KE⁻: above zero a gain.")  # fmt: skip
+
+
+def unequal(study: ComparisonStudy) -> Numbers:
+    """The extension by unequal restitution."""
+    rows = tuple((c.signs, c.cases, c.distance, c.gain, c.gain_newton_lcp, c.gain_equality) for c in study.unequal)
+    return Numbers(("contacts", "cases", "distance from Poisson's law", "largest change of KE, IAPB", "Newton LCP",
+                    "equalities"), rows, 2)  # fmt: skip
+
+
+def bar(study: ComparisonStudy) -> Numbers:
+    """The struck bar."""
+    return Numbers(("law", "kinetic energy [J]"), tuple(study.bar.items()), 5,
+                   "A bar struck at 0.5 and 0.4 of its length with e = 1 and e = 0.")  # fmt: skip
+
+
+def laws() -> Numbers:
+    """Impact laws by name."""
+    from reference.complementarity.laws import LAWS
+
+    rows = tuple((law.name, law.statement, law.source, law.hypotheses, law.never_gains_energy) for law in LAWS.values())
+    return Numbers(("law", "statement", "source", "hypotheses", "never gains energy under them"), rows)
+
+
+def solvers() -> Numbers:
+    """Solvers by name."""
+    from reference.complementarity.solvers import SOLVERS
+
+    takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
+    rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
+    return Numbers(("solver", "method", "package", "takes"), rows)
+
+
+def worlds(runner: Runner) -> Numbers:
+    """A run of every world, as its own file states its contact law and coupling."""
+    from reference.worlds import WORLDS
+
+    rows = []
+    for world in WORLDS:
+        run = runner(shipped_scene(WORLD_SCENE), world, keep=False)
+        rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
+    return Numbers(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
+                   f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip
+
+
+def _settings(values: Any) -> str:
+    texts = (f"{name} {json.dumps(value, ensure_ascii=False)}" for name, value in dict(values).items())
+    return ", ".join(texts) or "none"
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,150 @@
+"""What each sentence of a comparison amounts to: one of the verdicts of the claims ledger, from the record alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from verification.claims.claim import LIMITED, REFUTED, REPRODUCED, verdict_of
+from verification.comparison import sentences
+from verification.comparison.agreement import REPRODUCED as CONE_TOLERANCE
+from verification.comparison.agreement import SAME
+from verification.comparison.extensions import GAIN
+from verification.comparison.problem_study import ProblemStudy
+from verification.comparison.step_cost import IAPB, CostRow
+from verification.comparison.study import ComparisonStudy
+
+# Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
+MOMENTUM = 1e-9
+# Two solvers' outcomes of one law: ten times the residual that `reference.complementarity.laws` accepts.
+SAME_LAW = 1e-8
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A sentence with its verdict: `name` is that of the function in `sentences` that made it."""
+
+    name: str
+    sentence: str
+    verdict: str
+
+
+def judge(study: ComparisonStudy) -> tuple[Judged, ...]:
+    """Every sentence of a study with its verdict; those about nothing are left out."""
+    found = []
+    for name, verdict in VERDICTS.items():
+        sentence = getattr(sentences, name)(study)
+        if sentence:
+            found.append(Judged(name, sentence, verdict(study)))
+    for folder in study.problems:
+        found += judge_problems(folder)
+    return tuple(found)
+
+
+def judge_problems(study: ProblemStudy) -> list[Judged]:
+    """The sentences about one collection of problems: each solved by somebody, and solved alike."""
+    solved = [any(verdict == "solved" for _, verdict in line.verdicts) for line in study.lines]
+    solved += [False for _ in study.unread]
+    verdict = REPRODUCED if all(solved) else LIMITED
+    return [Judged("problems", sentence, verdict) for sentence in sentences.problems(study)]
+
+
+def _single_contact(study: ComparisonStudy) -> str:
+    return _all(c.distance <= sentences.C05_TOLERANCE for c in study.single)
+
+
+def _wider_class(study: ComparisonStudy) -> str:
+    return _all(c.contradictions == 0 for c in study.cells + study.scenes)
+
+
+def _two_contacts(study: ComparisonStudy) -> str:
+    return _all(c.predicted == c.found for c in study.two_contacts)
+
+
+def _difference(study: ComparisonStudy) -> str:
+    return _all(c.defect <= CONE_TOLERANCE for c in study.cells + study.scenes)
+
+
+def _energy(study: ComparisonStudy) -> str:
+    cells = study.cells + study.scenes
+    return _all(c.least_extra_loss >= -SAME and c.momentum <= MOMENTUM for c in cells)
+
+
+def _scenes(study: ComparisonStudy) -> str:
+    """Agreement, impact by impact."""
+    cases = sum(c.cases for c in study.scenes)
+    return _by_share(sum(c.agree * c.cases for c in study.scenes) / cases)
+
+
+def _touching(study: ComparisonStudy) -> str:
+    """No contact that touches is left approaching, impact by impact."""
+    cells = [c for c in study.cells if c.family == "with a neighbour"]
+    return _by_share(1.0 - float(np.mean([c.left_approaching for c in cells])))
+
+
+def _friction(study: ComparisonStudy) -> str:
+    """The NCP's motion where all push, and never a gain of energy."""
+    if any(c.largest_gain > GAIN for c in study.friction):
+        return REFUTED
+    return _by_share(sum(c.same for c in study.friction) / max(1, sum(c.pushing for c in study.friction)))
+
+
+def _unequal(study: ComparisonStudy) -> str:
+    return _all(c.distance <= SAME_LAW and c.gain <= GAIN for c in study.unequal)
+
+
+def _ideal_world(study: ComparisonStudy) -> str:
+    return verdict_of([row.first_order for row in study.convergence])
+
+
+def _cost(study: ComparisonStudy) -> str:
+    """An impact costs more by every LCP solver, both called from Python; None where the spreads overlap."""
+    here = {(row.family, row.contacts): row for row in study.impact_costs if row.solver == IAPB}
+    others = [row for row in study.impact_costs if not row.solver.startswith("IAPB")]
+    return verdict_of([costs_more(row, here[row.family, row.contacts]) for row in others])
+
+
+def costs_more(row: CostRow, ours: CostRow) -> bool | None:
+    """Whether the slower of two is `row`; None where it solved nothing or where the samples overlap."""
+    if row.verdict != "solved" or (row.least <= ours.largest and ours.least <= row.largest):
+        return None
+    return row.median > ours.median
+
+
+def _steps(study: ComparisonStudy) -> str:
+    """A step of the rigid world costs more than a step of IAPB, both taken from Python."""
+    outcomes: list[bool | None] = []
+    for scene in dict.fromkeys(row.scene for row in study.step_costs):
+        ways = {row.way: row for row in study.step_costs if row.scene == scene}
+        ours, ideal = ways["IAPB, step by step"], ways["ideal (QP per step)"]
+        outcomes.append(None if ideal.least <= ours.largest and ours.least <= ideal.largest
+                        else ideal.median > ours.median)  # fmt: skip
+    return verdict_of(outcomes)
+
+
+def _all(outcomes: Iterable[bool]) -> str:
+    """A statement that claims to be exact has no exceptions."""
+    return REPRODUCED if all(outcomes) else REFUTED
+
+
+def _by_share(share: float) -> str:
+    return REPRODUCED if share == 1.0 else LIMITED if share >= 0.5 else REFUTED
+
+
+# The function in `sentences` -> its verdict; in the order of the report.
+VERDICTS: dict[str, Callable[[ComparisonStudy], str]] = {
+    "single_contact": _single_contact,
+    "wider_class": _wider_class,
+    "two_contacts": _two_contacts,
+    "difference": _difference,
+    "energy": _energy,
+    "scenes": _scenes,
+    "touching": _touching,
+    "friction": _friction,
+    "unequal": _unequal,
+    "ideal_world": _ideal_world,
+    "cost": _cost,
+    "steps": _steps,
+}
