@@ -21,8 +21,9 @@ def compare(
     """Return the largest difference of each quantity, relative to the reference's largest entry.
 
     The potential energy, whose zero is a convention, is taken relative to the sum of m |g| |c|; a bias that nearly
-    vanishes (a centre of mass almost on its axis) relative to the sum of m |c| w^2, w the fastest turn: world
-    positions c are rounded, and with them every lever arm.
+    vanishes (a centre of mass almost on its axis, a body that hardly turns) relative to the size of the terms that
+    it sums: m |c| w^2, w the fastest turn, since world positions c are rounded and with them every lever arm; and
+    v x m v, which is zero but is computed, of the size of twice the kinetic energy.
 
     Quantities: mass_matrix, bias, gravity, inverse_dynamics, kinetic_energy, potential_energy, momentum,
     and, over all bodies, placement, point_jacobian (at a point one metre off the origin) and frame_jacobian.
@@ -48,9 +49,9 @@ def _lifted(mechanism: Mechanism, q: Floats, gravity: ArrayLike) -> float:
 
 
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
-    """Sum of m |c| w^2 [N]: the size of the terms of a bias that may itself be near zero."""
+    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias that may itself be near zero."""
     fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
-    return fastest**2 * _spread(mechanism, q)
+    return max(fastest**2 * _spread(mechanism, q), 2.0 * mechanism.kinetic_energy(q, v))
 
 
 def _spread(mechanism: Mechanism, q: Floats) -> float:

@@ -14,6 +14,9 @@ __all__ = ["DEPTHS", "STUDIES", "Finding", "check_mechanics"]
 # name: (module, function)
 STUDIES = {
     "random trees": ("robots", "compare_trees"),
+    "joint kinds": ("own_robots", "compare_kinds"),
+    "scenes": ("own_robots", "compare_scenes"),
+    "URDF texts": ("own_robots", "compare_written"),
     "robots": ("robots", "compare_robots"),
     "power balance": ("power_balance", "power_balance"),
     "positive definite": ("power_balance", "positive_definite"),

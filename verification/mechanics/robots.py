@@ -40,9 +40,9 @@ COLUMNS = (
     *(Column(name, "relative difference") for name in QUANTITIES),
     Column("worst", "relative difference"),
 )
-_TOLERANCE = (
-    f"{AGREEMENT:g} of the reference's largest entry (a bias or potential energy that nearly vanishes: of the terms "
-    "it sums): two algorithms, each exact to some 1e-14"
+TOLERANCE = (
+    f"{AGREEMENT:g} of the reference's largest entry (a bias or potential energy that nearly vanishes: the size of "
+    "the terms that it sums): two algorithms, each exact to some 1e-14"
 )
 
 
@@ -53,14 +53,14 @@ def compare_trees(depth: str = "quick", seed: int = SEED) -> Finding:
     for joints in TREE_SIZES:
         rng = np.random.default_rng([seed, joints])
         trees = [random_mechanism(rng, joints) for _ in range(TREES[depth])]
-        found = [_worst(tree, model_of(tree), rng) for tree in trees if tree.nv]
+        found = [worst_of(tree, model_of(tree), rng) for tree in trees if tree.nv]
         rows.append({"mechanism": f"{len(found)} trees of {joints}", "base": "random", "bodies": joints,
                      "velocities": max((tree.nv for tree in trees), default=0),
-                     "states": STATES * len(found), **_largest(found)})  # fmt: skip
+                     "states": STATES * len(found), **largest_of(found)})  # fmt: skip
     statement = (
         "Mass matrix, Jacobians, forces, energies and momentum of random trees are those of Pinocchio."
     )
-    return Finding("Random trees against Pinocchio", statement, _TOLERANCE, _judged(table_of(COLUMNS, rows)))
+    return Finding("Random trees against Pinocchio", statement, TOLERANCE, judged(table_of(COLUMNS, rows)))
 
 
 def compare_robots(folder: str | Path | None = None, depth: str = "quick", seed: int = SEED) -> Finding:
@@ -75,8 +75,8 @@ def compare_robots(folder: str | Path | None = None, depth: str = "quick", seed:
     files, skipped = robot_files(folder)
     rows = list(_robot_rows(files, seed))
     statement = "Robots read by the engine are those that Pinocchio reads, in every quantity."
-    table = _judged(table_of(COLUMNS, rows))
-    return Finding("Robots against Pinocchio", statement, _TOLERANCE, table, skipped)
+    table = judged(table_of(COLUMNS, rows))
+    return Finding("Robots against Pinocchio", statement, TOLERANCE, table, skipped)
 
 
 def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
@@ -93,16 +93,17 @@ def _robot_rows(files: list[Path], seed: int) -> Iterator[dict[str, Any]]:
             rng = np.random.default_rng([seed, floating])
             yield {"mechanism": path.stem, "base": "floating" if floating else "fixed",
                    "bodies": len(mechanism.bodies), "velocities": mechanism.nv, "states": STATES,
-                   **_largest([_worst(mechanism, model, rng)])}  # fmt: skip
+                   **largest_of([worst_of(mechanism, model, rng)])}  # fmt: skip
 
 
-def _worst(mechanism: Mechanism, model: PinocchioMechanism, rng: np.random.Generator) -> dict[str, float]:
+def worst_of(mechanism: Mechanism, model: PinocchioMechanism, rng: np.random.Generator) -> dict[str, float]:
     """The largest difference of each quantity over random states."""
     found = [compare(mechanism, model, *random_state(rng, mechanism)) for _ in range(STATES)]
     return {name: max(differences[name] for differences in found) for name in found[0]}
 
 
-def _largest(found: list[dict[str, float]]) -> dict[str, float]:
+def largest_of(found: list[dict[str, float]]) -> dict[str, float]:
+    """The largest difference of each quantity over mechanisms, and the worst of them all."""
     largest: dict[str, float] = {}
     for differences in found:
         for name, value in differences.items():
@@ -110,5 +111,6 @@ def _largest(found: list[dict[str, float]]) -> dict[str, float]:
     return {**largest, "worst": max(largest.values(), default=0.0)}
 
 
-def _judged(table: Table) -> Table:
+def judged(table: Table) -> Table:
+    """Every quantity within AGREEMENT."""
     return replace(table, holds=tuple(bool(worst <= AGREEMENT) for worst in table.column("worst")))
