@@ -15,6 +15,7 @@ SUBJECTS = (
     ("Forces", ("C11", "C14")),
     ("Weak devices", ("C09", "C12", "C16")),
     ("Coming to rest", ("C15",)),
+    ("False collisions", ("C18",)),
 )
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 _SENTENCE_END = re.compile(r"(?<=\.)\s(?=[A-Z])")

@@ -29,6 +29,7 @@ _FILES = (
     "c15_settling",
     "c16_together",
     "c17_energy_lost",
+    "c18_false_collisions",
 )
 CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)

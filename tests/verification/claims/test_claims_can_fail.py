@@ -3,12 +3,22 @@
 import numpy as np
 import pytest
 
-from verification.claims import CLAIMS, c11_forces, c12_saturate_spread, c13_limited_trajectory
+from verification.claims import (
+    CLAIMS,
+    c11_forces,
+    c12_saturate_spread,
+    c13_limited_trajectory,
+    c18_false_collisions,
+)
 from verification.claims.claim import REFUTED, REPRODUCED
 from verification.claims.table import Column, table_of
 
 RENDERED = {"saturate": 3e-3, "scale": 2e-3, "spread": 1e-3}
 NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]
+FILTERED = {
+    "part": c18_false_collisions.REACHES, "coherence_distance": 6.0, "speed × step": 1.2,
+    "false collisions without filters": 26,
+}  # fmt: skip
 
 # id -> (a trial that agrees, a trial that contradicts)
 PLANTED = {
@@ -38,6 +48,7 @@ PLANTED = {
         {"lost on first impact": 3e-3, "of the reference": 3e-3},
         {"lost on first impact": 3.1e-3, "of the reference": 3e-3},
     ),
+    "C18": (FILTERED | {"false collisions": 0}, FILTERED | {"false collisions": 1}),
     "C05": ({"error": 0.0, "bound": 0.0}, {"error": np.nan, "bound": 1.0}),
     "C10": ({"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
 }
@@ -70,6 +81,8 @@ def test_judge_confirms_and_refutes(name):
         ("C11", {"part": c11_forces.BALANCE, "IAPB": 0.1, "hand": -0.32}),
         ("C13", {"coordinate": "x", "IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 1.0}),
+        ("C18", FILTERED | {"part": c18_false_collisions.CLUSTERING, "coherence_distance": 0.0, "false collisions": 41}),
+        ("C18", FILTERED | {"part": c18_false_collisions.SHORT, "coherence_distance": 2.0, "false collisions": 26}),
     ],
 )
 def test_every_part_of_a_claim_can_fail(name, trial):
@@ -84,6 +97,8 @@ def test_every_part_of_a_claim_can_fail(name, trial):
         ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}),
         ("C15", {"IAPB": 0, "PB": 0}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 0.0}),
+        ("C18", FILTERED | {"coherence_distance": 1.0, "false collisions": 26}),
+        ("C18", FILTERED | {"false collisions without filters": 0, "false collisions": 0}),
     ],
 )
 def test_a_trial_that_cannot_tell_says_so(name, trial):
