@@ -81,8 +81,8 @@ def test_judge_confirms_and_refutes(name):
         ("C11", {"part": c11_forces.BALANCE, "IAPB": 0.1, "hand": -0.32}),
         ("C13", {"coordinate": "x", "IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 1.0}),
-        ("C18", FILTERED | {"part": c18_false_collisions.CLUSTERING, "coherence_distance": 0.0, "false collisions": 41}),
-        ("C18", FILTERED | {"part": c18_false_collisions.SHORT, "coherence_distance": 2.0, "false collisions": 26}),
+        ("C18", FILTERED | {"part": c18_false_collisions.CLUSTERING, "coherence_distance": 0, "false collisions": 41}),
+        ("C18", FILTERED | {"part": c18_false_collisions.SHORT, "coherence_distance": 2, "false collisions": 26}),
     ],
 )
 def test_every_part_of_a_claim_can_fail(name, trial):
