@@ -13,8 +13,9 @@ from verification.comparison.agreement import REPRODUCED as CONE_TOLERANCE
 from verification.comparison.agreement import SAME
 from verification.comparison.extensions import GAIN
 from verification.comparison.problem_study import ProblemStudy
-from verification.comparison.step_cost import IAPB, CostRow
+from verification.comparison.step_cost import rivals
 from verification.comparison.study import ComparisonStudy
+from verification.comparison.world_cost import costs_more, step_rivals
 
 # Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9
@@ -100,28 +101,13 @@ def _ideal_world(study: ComparisonStudy) -> str:
 
 
 def _cost(study: ComparisonStudy) -> str:
-    """An impact costs more by every LCP solver, both called from Python; None where the spreads overlap."""
-    here = {(row.family, row.contacts): row for row in study.impact_costs if row.solver == IAPB}
-    others = [row for row in study.impact_costs if not row.solver.startswith("IAPB")]
-    return verdict_of([costs_more(row, here[row.family, row.contacts]) for row in others])
-
-
-def costs_more(row: CostRow, ours: CostRow) -> bool | None:
-    """Whether the slower of two is `row`; None where it solved nothing or where the samples overlap."""
-    if row.verdict != "solved" or (row.least <= ours.largest and ours.least <= row.largest):
-        return None
-    return row.median > ours.median
+    """An impact costs more by a complementarity solver than by IAPB, called alike, pair by pair."""
+    return verdict_of([pair.costs_more for pair in rivals(study.impact_costs)])
 
 
 def _steps(study: ComparisonStudy) -> str:
     """A step of the rigid world costs more than a step of IAPB, both taken from Python."""
-    outcomes: list[bool | None] = []
-    for scene in dict.fromkeys(row.scene for row in study.step_costs):
-        ways = {row.way: row for row in study.step_costs if row.scene == scene}
-        ours, ideal = ways["IAPB, step by step"], ways["ideal (QP per step)"]
-        outcomes.append(None if ideal.least <= ours.largest and ours.least <= ideal.largest
-                        else ideal.median > ours.median)  # fmt: skip
-    return verdict_of(outcomes)
+    return verdict_of([costs_more(ideal, ours) for ideal, ours in step_rivals(study.step_costs)])
 
 
 def _all(outcomes: Iterable[bool]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from verification.comparison.agreement_map import MapCell
 from verification.comparison.convergence import WITHOUT_TRUTH
 from verification.comparison.problem_study import ProblemStudy
-from verification.comparison.step_cost import IAPB, KERNEL, CostRow
+from verification.comparison.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
 from verification.comparison.study import ComparisonStudy
 
 C05_TOLERANCE = 1e-12
@@ -143,24 +143,31 @@ def ideal_world(study: ComparisonStudy) -> str:
 
 def cost(study: ComparisonStudy) -> str:
     """C22, per impact."""
+    found = []
+    for called in ("compiled", "from Python"):
+        pairs = [pair for pair in rivals(study.impact_costs) if pair.called == called]
+        decided = [pair for pair in pairs if pair.costs_more is not None]
+        more = sum(bool(pair.costs_more) for pair in decided)
+        found.append(f"{called}, a solver costs more than IAPB in {more} of {len(decided)} pairs that differ clearly")
     rows = study.impact_costs
-    largest = max(row.contacts for row in rows)
-    parts = []
-    for family in dict.fromkeys(row.family for row in rows):
-        for contacts in sorted({min(row.contacts for row in rows), largest}):
-            parts.append(_cost_part(rows, family, contacts))
-    return "C22, time per impact (medians): " + "; ".join(parts) + "."
+    most, least = max(row.contacts for row in rows), min(row.contacts for row in rows)
+    parts = [_cost_part(rows, family, contacts) for family in dict.fromkeys(row.family for row in rows)
+             for contacts in sorted({least, most})]  # fmt: skip
+    return f"C22, time per impact: {'; '.join(found)}. Medians: {'; '.join(parts)}."
 
 
 def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
     here = {row.solver: row for row in rows if row.family == family and row.contacts == contacts}
-    others = [row for name, row in here.items() if not name.startswith("IAPB") and row.verdict == "solved"]
+    others = [row for name, row in here.items() if name not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL)
+              and row.verdict == "solved"]  # fmt: skip
     compiled, called = _seconds(here[KERNEL].median), _seconds(here[IAPB].median)
     text = f"{family} of {contacts}: IAPB {compiled} compiled, {called} from Python"
+    if LEMKE_KERNEL in here and here[LEMKE_KERNEL].verdict == "solved":
+        text += f", Lemke {_seconds(here[LEMKE_KERNEL].median)} compiled"
     if not others:
-        return text + ", no LCP solver solved it"
+        return text + ", no LCP solver from Python solved it"
     best = min(others, key=lambda row: row.median)
-    return text + f", fastest LCP solver {best.solver} {_seconds(best.median)}"
+    return text + f", fastest from Python {best.solver} {_seconds(best.median)}"
 
 
 def steps(study: ComparisonStudy) -> str:

@@ -1,9 +1,9 @@
 """C22: what one impact costs by each solver, beside IAPB, in one run.
 
 Timed is the whole way from M, J, v to v⁺: for the references that includes forming W or its factor, for IAPB the
-checks of `resolve_impact`; `IAPB kernel` is the compiled kernel alone, called from compiled code as in the engine's
-step. Every solver is warmed first (imports, compiling), then all take turns, so that a busy moment of the machine hits
-them alike; linear algebra runs on one thread.
+checks of `resolve_impact`. The kernels, IAPB's and Lemke's, are called from compiled code as in the engine's step:
+`rivals` sets like against like. Every solver is warmed first (imports, compiling), then all take turns, so that a busy
+moment of the machine hits them alike; linear algebra runs on one thread.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verification.comparison.cases import ImpactCase
+from verification.comparison.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
 
 Floats = NDArray[np.float64]
-Call = Callable[[], Floats]
 
 CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
 SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
-IAPB, KERNEL, PRINTED = "IAPB", "IAPB kernel", "IAPB printed formula"
+IAPB, KERNEL, PRINTED, LEMKE_KERNEL = "IAPB", "IAPB kernel", "IAPB printed formula", "Lemke kernel"
 REPEATS = 5
 LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked for a larger one; the row says so
 _SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
@@ -49,6 +50,33 @@ class CostRow:
     repeats: int
     distance: float
     note: str = ""
+
+
+class Rivals(NamedTuple):
+    """Two ways to resolve one impact, called alike: compiled, or from Python."""
+
+    called: str
+    solver: CostRow
+    ours: CostRow
+
+    @property
+    def costs_more(self) -> bool | None:
+        """Whether the solver costs more; None where it solved nothing, or where the samples of the two overlap."""
+        solver, ours = self.solver, self.ours
+        overlap = solver.least <= ours.largest and ours.least <= solver.largest
+        return None if solver.verdict != "solved" or overlap else solver.median > ours.median
+
+
+def rivals(rows: Sequence[CostRow]) -> tuple[Rivals, ...]:
+    """Every complementarity solver with IAPB at the same impact: kernel with kernel, the others from Python."""
+    ours = {(row.family, row.contacts, row.solver): row for row in rows}
+    found = []
+    for row in rows:
+        if row.solver in (IAPB, KERNEL, PRINTED):
+            continue
+        called, mine = ("compiled", KERNEL) if row.solver == LEMKE_KERNEL else ("from Python", IAPB)
+        found.append(Rivals(called, row, ours[row.family, row.contacts, mine]))
+    return tuple(found)
 
 
 def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
@@ -111,7 +139,7 @@ def _time_case(
     for name, times in samples.items():
         if np.median(times) > longest:
             too_slow[case.family, name] = float(np.median(times))
-    return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, *solvers)]
+    return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, *solvers)]
 
 
 def _warm(
@@ -120,15 +148,15 @@ def _warm(
     """The calls that work, their v⁺, and for the others why not."""
     from iapb.errors import MissingDependencyError
 
-    calls: dict[str, Call] = {KERNEL: _KernelCall(case), IAPB: _engine_call(case, "factored"),
-                              PRINTED: _engine_call(case, "gram_pinv")}  # fmt: skip
+    calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case, "factored"),
+                              PRINTED: engine_call(case, "gram_pinv")}  # fmt: skip
     answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()
-    for name in solvers:
+    for name in (LEMKE_KERNEL, *solvers):
         if (case.family, name) in too_slow:
             notes[name] = f"left out: {too_slow[case.family, name]:.3g} s for fewer contacts"
             continue
-        call = _solver_call(case, name)
         try:
+            call = LemkeCall(case) if name == LEMKE_KERNEL else solver_call(case, name)
             answers[name] = call()
         except MissingDependencyError as error:
             notes[name] = f"missing: {error}"
@@ -171,48 +199,3 @@ def _row(
     verdict = "solved" if distance <= _SOLVED else "failed"
     times = samples[name]
     return CostRow(*size, verdict, float(np.median(times)), min(times), max(times), len(times), distance)
-
-
-def _engine_call(case: ImpactCase, method: str) -> Call:
-    from iapb import resolve_impact
-
-    return lambda: resolve_impact(
-        case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, method=method
-    ).velocity
-
-
-class _KernelCall:
-    """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
-
-    def __init__(self, case: ImpactCase) -> None:
-        from iapb.compiled import block
-        from iapb.contact.kernels.impact import make_impact_work
-
-        self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
-        self.columns, self.restitution = np.ascontiguousarray(case.contact_jacobian.T), case.restitution
-        d, c = len(self.v), case.contacts
-        self.lower, self.v_plus, self.momentum = np.zeros((d, d)), np.zeros(d), np.zeros(d)
-        self.work = block(make_impact_work(d, c))
-
-    def repeated(self, times: int) -> None:
-        """Resolve the impact `times` times."""
-        from verification.comparison.kernels import repeat_impact
-
-        repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.work, self.v_plus,
-                      self.momentum, times)
-
-    def __call__(self) -> Floats:
-        """v⁺ (d,)."""
-        self.repeated(1)
-        return self.v_plus
-
-
-def _solver_call(case: ImpactCase, name: str) -> Call:
-    from reference.complementarity.problem import ImpactProblem
-    from reference.complementarity.solvers import solve
-
-    def call() -> Floats:
-        problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
-        return solve(problem, name).velocity_plus
-
-    return call

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 SCENES = ("peg_corner", "peg_hole")
-WAYS = ("IAPB, compiled loop", "IAPB, step by step", "PB, compiled loop", "ideal (QP per step)", "CBuc (QP per step)")
+STEPPED, IDEAL = "IAPB, step by step", "ideal (QP per step)"
+WAYS = ("IAPB, compiled loop", STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP per step)")
 STEPS = 256  # half a second of the peg: free, colliding and resting steps
 
 
@@ -30,8 +31,21 @@ class StepCostRow:
     steps: int
 
 
+def step_rivals(rows: Sequence[StepCostRow]) -> tuple[tuple[StepCostRow, StepCostRow], ...]:
+    """(the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
+    by = {(row.scene, row.way): row for row in rows}
+    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in dict.fromkeys(row.scene for row in rows))
+
+
+def costs_more(theirs: StepCostRow, ours: StepCostRow) -> bool | None:
+    """Whether their step costs more; None where the samples of the two overlap."""
+    if theirs.least <= ours.largest and ours.least <= theirs.largest:
+        return None
+    return theirs.median > ours.median
+
+
 def world_cost(
-    scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS,
+    scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS, ways: Sequence[str] = WAYS,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[StepCostRow, ...]:
     """Time every world on every scene; the first run of each, which compiles, is not counted."""
@@ -39,10 +53,10 @@ def world_cost(
 
     rows: list[StepCostRow] = []
     for done, name in enumerate(scenes):
-        samples: dict[str, list[float]] = {way: [] for way in WAYS}
+        samples: dict[str, list[float]] = {way: [] for way in ways}
         with threadpool_limits(1):
             for turn in range(max(3, repeats) + 1):
-                for way in WAYS:
+                for way in ways:
                     seconds = _seconds_per_step(name, way, steps)
                     if turn > 0:
                         samples[way].append(seconds)
@@ -61,7 +75,7 @@ def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:
     from reference.worlds import find_world, run_world
 
     scene, world = load_scene(find_scene(scene_name)), way.split(",")[0].split(" ")[0]
-    if way != WAYS[1]:
+    if way != STEPPED:
         return float(np.sum(run_world(scene, world, steps=steps).chunk_seconds)) / steps
     found = find_world(world)
     simulation = Simulation(scene, found.law, found.coupling_in(scene))

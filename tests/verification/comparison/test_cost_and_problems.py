@@ -12,25 +12,25 @@ from reference.complementarity.problem import ImpactProblem
 from reference.fclib import write_fclib
 from verification.comparison import sentences, step_cost
 from verification.comparison.problem_study import FACTORS, study_problems
-from verification.comparison.step_cost import IAPB, KERNEL, PRINTED, impact_cost
+from verification.comparison.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
 
 
 def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:
     rows = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
     assert {(r.family, r.contacts, r.solver) for r in rows} == {
         (family, contacts, solver) for family in ("patch", "pile") for contacts in (1, 3)
-        for solver in (KERNEL, IAPB, PRINTED, "daqp", "lemke")
+        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")
     }  # fmt: skip
     assert all(r.verdict == "solved" and r.repeats >= 3 and r.least <= r.median <= r.largest for r in rows)
 
 
 def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = step_cost._solver_call
+    original = step_cost.solver_call
 
     def wrong(case, name):  # type: ignore[no-untyped-def]
         return (lambda: case.velocity) if name == "lemke" else original(case, name)
 
-    monkeypatch.setattr(step_cost, "_solver_call", wrong)
+    monkeypatch.setattr(step_cost, "solver_call", wrong)
     rows = {(r.family, r.contacts, r.solver): r for r in impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0)}
     assert rows["patch", 1, "lemke"].verdict == "failed"
     assert rows["patch", 2, "daqp"].verdict == "left out"
