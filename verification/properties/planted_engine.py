@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from iapb.run import Run
 from verification.properties.case import Floats
 from verification.properties.engine_laws import ENGINE_LAWS, EngineLaw, judge_engine_law
 from verification.properties.engine_laws.device_limits import saturated
 from verification.properties.engine_laws.hand_port import Wall
 from verification.properties.planted import sound_resolver
+from verification.properties.scenes import SceneCase
 
 __all__ = ["ENGINE_LAWS", "PLANTED_ENGINE_FAULTS", "EngineLaw", "judge_engine_law"]
 
@@ -36,10 +39,19 @@ def makes_late_wall() -> Wall:
     return late_wall
 
 
+def one_factor_for_all(case: SceneCase) -> Run:
+    """Each impact, whoever it strikes, takes a thousandth of everybody's velocity at the end of its step."""
+    run = case.simulate()
+    factor = np.ones(len(run.time))
+    np.multiply.at(factor, run.impacts.step + 1, 0.999)
+    return replace(run, v=run.v * factor[:, None])
+
+
 # law -> (name of the fault, how to make its subject)
 PLANTED_ENGINE_FAULTS: dict[str, tuple[str, Callable[[], Callable[..., Any]]]] = {
     "truncation": ("rows not made orthogonal", lambda: not_orthogonal),
     "device_limits": ("saturation, component by component", lambda: saturated),
+    "group_splitting": ("one factor for all groups", lambda: one_factor_for_all),
     "hand_port": ("a wall one reading late", makes_late_wall),
     "extremes": ("plain numpy without checks", lambda: sound_resolver),
 }

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from verification.properties.case import Floats, ImpactCase
 from verification.properties.families import cradle_rows
+from verification.properties.scenes import SceneCase, Values
 
 
 @st.composite
@@ -59,3 +60,34 @@ def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int =
         )
     mass, rows = draw(mass_matrices(d, largest_exponent)), draw(contact_jacobians(d))
     return ImpactCase(mass, rows, draw(velocities(mass)), draw(restitutions()), "whole numbers")
+
+
+@st.composite
+def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
+    """A short scene of whole numbers and simple shares: one or two discs or a link in a room, any law and rendering."""
+    count, linked = draw(st.integers(1, 2)), draw(st.booleans())
+    bodies = [draw(_discs(k)) for k in range(count)]
+    if linked:
+        angle, rate = draw(st.integers(-3, 3)), draw(st.integers(-9, 9))
+        bodies.append({"name": "link", "joint": "revolute", "mass": 1.0, "inertia": 1e-3,
+                       "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(rate)],
+                       "shapes": [{"kind": "box", "size": [0.1, 0.02], "center": [0.05, 0.0]}]})  # fmt: skip
+    contact = {
+        "stiffness": 10.0 ** draw(st.integers(1, 4)), "damping": float(draw(st.sampled_from([0, 1, 10]))),
+        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
+    }  # fmt: skip
+    walls = [{"name": "floor", "kind": "half_plane", "point": [0.0, -0.2], "normal": [0.0, 1.0]},
+             {"name": "side", "kind": "half_plane", "point": [0.2, 0.0], "normal": [-1.0, 0.0]}]  # fmt: skip
+    rate = float(draw(st.sampled_from([250, 1000])))
+    values = {"name": "small_scene", "rate": rate, "duration": steps / rate, "bodies": bodies, "walls": walls,
+              "gravity": draw(st.sampled_from([None, [0.0, -10.0]])), "contact": contact}  # fmt: skip
+    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))
+
+
+@st.composite
+def _discs(draw: st.DrawFn, k: int) -> Values:
+    """A disc of a simple mass, at rest in its place or thrown."""
+    v = draw(st.lists(st.integers(-3, 3), min_size=3, max_size=3))
+    return {"name": f"disc_{k}", "joint": "planar", "mass": 10.0 ** draw(st.integers(-2, 1)), "inertia": 1e-3,
+            "shapes": [{"kind": "circle", "radius": 0.05}], "position": [0.1 * k, -0.1, 0.0],
+            "velocity": [float(x) for x in v]}  # fmt: skip

@@ -13,7 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verification.properties.case import LawResidual
-from verification.properties.engine_laws import device_limits, extremes, hand_port, truncation
+from verification.properties.engine_laws import (
+    device_limits,
+    extremes,
+    group_splitting,
+    hand_port,
+    truncation,
+)
 
 
 class EngineLaw(NamedTuple):
@@ -32,6 +38,9 @@ ENGINE_LAWS: dict[str, EngineLaw] = {
     "device_limits": EngineLaw(
         "an impulse cut to the device's limits by one factor per group is passive for tool and device",
         device_limits.draw, device_limits.limited_impulses_are_passive, device_limits.ours),
+    "group_splitting": EngineLaw(
+        "two groups that share nothing move the same, simulated together or apart",
+        group_splitting.draw, group_splitting.groups_apart_move_alike, group_splitting.ours),
     "hand_port": EngineLaw(
         "the hand gets no energy out of a sampled wall while b ≥ KT/2 + |B|",
         hand_port.draw, hand_port.hand_port_is_passive, hand_port.ours),

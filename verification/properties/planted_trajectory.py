@@ -1,0 +1,112 @@
+"""One fault for each law of a trajectory: a run in which something was done wrong, or written down wrong.
+
+A fault takes a scene and returns such a run, or None where the scene gives it no occasion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from iapb.run import Run
+from verification.properties.scenes import SceneCase
+
+Fault = Callable[[SceneCase], Run | None]
+
+
+def not_a_number(case: SceneCase) -> Run:
+    """A speed that is no number, in the last state only."""
+    run = case.simulate()
+    v = run.v.copy()
+    v[-1, 0] = np.nan
+    return replace(run, v=v)
+
+
+def energised_impact(case: SceneCase) -> Run | None:
+    """The last impact comes out a millionth too fast for an elastic one."""
+    run = case.simulate()
+    if not len(run.impacts.step):
+        return None
+    v_plus = run.impacts.v_plus.copy()
+    v_plus[-1] = -(1.0 + 1e-6) * run.impacts.v_minus[-1]
+    return replace(run, impacts=replace(run.impacts, v_plus=v_plus))
+
+
+def doubled_impulse(case: SceneCase) -> Run | None:
+    """An impulse that is counted twice."""
+    run = case.simulate()
+    if not np.any(run.impulse):
+        return None
+    return replace(run, impacts=replace(run.impacts, impulse=2.0 * run.impacts.impulse))
+
+
+def lost_gravity(case: SceneCase) -> Run | None:
+    """The scene says gravity, the simulation has none."""
+    if not case.values.get("gravity"):
+        return None
+    weightless = replace(case, values={key: value for key, value in case.values.items() if key != "gravity"})
+    return replace(weightless.simulate(), scene_source=case.scene().source_text)
+
+
+def moved_by_the_old_velocity(case: SceneCase) -> Run:
+    """Positions of explicit Euler beside velocities of semi-implicit Euler."""
+    run = case.simulate()
+    moved = run.q[:1] + run.dt * np.cumsum(run.v[:-1], axis=0)
+    return replace(run, q=np.concatenate([run.q[:1], moved]))
+
+
+def missing_half(case: SceneCase) -> Run | None:
+    """Erratum 1: impact losses without their ½."""
+    run = case.simulate()
+    if not np.any(run.impulse):
+        return None
+    return replace(run, energy=dict(run.energy) | {"impact_loss": 2.0 * run.energy["impact_loss"]})
+
+
+def unclamped_penalty(case: SceneCase) -> Run | None:
+    """The scene says that contacts never pull; the simulation lets them, as printed."""
+    if case.values["contact"].get("penalty") == "printed" or not case.values["contact"]["damping"]:
+        return None
+    printed = replace(case, values=case.values | {"contact": case.values["contact"] | {"penalty": "printed"}})
+    run = printed.simulate()
+    pulls = bool(np.any(run.contacts.normal_force < 0.0))
+    return replace(run, scene_resolved=case.scene().resolved()) if pulls else None
+
+
+def unclamped_friction(case: SceneCase) -> Run | None:
+    """Friction proportional to speed, without the bound of Coulomb's law."""
+    run = case.simulate()
+    if not np.any(run.contacts.friction_force):
+        return None
+    return replace(run, contacts=replace(run.contacts, friction_force=1.5 * run.contacts.friction_force))
+
+
+def device_beyond_its_limits(case: SceneCase) -> Run | None:
+    """The device gets what is asked for; the record says that it was cut to the limits."""
+    limit = (case.values.get("device") or {}).get("force_limit")
+    if limit is None or case.rendering == "full":
+        return None
+    run = replace(case, rendering="full").simulate()
+    beyond = bool(np.any(np.abs(run.device_force) > np.array(limit)))
+    return replace(run, law_settings=run.law_settings | {"rendering": case.rendering}) if beyond else None
+
+
+# law -> the fault that it must catch
+PLANTED_TRAJECTORY_FAULTS: dict[str, Fault] = {
+    "finite": not_a_number,
+    "impact_energy": energised_impact,
+    "impulse_momentum": doubled_impulse,
+    "motion": lost_gravity,
+    "kinematics": moved_by_the_old_velocity,
+    "ledger": missing_half,
+    "penalty": unclamped_penalty,
+    "friction": unclamped_friction,
+    "device_limits": device_beyond_its_limits,
+}
+
+
+def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
+    """The law's fault in the first of the scenes that gives it an occasion."""
+    return next((run for case in scenes if (run := PLANTED_TRAJECTORY_FAULTS[law](case)) is not None), None)
