@@ -1,0 +1,37 @@
+"""Adapters to other engines, and the fixed set of scenes on which they are compared. Each engine is optional."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from iapb.errors import ArgumentError
+from reference.simulators.fixed_scenes import FIXED_SCENES, fixed_scene
+from reference.simulators.scene import FixedScene
+from reference.simulators.simulator import Settings, Simulator
+from reference.simulators.trajectory import Trajectory
+
+__all__ = [
+    "FIXED_SCENES", "SIMULATORS", "FixedScene", "Settings", "Simulator", "Trajectory", "find_simulator", "fixed_scene",
+]  # fmt: skip
+
+_HERE = "reference.simulators"
+
+# name -> module:class; to add an engine: a file and a line here
+SIMULATORS: dict[str, str] = {
+    "iapb": f"{_HERE}.own_engines:ImpulseAugmentedEngine",
+    "rigid": f"{_HERE}.own_engines:RigidWorld",
+    "mujoco": f"{_HERE}.mujoco_adapter:MuJoCo",
+    "pinocchio": f"{_HERE}.pinocchio_adapter:Pinocchio",
+    "bullet": f"{_HERE}.bullet_adapter:Bullet",
+    # "drake": f"{_HERE}.drake_adapter:Drake",
+    # "siconos": f"{_HERE}.siconos_adapter:Siconos",
+}
+
+
+def find_simulator(name: str) -> Simulator:
+    """The adapter of that name; the engine itself is imported when it is first used."""
+    if name not in SIMULATORS:
+        raise ArgumentError("simulator", name, "one of " + ", ".join(SIMULATORS))
+    module, kind = SIMULATORS[name].split(":")
+    made: Simulator = getattr(import_module(module), kind)()
+    return made

@@ -1,0 +1,129 @@
+"""Bullet by PyBullet: sequential impulses with a coefficient of restitution."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import MissingDependencyError
+from reference.simulators.scene import Cuboid, FixedScene, Quaternion, Sphere, Vector
+from reference.simulators.simulator import Settings
+from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+
+DEFAULT_STEP = 1.0 / 240.0  # [s]
+DEFAULT_ERP = 0.2  # share of an overlap that the solver removes in a step
+ITERATIONS, ITERATIONS_OF_A_STACK = 50.0, 1e4  # the default; the best of 50, 1000 and 10 000 for the stack
+
+
+class Bullet:
+    """Adapter to PyBullet without a window."""
+
+    title = "Bullet"
+
+    def version(self) -> str:
+        """Installed version."""
+        _pybullet()
+        from importlib.metadata import version
+
+        return version("pybullet")
+
+    def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
+        """Its step of 1/240 s, and nothing that hides restitution: thresholds and damping are zero.
+
+        Static boxes, not planes, and e as the product of two equal roots. Overlaps are pushed out for one box at rest
+        only: the default contactERP turns the depth at which an impact is found into energy, three times the start's
+        with two balls and a wall.
+        """
+        stacked = scene.rests and len(scene.bodies) > 1
+        push_out = DEFAULT_ERP if scene.rests and not stacked else 0.0
+        options: dict[str, str | float] = {
+            "contactProcessingThreshold": 0.0, "restitutionVelocityThreshold": 0.0, "linearDamping": 0.0,
+            "angularDamping": 0.0, "restitution of each body": sqrt(scene.restitution),
+            "numSolverIterations": ITERATIONS_OF_A_STACK if stacked else ITERATIONS, "solverResidualThreshold": 0.0,
+            "erp": push_out, "contactERP": push_out,
+        }  # fmt: skip
+        return Settings(step or DEFAULT_STEP, options)
+
+    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
+        """Simulate by `stepSimulation`."""
+        bullet = _pybullet()
+        world = bullet.connect(bullet.DIRECT)
+        try:
+            bodies = _build(bullet, world, scene, settings, step)
+            record, stride = Recorder(), steps_between_samples(step)
+            for k in range(round(duration / step)):
+                if k % stride == 0:
+                    _keep(bullet, world, record, k * step, bodies)
+                bullet.stepSimulation(physicsClientId=world)
+            _keep(bullet, world, record, round(duration / step) * step, bodies)
+        finally:
+            bullet.disconnect(world)
+        return record.trajectory()
+
+
+def _pybullet() -> Any:
+    try:
+        import pybullet
+    except ImportError as error:
+        raise MissingDependencyError("pybullet", "The Bullet adapter", "pip install 'iapb[peers]'") from error
+    return pybullet
+
+
+def _build(bullet: Any, world: int, scene: FixedScene, settings: Settings, step: float) -> list[int]:
+    given = settings.options
+    bullet.setPhysicsEngineParameter(
+        fixedTimeStep=step, numSubSteps=0, numSolverIterations=int(given["numSolverIterations"]),
+        restitutionVelocityThreshold=given["restitutionVelocityThreshold"], erp=given["erp"],
+        contactERP=given["contactERP"], solverResidualThreshold=given["solverResidualThreshold"], physicsClientId=world,
+    )  # fmt: skip
+    bullet.setGravity(*scene.gravity, physicsClientId=world)
+    for wall in scene.obstacles:
+        _body(bullet, world, 0.0, (Cuboid(wall.size),), wall.center, wall.orientation, settings)
+    bodies = []
+    for body in scene.bodies:
+        made = _body(bullet, world, body.mass, body.shapes, body.position, body.orientation, settings)
+        bullet.changeDynamics(made, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
+        bullet.resetBaseVelocity(made, body.velocity, body.spin, physicsClientId=world)
+        bodies.append(made)
+    return bodies
+
+
+def _body(bullet: Any, world: int, mass: float, shapes: tuple[Sphere | Cuboid, ...], position: Vector,
+          orientation: Quaternion, settings: Settings) -> int:  # fmt: skip
+    made: int = bullet.createMultiBody(
+        mass, _collision_shape(bullet, world, shapes), -1, position, orientation, physicsClientId=world,
+    )  # fmt: skip
+    given = settings.options
+    bullet.changeDynamics(
+        made, -1, restitution=given["restitution of each body"], lateralFriction=0.0, rollingFriction=0.0,
+        spinningFriction=0.0, linearDamping=given["linearDamping"], angularDamping=given["angularDamping"],
+        contactProcessingThreshold=given["contactProcessingThreshold"],
+        activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=world,
+    )  # fmt: skip
+    return made
+
+
+def _collision_shape(bullet: Any, world: int, shapes: tuple[Sphere | Cuboid, ...]) -> int:
+    if len(shapes) == 1 and isinstance(shapes[0], Sphere):
+        made: int = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=shapes[0].radius, physicsClientId=world)
+        return made
+    boxes = [shape for shape in shapes if isinstance(shape, Cuboid)]
+    halves = [[0.5 * length for length in box.size] for box in boxes]
+    if len(boxes) == 1:
+        made = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=halves[0], physicsClientId=world)
+        return made
+    made = bullet.createCollisionShapeArray(
+        shapeTypes=[bullet.GEOM_BOX] * len(boxes), halfExtents=halves,
+        collisionFramePositions=[box.center for box in boxes], physicsClientId=world,
+    )  # fmt: skip
+    return made
+
+
+def _keep(bullet: Any, world: int, record: Recorder, time: float, bodies: list[int]) -> None:
+    places = [bullet.getBasePositionAndOrientation(body, physicsClientId=world) for body in bodies]
+    speeds = [bullet.getBaseVelocity(body, physicsClientId=world) for body in bodies]
+    position, turn = (np.array(part) for part in zip(*places, strict=True))
+    velocity, spin = (np.array(part) for part in zip(*speeds, strict=True))
+    record.add(time, position, turn, velocity, spin, len(bullet.getContactPoints(physicsClientId=world)))

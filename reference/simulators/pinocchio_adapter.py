@@ -1,0 +1,81 @@
+"""Pinocchio: free motion by its articulated-body algorithm, impacts by its `impulseDynamics` when a contact is found.
+
+It has no simulator of its own: contacts are found by our detection, the same that the rigid world gets, and rows
+that approach are given to it. `impulseDynamics` is bilateral and takes one e for all rows.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import MissingDependencyError
+from iapb.system import System
+from reference.contact_rows import find_rows
+from reference.rigid_body import model_of
+from reference.simulators.own_scene import own_scene, world_state
+from reference.simulators.scene import FixedScene, Floats
+from reference.simulators.simulator import Settings
+from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+
+STEP = 1e-3  # [s] it has none of its own
+DAMPING, DAMPING_OF_A_STACK = 1e-12, 1e-8  # [1/kg] the best of 0, 1e-14, 1e-12, 1e-10, 1e-8 and 1e-6 on these scenes
+MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the larger damping is needed
+APPROACHES = 1e-12  # [m/s] slower is rounding of a contact at rest
+
+
+class Pinocchio:
+    """Adapter to Pinocchio's impulse dynamics."""
+
+    title = "Pinocchio"
+
+    def version(self) -> str:
+        """Installed version."""
+        return str(_pinocchio().__version__)
+
+    def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
+        """The damping of the Delassus matrix that redundant rows need: without it the wedge loses a third of its
+        energy.
+        """
+        damping = DAMPING if np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min() else DAMPING_OF_A_STACK
+        return Settings(step or STEP, {"inv_damping": damping, "contacts found by": "our detection"},
+                        "no contact detection and no stepping of its own; bilateral rows that approach")  # fmt: skip
+
+    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
+        """Semi-implicit steps; the rows that touch and approach are resolved at once, at the step's start."""
+        pinocchio = _pinocchio()
+        system = System(own_scene(scene, step, duration))
+        start = system.make_state()
+        q, v = start.q.copy(), start.v.copy()
+        model = model_of(system.mechanism).model
+        model.gravity.linear = np.array(scene.gravity)
+        memory, nothing = model.createData(), np.zeros(model.nv)
+        record, stride = Recorder(), steps_between_samples(step)
+        for k in range(round(duration / step)):
+            v = v + step * pinocchio.aba(model, memory, q, v, nothing)
+            v, touching = self._struck(system, model, memory, q, v, scene.restitution, settings)
+            if k % stride == 0:
+                record.add(k * step, *world_state(q, v), touching)
+            q = pinocchio.integrate(model, q, step * v)
+        record.add(duration, *world_state(q, v), touching)
+        return record.trajectory()
+
+    @staticmethod
+    def _struck(system: System, model: Any, memory: Any, q: Floats, v: Floats, restitution: float,
+                settings: Settings) -> tuple[Floats, int]:  # fmt: skip
+        """Velocity after the impact of what touches and approaches, and how many points touch."""
+        found = find_rows(system, q, v, 0.0)
+        rows = found.jacobian[found.gamma < -APPROACHES]
+        if not len(rows):
+            return v, len(found.gap)
+        damping = float(settings.options["inv_damping"])
+        return np.array(_pinocchio().impulseDynamics(model, memory, q, v, rows, restitution, damping)), len(found.gap)
+
+
+def _pinocchio() -> Any:
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise MissingDependencyError("pinocchio", "The Pinocchio adapter", "pip install pin") from error
+    return pinocchio
