@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from reports.figures import (
+    agreement_map,
+    cost_of_contacts,
     energy_gains,
     fig01_contact_forces,
     fig02_two_link_arm,
@@ -17,6 +19,8 @@ from reports.figures import (
     fig12_device_trajectories,
     fig13_device_forces,
     hero_corner,
+    performance_profile,
+    rigid_convergence,
     scenes_gallery,
     work_precision,
 )
@@ -39,4 +43,8 @@ RECIPES: tuple[Recipe, ...] = (
     fig13_device_forces.RECIPE,
     energy_gains.RECIPE,
     work_precision.RECIPE,
+    agreement_map.RECIPE,
+    cost_of_contacts.RECIPE,
+    performance_profile.RECIPE,
+    rigid_convergence.RECIPE,
 )
