@@ -18,10 +18,12 @@ from reports.figures import (
     fig11_limited_forces,
     fig12_device_trajectories,
     fig13_device_forces,
+    hardness,
     hero_corner,
     performance_profile,
     rigid_convergence,
     scenes_gallery,
+    stability_map,
     work_precision,
 )
 from reports.figures.figure import Recipe
@@ -43,6 +45,8 @@ RECIPES: tuple[Recipe, ...] = (
     fig13_device_forces.RECIPE,
     energy_gains.RECIPE,
     work_precision.RECIPE,
+    stability_map.RECIPE,
+    hardness.RECIPE,
     agreement_map.RECIPE,
     cost_of_contacts.RECIPE,
     performance_profile.RECIPE,

@@ -30,6 +30,8 @@ _FILES = (
     "c16_together",
     "c17_energy_lost",
     "c18_false_collisions",
+    "c20_damping_bound",
+    "c21_impulses_or_damping",
 )
 CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)

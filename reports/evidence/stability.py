@@ -1,0 +1,150 @@
+"""Topic: how stable sampled contact is, with penalties and with impulses (C20, C21), and how hard it feels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from reports.evidence.runs import shipped_scene
+from reports.figures.figure import Numbers
+from reports.pages.records import LIMITED, REFUTED, REPRODUCED, Finding, Topic
+from reports.runner import Runner
+
+LEAD = (
+    "A wall in a sampled loop can feed the hand. A mass of 2 kg is pushed against walls of every stiffness and "
+    "damping, read and answered at 512 Hz or 1 kHz, its motion between the samples exact; then the peg of Figure 4 in "
+    "the engine's own loop. The line is Colgate's condition for passivity, b >= KT/2 + |B|: sufficient for any hand."
+)
+MARKS = {"settles": "+", "bounces on": "o", "grows": "x"}
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+    """Maps of the sampled wall, and the peg under the same laws."""
+    from verification.stability.maps import stability_maps
+    from verification.stability.peg import peg_contacts
+
+    maps = stability_maps(depth)
+    pegs = peg_contacts(shipped_scene("peg_corner"),
+                        lambda scene, world: runner(scene, world, keep=False, partial=True), depth, progress)
+    tables = {
+        "maps": _maps(maps), "dampings": Numbers(("damping [N s/m]",), tuple((float(B),) for B in maps[0].damping)),
+        "hardness": _hardness(maps), "peg": _pegs(pegs),
+    }  # fmt: skip
+    findings = (_held(maps), _beyond(maps), _undamped(maps), _hard(maps), *_peg(pegs))
+    return Topic("stability", "Stability of contact", LEAD, findings, tables, findings[0].sentence)
+
+
+def _pairs(maps: Sequence[Any]) -> list[tuple[Any, Any]]:
+    return list(zip(maps[::2], maps[1::2], strict=True))
+
+
+def _maps(maps: Sequence[Any]) -> Numbers:
+    """A row per loop and stiffness; outcomes as one mark for each damping."""
+    rows = []
+    for penalty, impulses in _pairs(maps):
+        loop, size = penalty.loop, len(penalty.stiffness)
+        bound = loop.passive_damping(penalty.stiffness)
+        for i, K in enumerate(penalty.stiffness):
+            marks = ["".join(MARKS[outcome] for outcome in one.outcomes[i::size]) for one in (penalty, impulses)]
+            rows.append((loop.rate, _sensors(loop), loop.device_damping, float(K), max(float(bound[i]), 0.0), *marks))
+    return Numbers(
+        ("rate [Hz]", "sensors", "device damping [N s/m]", "stiffness [N/m]", "passive up to [N s/m]", "penalties",
+         "impulses"), tuple(rows), 3,
+        "A mark for each damping, small to large: + settles, o bounces on, x grows.")  # fmt: skip
+
+
+def _sensors(loop: Any) -> str:
+    return "late" if loop.delay else "ideal"
+
+
+def _held(maps: Sequence[Any]) -> Finding:
+    pairs = _pairs(maps)
+    theirs, ours = (np.array([pair[law].contact.settled for pair in pairs]) for law in (0, 1))
+    more = ours.sum(axis=1) / theirs.sum(axis=1)
+    lost = int((theirs & ~ours).sum())
+    outcome = REFUTED if more.min() < 1.0 else LIMITED if lost else REPRODUCED
+    return Finding(
+        f"Of {theirs.size} walls, penalties hold {theirs.sum()} and impulses {ours.sum()}, {more.min():.2f} to "
+        f"{more.max():.2f} times as many per loop; {lost} walls only penalties hold.", outcome)  # fmt: skip
+
+
+def _beyond(maps: Sequence[Any]) -> Finding:
+    """The condition speaks of ideal sensors and penalties."""
+    chosen = [one for one in maps if one.passive.any() and one.law == "penalty" and not one.loop.delay]
+    passive = np.array([one.passive for one in chosen])
+    grown, settled = (np.array([getattr(one.contact, name) for one in chosen]) for name in ("grown", "settled"))
+    gains = int((grown & passive).sum())
+    return Finding(
+        f"Within b >= KT/2 + |B| no wall may make the hand faster: {gains} of {passive.sum()} do. Under this hand "
+        f"{(settled & ~passive).sum()} walls beyond it settle too: it is a condition for every hand, not for this one.",
+        REFUTED if gains else REPRODUCED)  # fmt: skip
+
+
+def _undamped(maps: Sequence[Any]) -> Finding:
+    bare = [one for one in maps if one.loop.device_damping == 0.0 and not one.loop.delay and one.law == "penalty"]
+    shares = ", ".join(f"{100 * one.settled_share:.0f} % at {one.loop.rate:.0f} Hz" for one in bare)
+    return Finding(
+        "The paper's device has no damping, b = 0: by the condition no wall at all is passive for every hand. That "
+        f"penalties still hold {shares} of these walls rests on this hand, a constant push.", LIMITED)  # fmt: skip
+
+
+def _hard(maps: Sequence[Any]) -> Finding:
+    pairs = [(theirs.contact, ours.contact, rows) for theirs, ours, rows in _at_paper(maps)]
+    harder, deeper = (
+        [float(np.median(getattr(ours, name)[rows] / getattr(theirs, name)[rows])) for theirs, ours, rows in pairs]
+        for name in ("rate_hardness", "penetration")
+    )  # fmt: skip
+    return Finding(
+        f"At the paper's damping of 50 N s/m an impulse feels {min(harder):.3g} to {max(harder):.3g} times as hard at "
+        f"first (rate-hardness, median over stiffnesses) and lets the hand {min(deeper):.2f} to {max(deeper):.2f} "
+        "times as deep.", REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else LIMITED)  # fmt: skip
+
+
+def _at_paper(maps: Sequence[Any]) -> list[tuple[Any, Any, slice]]:
+    from verification.stability.maps import PAPER_DAMPING
+
+    found = []
+    for theirs, ours in _pairs(maps):
+        size, row = len(theirs.stiffness), int(np.flatnonzero(theirs.damping == PAPER_DAMPING)[0])
+        found.append((theirs, ours, slice(row * size, (row + 1) * size)))
+    return found
+
+
+def _hardness(maps: Sequence[Any]) -> Numbers:
+    rows = []
+    for theirs, ours, at in _at_paper(maps):
+        for one in (theirs, ours):
+            c, loop = one.contact, one.loop
+            for K, *values in zip(one.stiffness, c.rate_hardness[at], c.settling_time[at], c.penetration[at],
+                                  c.bounces[at], c.peak_force[at], strict=True):  # fmt: skip
+                hardness, settling, depth, bounces, peak = (float(value) for value in values)
+                rows.append((loop.rate, _sensors(loop), loop.device_damping, one.law, float(K), hardness,
+                             settling if math.isfinite(settling) else None, 1e3 * depth, int(bounces), peak))
+    return Numbers(("rate [Hz]", "sensors", "device damping [N s/m]", "law", "stiffness [N/m]", "rate-hardness [N/m]",
+                    "settles after [s]", "penetration [mm]", "bounces", "peak force [N]"), tuple(rows), 3,
+                   "At the paper's damping, 50 N s/m. Rate-hardness: the first rise of the force over one step, per "
+                   "speed on touching (Lawrence and others, 2000).")  # fmt: skip
+
+
+def _pegs(pegs: Sequence[Any]) -> Numbers:
+    rows = tuple((p.device, p.stiffness, p.damping, p.world, p.settling_time, p.bounces, 1e3 * p.penetration, p.note)
+                 for p in pegs)
+    return Numbers(("device", "stiffness [N/m]", "damping [N s/m]", "world", "settles after [s]", "bounces",
+                    "penetration [mm]", "stopped"), rows, 3, "A dash: it never came to rest.")
+
+
+def _peg(pegs: Sequence[Any]) -> tuple[Finding, ...]:
+    pairs = list(zip(pegs[::2], pegs[1::2], strict=True))
+    sooner = [(a, b) for a, b in pairs if b.settling_time is not None
+              and (a.settling_time is None or b.settling_time <= a.settling_time)]
+    decided = [(a, b) for a, b in pairs if (a.settling_time, b.settling_time) != (None, None)]
+    fewer = sum(b.bounces <= a.bounces for a, b in pairs)
+    share = len(sooner) / max(1, len(decided))
+    outcome = REPRODUCED if share == 1.0 else LIMITED if share >= 0.5 else REFUTED
+    return (Finding(
+        f"The peg in the corner comes to rest no later with impulses in {len(sooner)} of {len(decided)} trials of "
+        f"device and wall where either does, and bounces no more often in {fewer} of {len(pairs)}.",
+        outcome),)  # fmt: skip

@@ -1,0 +1,85 @@
+"""The sampled wall: exact between the samples, and the laws of its outcomes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from verification.claims import CLAIMS, Study
+from verification.stability.maps import GROWS, PAPER_DAMPING, StabilityMap, grid, walls
+from verification.stability.sampled_wall import IMPULSES, LAWS, PENALTY, Loop, _held_force, touch_walls
+
+
+def at(loop: Loop, stiffness: float, damping: float, law: str):  # type: ignore[no-untyped-def]
+    return touch_walls(loop, np.array([stiffness]), np.array([damping]), law)
+
+
+@pytest.mark.parametrize("b", [0.0, 1e-9, 0.05, 5.0, 500.0])
+def test_motion_between_samples_is_that_of_the_differential_equation(b: float) -> None:
+    loop = Loop(device_damping=b)
+    free, moved, held = _held_force(loop)
+    x, v, force, n = 0.3, -0.7, 1.1, 20_000
+    fine_x, fine_v, h = x, v, loop.step / n
+    for _ in range(n):  # midpoint rule, error h²
+        half = fine_v + 0.5 * h * (force - b * fine_v) / loop.mass
+        fine_x, fine_v = fine_x + h * half, fine_v + h * (force - b * half) / loop.mass
+    a = force / loop.mass
+    assert x + moved * v + held * a == pytest.approx(fine_x, abs=1e-12)
+    assert free * v + moved * a == pytest.approx(fine_v, abs=1e-10)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_stiff_undamped_wall_at_a_slow_rate_makes_the_hand_faster(law: str) -> None:
+    assert at(Loop(), 1e6, 0.0, law).grown.all()
+
+
+def test_a_soft_damped_wall_holds() -> None:
+    assert at(Loop(device_damping=5.0), 1000.0, 50.0, PENALTY).settled.all()
+
+
+def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
+    loop = Loop(push=0.0)
+    contact = at(loop, 1000.0, 50.0, IMPULSES)
+    assert contact.penetration[0] <= 2.0 * loop.speed * loop.step
+    assert at(loop, 1000.0, 50.0, PENALTY).penetration[0] > 3.0 * contact.penetration[0]
+
+
+def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
+    stiffness = np.array([100.0, 1e4])
+    hardness = touch_walls(Loop(), stiffness, np.array([50.0, 50.0]), IMPULSES).rate_hardness
+    assert hardness[0] == pytest.approx(hardness[1], rel=1e-12)
+    theirs = touch_walls(Loop(), stiffness, np.array([50.0, 50.0]), PENALTY).rate_hardness
+    assert theirs[1] > theirs[0]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_wall_within_the_condition_makes_the_hand_faster(law: str) -> None:
+    loop, (stiffness, damping) = Loop(device_damping=5.0), grid("quick")
+    K, B = walls(stiffness, damping)
+    found = StabilityMap(loop, law, stiffness, damping, touch_walls(loop, K, B, law))
+    assert found.passive.any() and not found.passive.all()
+    outcomes = np.array(found.outcomes)
+    if law == PENALTY:
+        assert not (outcomes[found.passive] == GROWS).any()
+    assert (outcomes[~found.passive] == GROWS).any()
+
+
+def test_the_paper_s_damping_is_on_the_grid() -> None:
+    stiffness, damping = grid("quick")
+    assert PAPER_DAMPING in damping and damping[0] == 0.0
+    assert (np.diff(damping) > 0.0).all() and (np.diff(stiffness) > 0.0).all()
+
+
+def test_an_unknown_law_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="penalty, impulses"):
+        at(Loop(), 1.0, 1.0, "springs")
+
+
+def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:
+    claim = CLAIMS["C20"]
+    result = claim.check(Study())
+    assert result.held == result.decided > 0
+    moved = [dict(row, **{"virtual damping": 2.0 * row["virtual damping"]}) for row in result.table.records()
+             if row["virtual damping"] == 0.95]  # fmt: skip
+    assert not any(claim.holds(row) for row in moved)

@@ -1,0 +1,85 @@
+"""C20: virtual damping is bounded by physical damping, stiffness and step: b >= KT/2 + |B| (section VII)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from verification.claims.claim import Claim
+from verification.claims.table import Column, Row, Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
+COLUMNS = (
+    Column("rate", "Hz", condition=True),
+    Column("stiffness", "N/m", condition=True),
+    Column("device damping", "of KT/2", condition=True),
+    Column("virtual damping", "of the bound", condition=True),
+    Column("energy from the wall", "J"),
+    Column("wall's turnover", "J"),
+)
+
+STIFFNESSES = (250.0, 1000.0, 4000.0, 16000.0)
+DEVICE_DAMPINGS = (0.0, 0.5, 1.25, 2.0, 5.0)  # of KT/2: below 1 no wall of this stiffness is passive
+DAMPINGS = (0.0, 0.5, 0.95, 1.05, 2.0)  # of the bound b − KT/2
+ROUNDING = 1e-11  # of the turnover: the sums of 4000 steps, each rounded to 2e-16 of it
+_STEPS = 2000
+
+
+def measure(study: Study) -> Table:
+    """The motion that a wall feeds most (see `hand_port.quickest_motion`), against walls on both sides of the bound."""
+    return table_of(COLUMNS, (
+        _trial(rate, stiffness, device, share)
+        for rate in (512.0, 1000.0) for stiffness in STIFFNESSES for device in DEVICE_DAMPINGS
+        for share in (DAMPINGS if device > 1.0 else (0.0, 1.0))
+    ))  # fmt: skip
+
+
+def _trial(rate: float, K: float, device: float, share: float) -> dict[str, Any]:
+    """`share` is of b − KT/2; where that is negative no B is allowed, and it is of KT/2."""
+    from verification.properties.engine_laws.hand_port import leak, ours, quickest_motion
+
+    half = 0.5 * K / rate
+    b = device * half
+    B = share * (b - half if b > half else half)
+    case = quickest_motion(K, B, b, 1.0 / rate, _STEPS)
+    turnover = (b + half + B) * float(((case.readings[1:] - case.readings[:-1]) ** 2).sum()) * rate
+    return {
+        "rate": rate, "stiffness": K, "device damping": device, "virtual damping": share if b > half else None,
+        "energy from the wall": leak(case, ours), "wall's turnover": turnover,
+    }  # fmt: skip
+
+
+def holds(row: Row) -> bool:
+    """Energy comes out of the wall beyond the bound, and none within it."""
+    leaks = row["energy from the wall"] > ROUNDING * row["wall's turnover"]
+    share = row["virtual damping"]
+    allowed = share is not None and share <= 1.0
+    return bool(leaks is not allowed)
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    within = [row for row in table.records() if row["virtual damping"] is not None and row["virtual damping"] <= 1.0]
+    undamped = table.where(**{"device damping": 0.0})
+    most = max(undamped.column("energy from the wall"))
+    fed = sum(e > ROUNDING * t for e, t in zip(undamped.column("energy from the wall"),
+                                               undamped.column("wall's turnover"), strict=True))  # fmt: skip
+    worst = max(row["energy from the wall"] / row["wall's turnover"] for row in within)
+    return (f"Within b >= KT/2 + B the hand draws at most {worst:.0e} of the turnover from a wall, beyond it draws "
+            f"energy without end. A device without damping, the paper's, is fed by {fed} of {len(undamped.rows)} walls "
+            f"(up to {most:.2g} J in {_STEPS} samples): what keeps its contacts stable is the hand and the coupling.")
+
+
+CLAIM = Claim(
+    id="C20",
+    statement="Virtual damping is bounded by physical damping, stiffness and step: b > KT/2 + |B|.",
+    place="Section VII, after Colgate and Schenkel",
+    quantity="Energy that the hand draws from the engine's penalty (5), read every T and held, by the motion that "
+    "draws most: forth and back at half the sampling rate, well inside the wall.",
+    tolerance="1e-11 of the energy turned over: the rounding of the sums.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("device damping", "stiffness"),
+)

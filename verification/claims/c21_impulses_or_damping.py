@@ -1,0 +1,99 @@
+"""C21: impulse forces make contact more stable than raising the damping does (section VII)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from verification.claims.claim import Claim
+from verification.claims.table import Column, Row, Table, table_of
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+    from verification.stability.maps import StabilityMap
+
+SAME, EQUAL_GAIN, BEST = "the same wall without", "sustained damping of equal gain", "the best larger damping"
+
+COLUMNS = (
+    Column("against", condition=True, part=True),
+    Column("rate", "Hz", condition=True),
+    Column("delay", "samples", condition=True),
+    Column("device damping", "N s/m", condition=True),
+    Column("stiffness", "N/m", condition=True),
+    Column("impulses settle after", "s"),
+    Column("penalty settles after", "s"),
+    Column("at a damping of", "N s/m"),
+)
+
+
+def measure(study: Study) -> Table:
+    """Each loop and stiffness: impulses at the paper's damping against three penalties."""
+    from verification.stability.maps import stability_maps
+
+    maps = stability_maps(study.depth)
+    pairs = zip(maps[::2], maps[1::2], strict=True)  # the two laws of a loop follow each other
+    return table_of(COLUMNS, (record for penalty, impulses in pairs for record in _trials(penalty, impulses)))
+
+
+def _trials(penalty: StabilityMap, impulses: StabilityMap) -> list[dict[str, Any]]:
+    from verification.stability.maps import PAPER_DAMPING
+
+    loop, raised = penalty.loop, penalty.damping[penalty.damping >= PAPER_DAMPING]
+    times = np.array([penalty.settling(damping) for damping in raised])
+    best, ours = times.argmin(axis=0), impulses.settling(PAPER_DAMPING)
+    gain, sustained = _equal_gain(penalty)
+    records = []
+    for i, K in enumerate(penalty.stiffness):
+        rivals = {SAME: (times[0, i], PAPER_DAMPING), EQUAL_GAIN: (sustained[i], gain),
+                  BEST: (times[best[i], i], raised[best[i]])}  # fmt: skip
+        for against, (theirs, damping) in rivals.items():
+            records.append({
+                "against": against, "rate": loop.rate, "delay": loop.delay, "device damping": loop.device_damping,
+                "stiffness": float(K), "impulses settle after": float(ours[i]), "penalty settles after": float(theirs),
+                "at a damping of": float(damping),
+            })  # fmt: skip
+    return records
+
+
+def _equal_gain(penalty: StabilityMap) -> tuple[float, np.ndarray]:
+    """The damping whose force on touching is the impulse's, (1 + e) m/T, and when walls with it settle [s]."""
+    from verification.stability.sampled_wall import PENALTY, touch_walls
+
+    loop = penalty.loop
+    gain = (1.0 + loop.restitution) * loop.mass / loop.step
+    contact = touch_walls(loop, penalty.stiffness, np.full_like(penalty.stiffness, gain), PENALTY)
+    return gain, np.where(contact.settled, contact.settling_time, np.inf)
+
+
+def holds(row: Row) -> bool | None:
+    """Impulses settle no later than the best raised damping; None where neither ever settles."""
+    ours, theirs = row["impulses settle after"], row["penalty settles after"]
+    return None if np.isinf(ours) and np.isinf(theirs) else bool(ours <= theirs)
+
+
+def finding(table: Table) -> str:
+    """One sentence."""
+    texts = []
+    for rival in (SAME, EQUAL_GAIN, BEST):
+        decided = [row for row in table.where(against=rival).records() if holds(row) is not None]
+        first = sum(bool(holds(row)) for row in decided)
+        alone = sum(np.isinf(row["penalty settles after"]) for row in decided)
+        texts.append(f"no later than {rival} on {first} of {len(decided)} walls ({alone} of them it alone holds)")
+    return f"Impulses at the paper's 50 N s/m settle {'; '.join(texts)}."
+
+
+CLAIM = Claim(
+    id="C21",
+    statement="Impulse forces make contact more stable than raising the damping does.",
+    place="Section VII",
+    quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall, exact between the samples: "
+    "impulses at the paper's damping against penalties at the same damping, at the one whose force on touching is the "
+    "impulse's, (1 + e) m/T, and at the best of all larger ones, chosen afterwards for each wall.",
+    tolerance="None: the smaller time wins; walls that neither holds cannot tell.",
+    measure=measure,
+    holds=holds,
+    finding=finding,
+    map_axes=("stiffness", "rate"),
+    map_panels="against",
+)
