@@ -16,6 +16,8 @@ SUBJECTS = (
     ("Weak devices", ("C09", "C12", "C16")),
     ("Coming to rest", ("C15",)),
     ("False collisions", ("C18",)),
+    ("Stable contact", ("C20", "C21")),
+    ("Cost", ("C19", "C22")),
 )
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 _SENTENCE_END = re.compile(r"(?<=\.)\s(?=[A-Z])")
