@@ -10,6 +10,7 @@ from reports.runner import Runner
 
 # id of the topic -> module of reports.evidence
 TOPICS: dict[str, str] = {
+    "mechanics": "mechanics",
     "stability": "stability",
     "complementarity": "complementarity",
 }

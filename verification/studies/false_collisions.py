@@ -88,9 +88,7 @@ def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
 
 def count_false(scene: Scene, simulate: Simulate | None = None) -> FalseCollisions:
     """Simulate the socket and count."""
-    if simulate is None:
-        from iapb.simulation import simulate
-    run, contact = simulate(scene), scene.contact
+    run, contact = (simulate or _simulated)(scene), scene.contact
     per_step = np.diff(run.contacts.offsets)
     first = int(np.flatnonzero(per_step)[0])
     later = run.impacts.step > first
@@ -106,3 +104,9 @@ def count_false(scene: Scene, simulate: Simulate | None = None) -> FalseCollisio
         largest_speed=float(np.hypot(run.v[:, 0], run.v[:, 1]).max()),
         times=tuple((run.impacts.step[later] * run.dt).tolist()), losses=tuple(lost.tolist()),
     )  # fmt: skip
+
+
+def _simulated(scene: Scene) -> Run:
+    from iapb.simulation import simulate
+
+    return simulate(scene)

@@ -22,6 +22,11 @@ Floats = NDArray[np.float64]
 
 # Start gaps that put contacts in an order for the event-driven reference, where gaps are linear: any size will do.
 _GAP = 1e-3
+# Relative change of energy or momentum that is rounding: some thousand roundings of numbers of order one.
+CONSERVED = 1e-12
+RELATIVE, PER_BODY = "simultaneous, relative rows (12)", "simultaneous, per-body rows (13)-(14)"
+SEQUENTIAL = "event-driven"
+ALL, APPROACHING = "all touching contacts", "approaching contacts"
 
 
 @dataclass(frozen=True)
@@ -103,15 +108,10 @@ def bernoulli(degrees: float = 30.0) -> LinkedBalls:
 
 def outcomes(balls: LinkedBalls) -> tuple[LinkedOutcome, ...]:
     """Return the elastic outcomes of every treatment, side by side."""
-    every = tuple(range(len(balls.contacts)))
-    found = [
-        _mapped(balls, "simultaneous, relative rows (12)", "all touching contacts", balls.relative_rows(every)),
-        _mapped(balls, "simultaneous, relative rows (12)", "approaching contacts",
-                balls.relative_rows(balls.approaching())),
-        _mapped(balls, "simultaneous, per-body rows (13)-(14)", "all touching contacts", balls.per_body_rows(every)),
-        _mapped(balls, "simultaneous, per-body rows (13)-(14)", "approaching contacts",
-                balls.per_body_rows(balls.approaching())),
-    ]  # fmt: skip
+    chosen = {ALL: tuple(range(len(balls.contacts))), APPROACHING: balls.approaching()}
+    rows_of = {RELATIVE: balls.relative_rows, PER_BODY: balls.per_body_rows}
+    found = [_mapped(balls, treatment, words, rows(contacts))
+             for treatment, rows in rows_of.items() for words, contacts in chosen.items()]  # fmt: skip
     return (*found, *_sequential(balls))
 
 
@@ -144,7 +144,7 @@ def _event_driven(balls: LinkedBalls, order: str, start: Floats) -> LinkedOutcom
     rows = balls.relative_rows(range(len(balls.contacts)))
     system = LinearSystem(np.eye(d), np.zeros(d), rows, start, 1.0)
     path = event_driven(system, np.zeros(d), balls.velocity.ravel(), duration=10.0)
-    return LinkedOutcome(balls.name, "event-driven", order, balls.velocity, path.v[-1].reshape(-1, 2))
+    return LinkedOutcome(balls.name, SEQUENTIAL, order, balls.velocity, path.v[-1].reshape(-1, 2))
 
 
 def study_linked_impacts() -> tuple[LinkedOutcome, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from verification.studies.linked_impacts import (
+    CONSERVED,
     LinkedOutcome,
     bernoulli,
     cradle,
@@ -15,7 +16,7 @@ from verification.studies.linked_impacts import (
     study_linked_impacts,
 )
 
-TOLERANCE = 1e-12  # the issue's: some thousand roundings of an impact in which all numbers are of order one
+TOLERANCE = CONSERVED
 
 
 def chosen(found: tuple[LinkedOutcome, ...], treatment: str, rows: str) -> LinkedOutcome:
