@@ -11,6 +11,7 @@ from reports.runner import Runner
 # id of the topic -> module of reports.evidence
 TOPICS: dict[str, str] = {
     "mechanics": "mechanics",
+    "scene-ledger": "scenes",
     "stability": "stability",
     "complementarity": "complementarity",
 }

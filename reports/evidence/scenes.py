@@ -1,0 +1,53 @@
+"""Topic: every scene that comes with the project: how deep, where the energy went, how long a step takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from reports.evidence import scenes_tables as tables
+from reports.evidence.runs import shipped_scene
+from reports.evidence.scenes_findings import findings_of, verdict_of
+from reports.pages.records import Topic
+from reports.runner import Runner
+
+if TYPE_CHECKING:
+    from iapb.run import Run
+    from verification.studies.open_books import OpenBooks
+    from verification.studies.scene_measures import SceneMeasure
+
+ID, TITLE = "scene-ledger", "The scenes"
+LEAD = (
+    "Every scene file of the project, run in the world IAPB at the scene's own step. The energy books say where each "
+    "joule came from and went; what they leave open is energy that the steps in time made up or swallowed, and must "
+    "fall with the integrator's declared order when the step is shortened. Times per step were taken while other work "
+    "ran on the machine, which inflates them: compare the ratios."
+)
+WORLD = "IAPB"
+REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+    """Run every scene, at shorter steps too, and keep the books of each."""
+    from iapb.scene_files import scene_names
+    from verification.studies.open_books import open_books
+    from verification.studies.scene_measures import measure
+
+    names = scene_names()
+    runs: list[Run] = []
+    measures: list[SceneMeasure] = []
+    books: list[OpenBooks] = []
+    for done, name in enumerate(names):
+        progress(done, len(names))
+        scene = shipped_scene(name)
+        runs.append(runner(scene, WORLD))
+        measures.append(measure(runs[-1]))
+        books.append(open_books(scene, lambda refined: runner(refined, WORLD, keep=False), REFINEMENTS[depth]))
+    progress(len(names), len(names))
+    return topic_of(runs, measures, books)
+
+
+def topic_of(runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks]) -> Topic:
+    """Return the topic of these records."""
+    findings = findings_of(runs, measures, books)
+    return Topic(ID, TITLE, LEAD, findings, tables.all_tables(runs, measures, books), verdict_of(measures, books))
