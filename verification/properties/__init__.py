@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from verification.properties.bulk import bulk_impacts as bulk_impacts
     from verification.properties.case import ImpactCase as ImpactCase
     from verification.properties.case import LawResidual as LawResidual
-    from verification.properties.kit import PassivityReport as PassivityReport
     from verification.properties.kit import check_passivity as check_passivity
     from verification.properties.laws import LAWS as LAWS
+    from verification.properties.laws import UNEQUAL_LAWS as UNEQUAL_LAWS
+    from verification.properties.passivity_report import PassivityReport as PassivityReport
     from verification.properties.planted import PLANTED_BUGS as PLANTED_BUGS
     from verification.properties.planted import sound_resolver as sound_resolver
 
@@ -21,9 +22,10 @@ _HOME = {
     "bulk_impacts": "bulk",
     "ImpactCase": "case",
     "LawResidual": "case",
-    "PassivityReport": "kit",
+    "PassivityReport": "passivity_report",
     "check_passivity": "kit",
     "LAWS": "laws",
+    "UNEQUAL_LAWS": "laws",
     "PLANTED_BUGS": "planted",
     "sound_resolver": "planted",
 }

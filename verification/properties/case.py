@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from iapb.errors import IapbError
 
 Floats = NDArray[np.floating[Any]]
-Resolver = Callable[[Floats, Floats, Floats, float], Any]
+Resolver = Callable[[Floats, Floats, Floats, Any], Any]
 
 # Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion: a sound
 # resolver may take them for either, so laws that compare velocities do not judge such impacts.
@@ -48,7 +48,10 @@ class LawResidual:
 
 @dataclass(frozen=True)
 class ImpactCase:
-    """M (d, d), J (c, d), v (d,) and scalar e; `translations` (k, d) are motions z with J z = 0 exactly."""
+    """M (d, d), J (c, d), v (d,) and scalar e; `translations` (k, d) are motions z with J z = 0 exactly.
+
+    `unequal` (c,), each in [0, 1], takes the place of e where it is given.
+    """
 
     mass_matrix: Floats
     contact_jacobian: Floats
@@ -56,6 +59,7 @@ class ImpactCase:
     restitution: float
     family: str = ""
     translations: Floats | None = field(default=None)
+    unequal: Floats | None = field(default=None)
 
     @property
     def coordinates(self) -> int:
@@ -66,6 +70,10 @@ class ImpactCase:
     def contacts(self) -> int:
         """c."""
         return len(self.contact_jacobian)
+
+    def given_restitution(self) -> Any:
+        """What a resolver gets: the scalar e, or a copy of the unequal ones."""
+        return self.restitution if self.unequal is None else self.unequal.copy()
 
     @cached_property
     def condition(self) -> float:
@@ -127,7 +135,7 @@ def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
     """Return v⁺ (d,) as the resolver gives it on copies of the case's arrays, checked for shape and finiteness."""
     given = case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy()
     try:
-        answer = resolver(*given, case.restitution)
+        answer = resolver(*given, case.given_restitution())
     except Exception as error:  # anybody's resolver: whatever it raises is the finding
         raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
     velocity = np.asarray(getattr(answer, "velocity", answer))

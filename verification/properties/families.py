@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from verification.properties.case import Floats, ImpactCase
@@ -28,6 +30,13 @@ def draw_case(rng: np.random.Generator, largest_condition: float = 1e8, largest_
     translations = np.ones((1, d)) if rows_kind == "cradle" else None
     name = f"{mass_kind} mass, {rows_kind} rows{closeness}, {velocity_kind} velocity"
     return ImpactCase(mass, rows, v, e, name, translations)
+
+
+def with_unequal_restitution(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
+    """The case with a restitution in [0, 1] per row: 0 and 1 side by side, or anything."""
+    extremes = rng.random() < 0.5
+    e = rng.choice([0.0, 1.0], size=case.contacts) if extremes else rng.uniform(0.0, 1.0, size=case.contacts)
+    return replace(case, family=case.family + ", unequal e", unequal=e)
 
 
 def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: float) -> Floats:

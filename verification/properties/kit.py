@@ -2,93 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from verification.properties.bounds import KIT, Bounds
 from verification.properties.case import ImpactCase, LawResidual, Resolver, ResolverFault
-from verification.properties.families import draw_case
-from verification.properties.laws import LAWS
+from verification.properties.families import draw_case, with_unequal_restitution
+from verification.properties.laws import LAWS, UNEQUAL_LAWS, Law
+from verification.properties.passivity_report import LawVerdict, PassivityReport
+from verification.properties.pasteable import name_of
 from verification.properties.shrink import search_counterexample, shrink
 from verification.threads import one_thread
 
 NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
 LARGEST_CONDITION = 1e8  # κ(M) of the default families; beyond it plain Cholesky loses what the laws compare
-
-
-@dataclass(frozen=True)
-class LawVerdict:
-    """What became of one law over all impacts.
-
-    Attributes
-    ----------
-    checked, failures : impacts the law applied to, and those that broke it.
-    worst : the residual with the largest value / tolerance (None if the law never applied).
-    largest : largest value of the residual, whatever its tolerance.
-    fault : first complaint where the resolver raised or returned nothing usable.
-    """
-
-    law: str
-    statement: str
-    checked: int
-    failures: int
-    worst: LawResidual | None
-    worst_case: ImpactCase | None
-    largest: float
-    fault: str = ""
-
-    @property
-    def passed(self) -> bool:
-        """No impact broke the law."""
-        return self.failures == 0
-
-
-@dataclass(frozen=True)
-class PassivityReport:
-    """Verdict of `check_passivity`; `print(report)` is meant for people."""
-
-    resolver: str
-    impacts: int
-    seed: int
-    verdicts: tuple[LawVerdict, ...]
-    counterexample: ImpactCase | None
-    counterexample_law: str
-
-    @property
-    def passed(self) -> bool:
-        """Every law holds on every impact tried."""
-        return all(verdict.passed for verdict in self.verdicts)
-
-    @property
-    def broken_laws(self) -> tuple[str, ...]:
-        """Names of the laws that some impact broke."""
-        return tuple(verdict.law for verdict in self.verdicts if not verdict.passed)
-
-    @property
-    def worst(self) -> LawVerdict:
-        """The law that came closest to its tolerance, or exceeded it most."""
-        return max(self.verdicts, key=lambda verdict: verdict.worst.ratio if verdict.worst else 0.0)
-
-    def verdict(self, law: str) -> LawVerdict:
-        """The verdict on the law of that name."""
-        return next(verdict for verdict in self.verdicts if verdict.law == law)
-
-    @property
-    def counterexample_test(self) -> str:
-        """The counterexample as a test to paste, or an empty text."""
-        return as_test(self.counterexample, self.counterexample_law) if self.counterexample else ""
-
-    def __str__(self) -> str:
-        lines = [f"{self.resolver}: {'passed' if self.passed else 'FAILED'} on {self.impacts} impacts"]
-        for verdict in self.verdicts:
-            mark = "kept  " if verdict.passed else "BROKEN"
-            worst = f"worst {verdict.worst.value:.2e} of {verdict.worst.tolerance:.2e}" if verdict.worst else "-"
-            lines.append(f"  {mark} {verdict.statement}: {verdict.failures} of {verdict.checked}, {worst}")
-            if verdict.fault:
-                lines.append(f"         {verdict.fault}")
-        return "\n".join([*lines, self.counterexample_test]).rstrip()
+PATIENCE = 600.0  # [s] ten times what a resolver of 30 µs a call takes at the default depth
 
 
 def check_passivity(
@@ -99,6 +31,9 @@ def check_passivity(
     search: int = 200,
     bounds: Bounds = KIT,
     largest_condition: float = LARGEST_CONDITION,
+    unequal_restitution: bool = False,
+    patience: float = PATIENCE,
+    progress: Callable[[int, int], None] | None = None,
 ) -> PassivityReport:
     """Run every law against `resolver` and return the report.
 
@@ -112,6 +47,10 @@ def check_passivity(
     search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
     bounds : tolerances; `verification.properties.bounds`.
     largest_condition : largest κ(M) drawn.
+    unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and ask
+        what holds for any law of them: no energy, M(v⁺ − v⁻) in range(Jᵀ), momentum, the same bits, own arguments.
+    patience : seconds after which no further impact is tried; then the report is not passed, and says so.
+    progress : called with (impacts done, impacts) after each.
 
     Examples
     --------
@@ -119,81 +58,101 @@ def check_passivity(
     ...     report = check_passivity(my_resolver)
     ...     assert report.passed, report
     """
-    rng = np.random.default_rng(seed)
-    cases = [draw_case(rng, largest_condition) for _ in range(impacts)]
+    ends = time.monotonic() + patience
+    tallies = {name: _Tally(name, law) for name, law in LAWS.items()}
+    if unequal_restitution:
+        tallies |= {name: _Tally(name, law) for name, law in UNEQUAL_LAWS.items()}
     with one_thread():
-        verdicts = tuple(_judge(name, resolver, bounds, cases) for name in LAWS)
+        done = _try_all(tallies, resolver, bounds, _Draw(impacts, seed, largest_condition), ends, progress)
+        verdicts = tuple(tally.verdict() for tally in tallies.values())
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
-        example = None if broken is None else _counterexample(broken, resolver, bounds, search, seed)
-    name = getattr(resolver, "__qualname__", None) or repr(resolver)
-    return PassivityReport(name, impacts, seed, verdicts, example, broken.law if broken else "")
+        example = None if broken is None else _counterexample(broken, resolver, bounds, search, seed, ends)
+    late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
+    law = broken.law if broken else ""
+    return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver)
 
 
-def _judge(name: str, resolver: Resolver, bounds: Bounds, cases: list[ImpactCase]) -> LawVerdict:
-    checked, failures, fault, largest = 0, 0, "", -np.inf
+@dataclass(frozen=True)
+class _Draw:
+    impacts: int
+    seed: int
+    largest_condition: float
+
+
+def _try_all(tallies: dict[str, _Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
+             progress: Callable[[int, int], None] | None) -> int:
+    """Put every impact to every law; return how many there was time for."""
+    rng, other = np.random.default_rng(draw.seed), np.random.default_rng([draw.seed, 1])
+    unequal = any(name in UNEQUAL_LAWS for name in tallies)
+    for done in range(draw.impacts):
+        case = draw_case(rng, draw.largest_condition)
+        mixed = with_unequal_restitution(other, case) if unequal else case
+        for name, tally in tallies.items():
+            if time.monotonic() > ends:
+                return done
+            tally.add(mixed if name in UNEQUAL_LAWS else case, resolver, bounds)
+        if progress is not None:
+            progress(done + 1, draw.impacts)
+    return draw.impacts
+
+
+@dataclass
+class _Tally:
+    """The verdict on one law in the making."""
+
+    name: str
+    law: Law
+    checked: int = 0
+    failures: int = 0
+    fault: str = ""
+    largest: float = -np.inf
     worst: LawResidual | None = None
-    worst_case: ImpactCase | None = None
-    for case in cases:
-        residual, complaint = _residual(name, case, resolver, bounds)
+    worst_case: ImpactCase | None = field(default=None, repr=False)
+
+    def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
+        """Try one impact."""
+        residual, complaint = residual_of(self.law, case, resolver, bounds)
         if residual is None:
-            continue
-        checked += 1
-        failures += not residual.passed
-        fault = fault or complaint
-        largest = max(largest, residual.value)
-        if worst is None or residual.ratio > worst.ratio:
-            worst, worst_case = residual, case
-    return LawVerdict(name, LAWS[name].statement, checked, failures, worst, worst_case, largest, fault)
+            return
+        self.checked += 1
+        self.failures += not residual.passed
+        self.fault = self.fault or complaint
+        self.largest = max(self.largest, residual.value)
+        if self.worst is None or residual.ratio > self.worst.ratio:
+            self.worst, self.worst_case = residual, case
+
+    def verdict(self) -> LawVerdict:
+        """What became of it."""
+        return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
+                          self.largest, self.fault)
 
 
-def _residual(name: str, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
+def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
     """The law's residual; infinite, with the complaint, where the resolver gave nothing usable."""
     try:
-        return LAWS[name].check(case, resolver, bounds), ""
+        return law.check(case, resolver, bounds), ""
     except ResolverFault as fault:
-        return LawResidual(name, np.inf, 0.0), str(fault)
+        return LawResidual("", np.inf, 0.0), str(fault)
 
 
 def _counterexample(
-    broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int
+    broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float
 ) -> ImpactCase | None:
+    """The smallest one found: by hypothesis, else the worst one drawn, shrunk as far as there is time."""
+    unequal = broken.law in UNEQUAL_LAWS
     for least in (NOTABLE, 0.0):
-        fails = partial(_fails, broken.law, resolver, bounds, least)
-        found = search_counterexample(fails, search, seed) if search else None
+        fails = partial(_fails, broken.law, resolver, bounds, least, ends)
+        found = search_counterexample(fails, search, seed, unequal) if search and time.monotonic() < ends else None
         if found is not None:
             return found
-        if broken.worst_case is not None and fails(broken.worst_case):
+        if broken.worst is not None and broken.worst_case is not None and not broken.worst.value < least:
             return shrink(broken.worst_case, fails)
     return None
 
 
-def _fails(name: str, resolver: Resolver, bounds: Bounds, least: float, case: ImpactCase) -> bool:
-    """Whether the law is broken, by at least `least`."""
-    residual, _ = _residual(name, case, resolver, bounds)
+def _fails(name: str, resolver: Resolver, bounds: Bounds, least: float, ends: float, case: ImpactCase) -> bool:
+    """Whether the law is broken, by at least `least`; never when the time is over."""
+    if time.monotonic() > ends:
+        return False
+    residual, _ = residual_of((LAWS | UNEQUAL_LAWS)[name], case, resolver, bounds)
     return residual is not None and not residual.passed and not residual.value < least
-
-
-def as_test(case: ImpactCase, law: str) -> str:
-    """Return the case as source of a test of `law`, to paste beside the resolver it breaks."""
-    arrays = {
-        "mass_matrix": case.mass_matrix,
-        "contact_jacobian": case.contact_jacobian,
-        "velocity": case.velocity,
-    }
-    lines = [f"    {name} = np.array({array.tolist()!r}).reshape({array.shape})" for name, array in arrays.items()]
-    return "\n".join(
-        [
-            "import numpy as np",
-            "from verification.properties import LAWS, ImpactCase",
-            "from verification.properties.bounds import KIT",
-            "",
-            "# resolver = ...  the one under test",
-            "",
-            "",
-            f"def test_{law}():",
-            *lines,
-            f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r})",
-            f"    residual = LAWS[{law!r}].check(case, resolver, KIT)",
-            "    assert residual.passed, residual",
-        ]
-    )

@@ -159,6 +159,24 @@ def fails_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))
 
 
+def nan_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return sound_resolver(M, J, v, e) if len(J) else np.full_like(v, np.nan)
+
+
+def column_of_velocities(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Shape (d, 1)."""
+    return sound_resolver(M, J, v, e)[:, None]
+
+
+def writes_on_its_arguments(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    v[:] = sound_resolver(M, J, v, e)
+    return v
+
+
+def gives_up(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    raise RuntimeError("did not converge")
+
+
 def makes_stale_jacobian() -> Resolver:
     """Remembers the Jacobian of the first call of each shape."""
     remembered: dict[tuple[int, ...], Floats] = {}
@@ -167,6 +185,15 @@ def makes_stale_jacobian() -> Resolver:
         return sound_resolver(M, remembered.setdefault(J.shape, J), v, e)
 
     return stale_jacobian
+
+
+def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
+    """Newton's law as equalities with a restitution per row: met on every row, and it makes energy."""
+    if np.ndim(e) == 0:
+        return sound_resolver(M, J, v, float(e))
+    parts = _whitened(M, J, v)
+    wanted = (1.0 + np.asarray(e)) * (parts.rows @ parts.u)
+    return _back(parts, parts.u - np.linalg.pinv(parts.rows, rcond=_RANK_CUT) @ wanted)
 
 
 class PlantedBug(NamedTuple):
@@ -201,5 +228,9 @@ PLANTED_BUGS: dict[str, PlantedBug] = {
     "damped_formula": _plain(damped_formula, "restitution"),
     "unscaled_rows": _plain(unscaled_rows, "row_scaling"),
     "fails_without_contacts": _plain(fails_without_contacts, "kinetic_energy"),
+    "nan_without_contacts": _plain(nan_without_contacts, "kinetic_energy"),
+    "column_of_velocities": _plain(column_of_velocities, "kinetic_energy"),
+    "writes_on_its_arguments": _plain(writes_on_its_arguments, "arguments"),
+    "gives_up": _plain(gives_up, "kinetic_energy"),
     "stale_jacobian": PlantedBug(makes_stale_jacobian, "restitution"),
 }

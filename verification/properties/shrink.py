@@ -13,7 +13,7 @@ _DIGITS = (0, 1, 2, 4, 8)
 
 
 def search_counterexample(
-    fails: Callable[[ImpactCase], bool], examples: int, seed: int, largest_exponent: int = 8
+    fails: Callable[[ImpactCase], bool], examples: int, seed: int, unequal: bool = False
 ) -> ImpactCase | None:
     """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing."""
     import random
@@ -21,7 +21,7 @@ def search_counterexample(
     from hypothesis import HealthCheck, Phase, find, settings
     from hypothesis.errors import NoSuchExample
 
-    from verification.properties.strategies import impact_cases
+    from verification.properties.strategies import impact_cases, unequal_cases
 
     profile = settings(
         max_examples=examples,
@@ -31,7 +31,7 @@ def search_counterexample(
         suppress_health_check=list(HealthCheck),
     )
     try:
-        return find(impact_cases(largest_exponent), fails, settings=profile, random=random.Random(seed))
+        return find(unequal_cases() if unequal else impact_cases(), fails, settings=profile, random=random.Random(seed))
     except NoSuchExample:
         return None
 
@@ -50,15 +50,16 @@ def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
 
 def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
     for i in range(case.contacts):
-        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0))
+        e = None if case.unequal is None else np.delete(case.unequal, i)
+        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=e)
     if case.coordinates > 1 and case.translations is None:
         for k in range(case.coordinates):
             yield _without_coordinate(case, k)
     for e in (1.0, 0.0):
-        if case.restitution not in (1.0, e):
+        if case.unequal is None and case.restitution not in (1.0, e):
             yield replace(case, restitution=e)
     for digits in _DIGITS:
-        for name in ("velocity", "contact_jacobian", "mass_matrix"):
+        for name in ("velocity", "contact_jacobian", "mass_matrix", "unequal"):
             yield from _rounded(case, name, digits)
 
 
@@ -74,6 +75,8 @@ def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
 def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
     """The array in `digits` decimals, if that changes it and it was not rounder already."""
     array = getattr(case, name)
+    if array is None:
+        return
     rounder = np.round(array, digits)
     if _written(rounder) < _written(array):
         yield replace(case, **{name: rounder})

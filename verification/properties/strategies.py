@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -46,6 +48,14 @@ def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
 def restitutions() -> st.SearchStrategy[float]:
     """e: the four that matter, or any."""
     return st.one_of(st.sampled_from([1.0, 0.0, -1.0, 0.5]), st.floats(-1.0, 1.0))
+
+
+@st.composite
+def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
+    """An impact with a restitution of its own for each row."""
+    case = draw(impact_cases(largest_exponent))
+    e = draw(st.lists(st.sampled_from([0.0, 1.0, 0.5]), min_size=case.contacts, max_size=case.contacts))
+    return replace(case, unequal=np.array(e, dtype=float))
 
 
 @st.composite

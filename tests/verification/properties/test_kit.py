@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from functools import partial
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 
 from iapb import Impact, resolve_impact
 from verification import check_passivity
-from verification.properties import LAWS, PLANTED_BUGS, sound_resolver
-from verification.properties.bounds import FACTORED, KIT
-from verification.properties.case import ImpactCase
+from verification.properties import PLANTED_BUGS, sound_resolver
+from verification.properties.bounds import FACTORED
 from verification.properties.laws.kinetic_energy import relative_gain
+from verification.properties.pasteable import as_test
+from verification.properties.planted import each_contact_its_own_restitution
 
 
 @pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, partial(resolve_impact, method="svd")])
@@ -53,8 +55,9 @@ def test_the_printed_formula_is_found_to_gain_energy() -> None:
 def test_the_counterexample_can_be_pasted() -> None:
     resolver = PLANTED_BUGS["wrong_sign"].make()
     report = check_passivity(resolver, impacts=50, search=50)
-    scope = {"np": np, "ImpactCase": ImpactCase, "LAWS": LAWS, "KIT": KIT, "resolver": resolver}
+    scope: dict[str, object] = {}
     exec(report.counterexample_test, scope)
+    assert scope["resolver"] is resolver
     with pytest.raises(AssertionError, match="kinetic_energy"):
         scope["test_kinetic_energy"]()
     scope["resolver"] = sound_resolver
@@ -83,12 +86,52 @@ def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(answer: o
     assert complaint in report.verdict("kinetic_energy").fault
 
 
-def test_a_resolver_that_writes_on_its_input_harms_nobody() -> None:
-    def in_place(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> np.ndarray:
-        v[:] = sound_resolver(M, J, v, e)
-        return v
+def test_a_resolver_that_writes_on_its_input_is_told_so_and_nothing_else() -> None:
+    report = check_passivity(PLANTED_BUGS["writes_on_its_arguments"].make(), impacts=60, search=0)
+    assert report.broken_laws == ("arguments",)
+    assert "BROKEN the arguments are left as they were" in str(report)
 
-    assert check_passivity(in_place, impacts=60, search=0).passed
+
+def test_unequal_restitution_is_opt_in() -> None:
+    """Newton's equalities with a restitution per row: sound while they are equal, and a gain of energy when not."""
+    assert check_passivity(each_contact_its_own_restitution, impacts=100).passed
+    report = check_passivity(each_contact_its_own_restitution, impacts=100, search=60, unequal_restitution=True)
+    assert report.broken_laws == ("unequal_kinetic_energy",)
+    assert report.verdict("unequal_kinetic_energy").largest > 0.1
+    scope: dict[str, object] = {}
+    with pytest.raises(AssertionError, match="kinetic_energy"):
+        exec(report.counterexample_test + "\n\ntest_unequal_kinetic_energy()", scope)
+    assert scope["resolver"] is each_contact_its_own_restitution
+    assert check_passivity(resolve_impact, impacts=100, unequal_restitution=True).passed
+
+
+def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
+    def slow(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> np.ndarray:
+        time.sleep(0.02)
+        return sound_resolver(M, J, v, e)
+
+    report = check_passivity(slow, impacts=1000, patience=0.2)
+    assert not report.passed and report.broken_laws == () and report.impacts < 1000
+    assert "NOT FINISHED" in str(report) and "too slow" in str(report)
+
+
+@pytest.mark.parametrize("name", ["per_body_rows", "reversed_velocity", "transposed_factor"])
+def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(name: str) -> None:
+    resolver = PLANTED_BUGS[name].make()
+    law = PLANTED_BUGS[name].caught_by
+    report = check_passivity(resolver, impacts=60, search=0)
+    case = report.verdict(law).worst_case
+    text = as_test(case, law, resolver=resolver) + f"\n\ntest_{law}()"
+    with pytest.raises(AssertionError, match=law):
+        exec(text, {})
+    exec(as_test(case, law, resolver=sound_resolver) + f"\n\ntest_{law}()", {})
+
+
+def test_a_partial_is_pasted_with_its_options() -> None:
+    report = check_passivity(partial(resolve_impact, method="gram_pinv"), impacts=100, search=0)
+    assert str(report).startswith("resolve_impact(method='gram_pinv'): FAILED")
+    with pytest.raises(AssertionError, match="kinetic_energy"):
+        exec(report.counterexample_test + "\n\ntest_kinetic_energy()", {})
 
 
 def test_the_same_seed_gives_the_same_report() -> None:

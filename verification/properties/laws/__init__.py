@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from verification.properties.bounds import Bounds
 from verification.properties.case import ImpactCase, LawResidual, Resolver
+from verification.properties.laws.arguments import arguments_are_left_alone
 from verification.properties.laws.coordinates import coordinates_do_not_matter
 from verification.properties.laws.duplicated_rows import duplicated_rows_change_nothing
 from verification.properties.laws.elastic import elastic_conserves
@@ -52,4 +53,11 @@ LAWS: dict[str, Law] = {
     "coordinates": Law("the choice of coordinates does not matter", coordinates_do_not_matter),
     "groups": Law("bodies that share no contact do not feel one another", groups_do_not_interact),
     "repeatability": Law("the same impact gives the same bits, whatever came before", same_input_same_output),
+    "arguments": Law("the arguments are left as they were", arguments_are_left_alone),
+}
+
+# What holds for any law of unequal restitution, whatever it says of the separation velocities.
+UNEQUAL_LAWS: dict[str, Law] = {
+    f"unequal_{name}": Law(f"{LAWS[name].statement}, unequal e", LAWS[name].check)
+    for name in ("kinetic_energy", "impulse_range", "momentum", "repeatability", "arguments")
 }

@@ -1,0 +1,73 @@
+"""A counterexample as the source of a test that can be pasted beside the resolver it breaks."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from verification.properties.bounds import FACTORED, KIT, Bounds
+from verification.properties.case import ImpactCase
+
+_BY_NAME = {"KIT": KIT, "FACTORED": FACTORED}
+
+
+def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None) -> str:
+    """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap."""
+    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else "LAWS"
+    optional = {"translations": case.translations, "unequal": case.unequal}
+    arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
+    arrays |= {name: array for name, array in optional.items() if array is not None}
+    more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)
+    name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
+    imports = ["import numpy as np", f"from verification.properties import {table}, ImpactCase"]
+    imports.append(f"from verification.properties.bounds import {name or 'Bounds'}")
+    return "\n".join([
+        *imports,
+        import_line(resolver) or "\n# resolver = ...  the one under test",
+        "",
+        "",
+        f"def test_{law}():",
+        *(f"    {key} = {_written(array)}" for key, array in arrays.items()),
+        f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
+        f"    residual = {table}[{law!r}].check(case, resolver, {name or _bounds(bounds)})",
+        "    assert residual.passed, residual",
+    ])  # fmt: skip
+
+
+def import_line(resolver: Any) -> str:
+    """Return the lines that give `resolver`, or an empty text for a lambda or something made in place."""
+    if isinstance(resolver, partial) and not resolver.args:
+        line = _import_of(resolver.func, resolver.func.__name__) if _can_be_imported(resolver.func) else ""
+        return line and f"{line}\nfrom functools import partial\n\nresolver = {name_of(resolver, 'partial')}"
+    return _import_of(resolver, f"{resolver.__name__} as resolver") if _can_be_imported(resolver) else ""
+
+
+def name_of(resolver: Any, word: str = "") -> str:
+    """Return what a resolver is called, the options of a partial included; `word` writes that as a call."""
+    if isinstance(resolver, partial) and not resolver.args:
+        options = ", ".join(f"{key}={value!r}" for key, value in resolver.keywords.items())
+        name = getattr(resolver.func, "__name__", repr(resolver.func))
+        return f"{word}({name}, {options})" if word else f"{name}({options})"
+    return getattr(resolver, "__qualname__", None) or repr(resolver)
+
+
+def _can_be_imported(resolver: Any) -> bool:
+    module, name = getattr(resolver, "__module__", None), getattr(resolver, "__qualname__", "")
+    return bool(module) and module != "__main__" and getattr(sys.modules.get(module), name, None) is resolver
+
+
+def _import_of(resolver: Any, name: str) -> str:
+    return f"from {resolver.__module__} import {name}"
+
+
+def _bounds(bounds: Bounds) -> str:
+    return repr(bounds).replace("=inf", "=np.inf")
+
+
+def _written(array: np.ndarray) -> str:
+    """The array as source; an empty one needs its shape."""
+    text = f"np.array({array.tolist()!r}, dtype=float)"
+    return text if array.size else f"{text}.reshape({array.shape})"
