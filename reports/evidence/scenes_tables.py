@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from verification.studies.scene_measures import SceneMeasure
 
 YARDSTICK = "peg_corner"  # the paper's scene: its step is the unit of time
-INSTANTS = 120  # of the books over time: as many as a strip of the figure can show
+INSTANTS = 90  # of the books over time: as many as a strip of the figure can show
 
 CONTACTS, LEDGER, OPEN, OVER_TIME = "contact and time", "energy ledger", "what the books leave open", "books over time"
 SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_damping", "lost_friction")
