@@ -41,31 +41,36 @@ def kernel_times(sizes: tuple[tuple[int, int], ...] = SIZES, rounds: int = 40, s
 
 
 def _time_size(d: int, c: int, rounds: int, rng: np.random.Generator) -> KernelTime:
-    rank = max(1, (2 * d) // 3)
-    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
-    mass, v = root @ root.T + np.eye(d), rng.normal(size=d)
-    factored = _factored_loop(mass, rows, v)
+    mass, rows, v = random_impact(d, c, rng)
+    factored = factored_loop(mass, rows, v, _CALLS)
     factored()
-    _printed(mass, rows, v)
+    printed_impact(mass, rows, v)
     compiled, printed = [], []
     for _ in range(rounds):
         started = time.perf_counter()
         factored()
         compiled.append((time.perf_counter() - started) / _CALLS)
         started = time.perf_counter()
-        _printed(mass, rows, v)
+        printed_impact(mass, rows, v)
         printed.append(time.perf_counter() - started)
-    return KernelTime(d, c, _quartiles(compiled), _quartiles(printed))
+    return KernelTime(d, c, quartiles(compiled), quartiles(printed))
 
 
-def _printed(mass: Floats, rows: Floats, v: Floats) -> Floats:
+def random_impact(d: int, c: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """(M, J, v) with c rows that span two thirds of the d coordinates."""
+    rank = max(1, (2 * d) // 3)
+    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    return root @ root.T + np.eye(d), rows, rng.normal(size=d)
+
+
+def printed_impact(mass: Floats, rows: Floats, v: Floats) -> Floats:
     """(21) to the letter with e = 0.5."""
     solved = np.linalg.solve(mass, rows.T)
     return v - 1.5 * (solved @ (np.linalg.pinv(rows @ solved) @ (rows @ v)))
 
 
-def _factored_loop(mass: Floats, rows: Floats, v: Floats) -> Callable[[], None]:
-    """A call that resolves the impact _CALLS times in compiled code."""
+def factored_loop(mass: Floats, rows: Floats, v: Floats, calls: int) -> Callable[[], None]:
+    """A function that resolves the impact `calls` times in compiled code."""
     from iapb.contact.kernels.cholesky import cholesky
     from iapb.contact.kernels.impact import make_impact_work, rank_tolerance
     from verification.accuracy_time.kernel_loop import repeat_factored
@@ -76,11 +81,12 @@ def _factored_loop(mass: Floats, rows: Floats, v: Floats) -> Callable[[], None]:
     columns, tolerance = np.ascontiguousarray(rows.T), float(rank_tolerance(lower))
 
     def loop() -> None:
-        repeat_factored(mass, lower, v, 0.5, columns, tolerance, work, v_plus, momentum, _CALLS)
+        repeat_factored(mass, lower, v, 0.5, columns, tolerance, work, v_plus, momentum, calls)
 
     return loop
 
 
-def _quartiles(samples: list[float]) -> Quartiles:
+def quartiles(samples: list[float]) -> Quartiles:
+    """Median and quartiles of some times."""
     lower, median, upper = np.percentile(samples, [25, 50, 75])
     return Quartiles(float(lower), float(median), float(upper), len(samples))

@@ -30,6 +30,7 @@ _FILES = (
     "c16_together",
     "c17_energy_lost",
     "c18_false_collisions",
+    "c19_haptic_rate",
     "c20_damping_bound",
     "c21_impulses_or_damping",
 )
