@@ -1,7 +1,9 @@
-"""One rigid step with dry friction in the plane: Coulomb's law, or its convex relaxation, at velocity level.
+"""One rigid step with dry friction: Coulomb's law, or its convex relaxation, at velocity level, in plane and space.
 
-The step's contacts as blocks (normal, tangent): K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w is J v⁺ − b on the normals
-(b of `reference.rigid_step`) and the tangential velocity after the step; `relaxed` drops mu |w_T| (Anitescu).
+The step's contacts as blocks (normal, one tangent in the plane or two in space): K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w
+is J v⁺ − b on the normals (b of `reference.rigid_step`) and the tangential velocity after the step; `relaxed` drops
+mu |w_T| (Anitescu). Contacts that the others' impulses do not make close are left out: solve for those that close,
+see which of the rest the answer closes, and solve again with them. The last answer solves the whole problem.
 Source: Stewart and Trinkle (1996); Anitescu and Tasora, Comput. Optim. Appl. 47 (2010).
 """
 
@@ -12,13 +14,17 @@ from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import SOLVED_TOLERANCE, Solution
 from reference.complementarity.solvers import solve
 
 Floats = NDArray[np.float64]
 
 FRICTION_LAWS = ("none", "coulomb", "relaxed")
-# Gauss-Seidel ends at 1e-13 of the velocities where it converges; what it leaves on hyperstatic contacts is above.
-FRICTION_TOLERANCE = 1e-8
+# Gauss-Seidel ends at 1e-13 of the velocities where it converges: such an answer is taken at once. On hyperstatic
+# contacts it creeps, and an interior point ends at the root of its own accuracy: then the best of them is taken,
+# down to what `reference.complementarity` calls solved.
+CONVERGED, FRICTION_TOLERANCE = 1e-8, SOLVED_TOLERANCE
+SOLVERS = ("nsgs", "pinocchio_admm", "cvxpy_socp")
 
 
 def friction_step(
@@ -30,25 +36,48 @@ def friction_step(
     friction: float,
     relaxed: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return v⁺ (d,), normal and tangential impulses (c,) [N s] of one step; −inf in `bound` leaves a contact out.
+    """Return v⁺ (d,), normal (c,) and tangential impulses (c, s) [N s] of one step.
+
+    Parameters
+    ----------
+    normal_rows : (c, d) unit-normal rows; tangent_rows : (c, s, d) rows of s = 1 (plane) or 2 (space) unit tangents
+    bound : (c,) of the normal velocities after the step [m/s]; −inf leaves a contact out
+    friction : mu > 0, one for all contacts
 
     Raises
     ------
     SolverError
-        where Gauss-Seidel does not reach FRICTION_TOLERANCE
+        where no solver reaches FRICTION_TOLERANCE; says with how many contacts, and what each solver said
     """
-    normal, tangential = np.zeros(len(bound)), np.zeros(len(bound))
-    kept = np.flatnonzero(np.isfinite(bound))
-    if (normal_rows[kept] @ v_free >= bound[kept]).all():
-        return v_free, normal, tangential
-    rows = np.stack([normal_rows[kept], tangent_rows[kept]], axis=1).reshape(2 * len(kept), -1)
-    offset = rows @ v_free
-    offset[::2] -= bound[kept]
-    w = rows @ np.linalg.solve(mass_matrix, rows.T)
-    problem = ImpactProblem.from_delassus(w, offset, 0.0, friction, contact_size=2, relaxed=relaxed)
-    solution = solve(problem, "nsgs")
-    if not solution.solved(FRICTION_TOLERANCE):
-        raise SolverError(f"step with friction: residual {solution.residuals.worst:.1e}, {solution.note}")
-    impulse = solution.answer()
-    normal[kept], tangential[kept] = impulse[::2], impulse[1::2]
-    return v_free + np.linalg.solve(mass_matrix, rows.T @ impulse), normal, tangential
+    count, size = tangent_rows.shape[0], 1 + tangent_rows.shape[1]
+    blocks = np.concatenate([normal_rows[:, None], tangent_rows], axis=1)
+    impulse, velocity = np.zeros((count, size)), v_free
+    taken = np.zeros(count, np.bool_)
+    while (closing := ~taken & (normal_rows @ velocity < bound)).any():
+        taken |= closing
+        rows = blocks[taken].reshape(-1, len(v_free))
+        offset = rows @ v_free
+        offset[::size] -= bound[taken]
+        response = np.linalg.solve(mass_matrix, rows.T)
+        problem = ImpactProblem.from_delassus(
+            rows @ response, offset, 0.0, friction, contact_size=size, relaxed=relaxed
+        )
+        impulse[taken] = _solve(problem).reshape(-1, size)
+        velocity = v_free + response @ impulse[taken].ravel()
+    return velocity, impulse[:, 0], impulse[:, 1:]
+
+
+def _solve(problem: ImpactProblem) -> Floats:
+    """Return p (n,) from the first solver that converges, or the best that reaches FRICTION_TOLERANCE."""
+    found: list[Solution] = []
+    for solver in SOLVERS:
+        found.append(solve(problem, solver))
+        if found[-1].solved(CONVERGED):
+            return found[-1].answer()
+    best = min(found, key=lambda solution: solution.residuals.worst)
+    if best.solved(FRICTION_TOLERANCE):
+        return best.answer()
+    said = "; ".join(f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found)
+    raise SolverError(
+        f"rigid step with friction and {problem.contacts} contacts has no accepted solution: {said}"
+    )

@@ -16,6 +16,7 @@ from iapb.contact.laws import StepResult
 from iapb.errors import ArgumentError
 from iapb.run import COLLIDING, FREE, RESTING
 from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
+from reference.one_thread import one_thread
 from reference.rigid_friction import FRICTION_LAWS, friction_step
 from reference.rigid_step import SCHEMES, nearest_velocity, rigid_step, velocity_bounds
 
@@ -25,12 +26,16 @@ Floats = NDArray[np.float64]
 
 
 class _Solved(NamedTuple):
-    """Velocity (d,), normal and tangential impulses (c,), tangential rows (c, d)."""
+    """What a step returns for c contacts and d velocities.
+
+    velocity : (d,) v⁺; normal : (c,) impulses [N s]
+    tangential : (c, 3) impulses [N s], world axes; dragging : (d, c) generalized impulse of each
+    """
 
     velocity: Floats
     normal: Floats
     tangential: Floats
-    tangents: Floats
+    dragging: Floats
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class RigidConstraints:
         finite margin must exceed the largest speed times the step
     stabilization : share of an overlap removed in each step, 0 for none
     scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
-    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient; planar scenes
+    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient
 
     Restitution is Newton's; Poisson's in "stewart-trinkle" with e > 0, and in steps where Newton's law has no solution.
     """
@@ -76,15 +81,19 @@ class RigidConstraints:
         Impulses of contacts that approached faster than the scene's approach velocity are reported as collision
         impulses, the rest as forces p/dt: only their sum is determined by the step.
         """
+        with one_thread():
+            return self._advance(system, state, applied_force, dt)
+
+    def _advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         mechanism, q, v = system.mechanism, state.q.copy(), state.v.copy()
         mass = mechanism.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
         force = applied_force - _inner_forces(system, q, v)
         step = self._solve(system, mass, q, v, force, dt, found)
         blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.normal > 0.0)
-        normal, tangential = found.jacobian.T * step.normal, step.tangents.T * step.tangential
-        impulse = (normal + tangential)[:, blows].sum(axis=1)
-        pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, tangential))
+        normal = found.jacobian.T * step.normal
+        impulse = (normal + step.dragging)[:, blows].sum(axis=1)
+        pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
         write_contacts(state, found, step.normal, step.tangential, ~blows, dt)
         write_impact(state, system, v, np.linalg.solve(mass, impulse), impulse, found.jacobian[blows])
         q_plus = mechanism.integrate(q, step.velocity, dt)
@@ -99,13 +108,14 @@ class RigidConstraints:
             step = rigid_step(
                 mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization, self.scheme
             )
-            still = np.zeros_like(found.jacobian)
-            return _Solved(step.velocity, step.impulse, np.zeros_like(found.gap), still)
+            still = np.zeros((len(found.gap), 3))
+            return _Solved(step.velocity, step.impulse, still, np.zeros_like(found.jacobian.T))
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
-        tangents = tangent_rows(system.mechanism, q, found)
-        v_free = v + dt * np.linalg.solve(mass, force)
-        relaxed = self.friction == "relaxed"
-        return _Solved(*friction_step(mass, v_free, found.jacobian, tangents, bound, mu, relaxed), tangents)
+        tangents, rows = tangent_rows(system, q, found)
+        v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
+        velocity, normal, slip = friction_step(mass, v_free, found.jacobian, rows, bound, mu, relaxed)
+        along, dragging = np.einsum("csx,cs->cx", tangents, slip), np.einsum("csd,cs->dc", rows, slip)
+        return _Solved(velocity, normal, along, dragging)
 
 
 def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:

@@ -5,13 +5,37 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
-from iapb.scene import load_scene
+from iapb.errors import ArgumentError, SolverError
+from iapb.scene import load_scene, scene_from_text
 from iapb.scene_files import find_scene
 from iapb.simulation import simulate
+from reference import rigid_friction
+from reference.rigid_friction import friction_step
 from reference.time_stepping import RigidConstraints
 
-SCENES = ("peg_corner", "peg_hole", "newton_cradle", "box_stack", "three_link_arm_elastic")
+SCENES = (
+    "peg_corner", "peg_hole", "newton_cradle", "box_stack", "three_link_arm_elastic", "arm_obstacles", "peg_hole_space",
+    "tumbling_body",
+)  # fmt: skip
+FLOOR = """
+name: on_the_floor
+dimensions: 3
+rate: 1000
+duration: 1
+gravity: [0, 0, -9.81]
+bodies:
+  - name: body
+    joint: free_flyer
+    mass: 1
+    inertia: [4e-4, 4e-4, 4e-4]
+    shapes: [%s]
+    position: [0, 0, %s, 0, 0, 0, 1]
+    velocity: [0.3, 0.4, 0, 0, 0, 0]
+walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
+contact: {restitution: 0, friction: 0.6, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+"""
+BOX = FLOOR % ("{kind: box, size: [0.2, 0.2, 0.02]}", 0.01)
+BALL = FLOOR % ("{kind: sphere, radius: 0.0316227766}", 0.0316227766)  # 2/5 m r² = 4e-4 kg m²
 
 
 @pytest.mark.parametrize("scheme", ["moreau", "stewart-trinkle"])
@@ -41,6 +65,46 @@ def test_the_sliding_box_stops_where_the_textbook_says(friction: str) -> None:
     assert np.abs(run.v[-1]).max() < 2e-2
     dragged = run.friction_force[:150, 0] + run.impulse[:150, 0] / run.dt
     assert np.mean(dragged) == pytest.approx(-0.3 * 9.81, rel=0.05)
+
+
+@pytest.mark.parametrize("friction", ["coulomb", "relaxed"])
+def test_a_box_slides_straight_in_space_and_stops_where_the_textbook_says(friction: str) -> None:
+    """v²/(2 μ g) = 21 mm along (0.6, 0.8); the relaxed law lifts it on the way, by less than a step's slip."""
+    run = simulate(scene_from_text(BOX), RigidConstraints(friction=friction), steps=110)
+    expected, near = 0.5**2 / (2.0 * 0.6 * 9.81), {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
+    assert run.complete and run.q[-1, :2] == pytest.approx(expected * np.array([0.6, 0.8]), abs=near)
+    assert np.abs(run.v[-1]).max() < 2e-2
+    assert run.q[:, 2].max() <= 0.01 + {"coulomb": 1e-9, "relaxed": 2e-3}[friction]
+
+
+@pytest.mark.parametrize(("friction", "expected"), [("coulomb", 5.0 / 7.0), ("none", 1.0)])
+def test_a_ball_slides_until_it_rolls_at_five_sevenths_of_its_speed(friction: str, expected: float) -> None:
+    """After 2 v/(7 μ g) = 24 ms, to the 1 % that it turns in a step. Without friction it never rolls: the fault."""
+    run = simulate(scene_from_text(BALL), RigidConstraints(friction=friction), steps=40)
+    assert np.hypot(*np.diff(run.q[-2:, :2], axis=0)[0]) * 1000.0 == pytest.approx(0.5 * expected, rel=1e-2)
+    rolling = np.linalg.norm(run.v[-1, 3:]) * 0.0316227766
+    assert rolling == pytest.approx(0.5 * expected if friction != "none" else 0.0, rel=1e-2)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int) -> None:
+    """Contacts left out of the solved problem are those that the answer does not close."""
+    rng = np.random.default_rng(size)
+    for _ in range(20):
+        rows = rng.normal(size=(6, size, 5))
+        bound, v_free = rng.normal(size=6) * 0.1 - 0.3, rng.normal(size=5)
+        v, normal, tangential = friction_step(np.eye(5), v_free, rows[:, 0], rows[:, 1:], bound, 0.4)
+        assert (rows[:, 0] @ v - bound).min() >= -1e-6 * np.abs(v_free).max()
+        assert (np.linalg.norm(tangential, axis=1) <= 0.4 * normal + 1e-9).all()
+        change = np.einsum("ck,ckd->d", np.column_stack([normal, tangential]), rows)
+        assert v - v_free == pytest.approx(change, abs=1e-9)
+
+
+def test_a_step_without_solution_says_how_many_contacts_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rigid_friction, "FRICTION_TOLERANCE", -1.0)
+    monkeypatch.setattr(rigid_friction, "CONVERGED", -1.0)
+    with pytest.raises(SolverError, match="1 contacts.*nsgs.*cvxpy_socp"):
+        friction_step(np.eye(2), np.array([0.3, -1.0]), np.eye(2)[1:], np.eye(2)[None, :1], np.zeros(1), 0.5)
 
 
 def test_unknown_schemes_and_friction_laws_are_refused() -> None:

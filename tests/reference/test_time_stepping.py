@@ -119,6 +119,14 @@ def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
 
 
+def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
+    """A gram under a tonne, at rest: 5e3 m/s from above and from below leave 1e-12 m/s, not a wrong active set."""
+    mass, load = np.diag([1e-3, 1e3]), np.array([-9.81e-3, -9.81e3])
+    result = step(mass, [0.0, 0.0], load, [[1.0, 0.0], [-1.0, 1.0]], [0.0, 0.0], 0.0)
+    assert np.abs(result.velocity).max() <= 1e-11
+    assert result.impulse == pytest.approx([9.81e3 * DT, 9.81e3 * DT], rel=1e-5)
+
+
 def test_stabilization_removes_its_share_of_the_overlap() -> None:
     overlap = np.array([-1e-3])
     bound = velocity_bounds(overlap, np.array([0.0]), 0.0, DT, stabilization=0.25)
