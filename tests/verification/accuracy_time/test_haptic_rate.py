@@ -5,7 +5,14 @@ from __future__ import annotations
 import pytest
 
 from verification.accuracy_time.anytime import anytime
-from verification.accuracy_time.haptic_rate import ALLOWED, FACTORED, PRINTED, RateTrial, haptic_rate, most_contacts
+from verification.accuracy_time.haptic_rate import (
+    ALLOWED,
+    FACTORED,
+    PRINTED,
+    RateTrial,
+    haptic_rate,
+    most_contacts,
+)
 from verification.accuracy_time.kernels import quartiles
 from verification.accuracy_time.scaling import Timing, exponent
 from verification.claims import CLAIMS

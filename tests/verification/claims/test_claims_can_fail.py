@@ -49,6 +49,15 @@ PLANTED = {
         {"lost on first impact": 3.1e-3, "of the reference": 3e-3},
     ),
     "C18": (FILTERED | {"false collisions": 0}, FILTERED | {"false collisions": 1}),
+    "C19": ({"late calls": 1, "contacts": 60}, {"late calls": 2, "contacts": 60}),
+    "C20": (
+        {"virtual damping": 0.95, "energy from the wall": 0.0, "wall's turnover": 1.0},
+        {"virtual damping": 0.95, "energy from the wall": 1e-3, "wall's turnover": 1.0},
+    ),
+    "C21": (
+        {"impulses settle after": 0.1, "penalty settles after": np.inf},
+        {"impulses settle after": 0.2, "penalty settles after": 0.1},
+    ),
     "C05": ({"error": 0.0, "bound": 0.0}, {"error": np.nan, "bound": 1.0}),
     "C10": ({"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
 }
@@ -81,6 +90,8 @@ def test_judge_confirms_and_refutes(name):
         ("C11", {"part": c11_forces.BALANCE, "IAPB": 0.1, "hand": -0.32}),
         ("C13", {"coordinate": "x", "IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 1.0}),
+        ("C20", {"virtual damping": 1.05, "energy from the wall": 0.0, "wall's turnover": 1.0}),
+        ("C20", {"virtual damping": None, "energy from the wall": 0.0, "wall's turnover": 1.0}),
         ("C18", FILTERED | {"part": c18_false_collisions.CLUSTERING, "coherence_distance": 0, "false collisions": 41}),
         ("C18", FILTERED | {"part": c18_false_collisions.SHORT, "coherence_distance": 2, "false collisions": 26}),
     ],
@@ -96,6 +107,8 @@ def test_every_part_of_a_claim_can_fail(name, trial):
         ("C12", {"part": "x", "impacts limited": 0.0} | RENDERED),
         ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}),
         ("C15", {"IAPB": 0, "PB": 0}),
+        ("C19", {"late calls": 2, "contacts": 120}),
+        ("C21", {"impulses settle after": np.inf, "penalty settles after": np.inf}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 0.0}),
         ("C18", FILTERED | {"coherence_distance": 1.0, "false collisions": 26}),
         ("C18", FILTERED | {"false collisions without filters": 0, "false collisions": 0}),
