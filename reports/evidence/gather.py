@@ -35,10 +35,10 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     bulk = kept.stage("bulk impacts", Numbers, lambda done: properties.bulk(depth, done))
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
-    hard = kept.stage("hard cases", tuple[HardCase, ...], hard_cases.compute)
+    hard = kept.stage("hard cases", tuple[HardCase, ...], lambda done: hard_cases.compute(runner, done))
     timed = kept.stage("accuracy", Numbers, accuracy.compute)
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
-    inputs |= {"work_precision": timed, "energy_gains": bulk}
+    inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, cross_checks=checks,

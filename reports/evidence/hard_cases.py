@@ -1,29 +1,70 @@
-"""Stage: named hard cases with exact truth, every method on each."""
+"""Stage: named hard cases with certain answers, every method and world on each."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
+from reports.figures.figure import Numbers
+from reports.figures.hard_cases import CASE, INPUT, KIND
 from reports.pages.records import HardCase
+from reports.runner import Runner
+
+__all__ = ["INPUT", "compute", "summary"]
+
+COLUMNS = (
+    "method", "outcome", "energy gain", "gain allowed", "restitution residual", "forward error", "error allowed",
+    "rank", "exact rank", "time [µs]", "note",
+)
+_NOTES = {
+    "impact": "Gain exact, (KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric; median time of a call.",
+    "motion": "Gain: the most energy ever made, as a share of what was there or was fed in; error: distance from the "
+              "law, in the case's own unit; median time of a step.",
+}  # fmt: skip
 
 
-def compute(progress: Callable[[int, int], None]) -> tuple[HardCase, ...]:
-    """Judge all methods on all cases of the catalogue."""
-    from verification.hard_cases import HARD_CASES, judge_hard_cases
+def compute(runner: Runner, progress: Callable[[int, int], None]) -> tuple[HardCase, ...]:
+    """Judge all methods and worlds on all cases of the catalogue; a case without its files is a record that says so."""
+    from verification.hard_cases import HARD_CASES
 
     records = []
-    for done, (name, make) in enumerate(HARD_CASES.items()):
+    for done, name in enumerate(HARD_CASES):
         progress(done, len(HARD_CASES))
-        case = make()
-        results = tuple(
-            (verdict.method, verdict.forward_error, verdict.energy_gain, _outcome(verdict.verdict, verdict.note))
-            for verdict in judge_hard_cases(cases=[name])
-        )
-        expects = f"{case.why_hard.rstrip('.')}. Expected: {case.expected}"
-        records.append(HardCase(case.name, case.source, expects, results))
+        records.append(_record(name, runner))
     progress(len(HARD_CASES), len(HARD_CASES))
     return tuple(records)
 
 
-def _outcome(verdict: str, note: str) -> str:
-    return f"{verdict}: {note}" if note else verdict
+def summary(cases: Sequence[HardCase]) -> Numbers:
+    """All cases in one table: a row per case and method or world."""
+    rows = tuple((case.name, case.kind, *row) for case in cases for row in case.numbers.rows)
+    return Numbers((CASE, KIND, *COLUMNS), rows, 2)
+
+
+def _record(name: str, runner: Runner) -> HardCase:
+    from verification.hard_cases import HARD_CASES, CaseAbsent, TrajectoryCase, judge_hard_cases
+
+    try:
+        case = HARD_CASES[name]()
+    except CaseAbsent as absent:
+        title, nothing = name.replace("_", " "), Numbers(COLUMNS, ())
+        return HardCase(name, title, "problems of others", "", "", "", "", nothing, skipped=str(absent))
+    kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
+    rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner))
+    numbers = Numbers(COLUMNS, rows, 2, _NOTES[kind])
+    return HardCase(name, case.name, case.source, kind, case.why_hard, case.law, case.expected, numbers)
+
+
+def _row(found: Any) -> tuple[Any, ...]:
+    """A verdict as a row; what does not apply or was not delivered is a dash."""
+    answered, motion = not found.note, found.exact_rank < 0
+    return (
+        found.method, found.verdict, _known(found.energy_gain), _known(found.energy_bound),
+        _known(found.restitution_residual), _known(found.forward_error), _known(found.forward_bound),
+        found.rank if answered else None, None if motion else found.exact_rank, _known(found.seconds * 1e6), found.note,
+    )  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

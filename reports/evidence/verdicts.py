@@ -18,6 +18,8 @@ from reports.pages.records import (
 
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 
+_ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
+
 
 def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
     """One verdict for each topic that was computed."""
@@ -81,10 +83,14 @@ def _checks(evidence: Evidence) -> Iterator[Verdict]:
 def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
     if not evidence.hard_cases:
         return
-    ours = [result for case in evidence.hard_cases for result in case.results if result[0] == "factored"]
-    stable = sum(result[3].startswith("stable") for result in ours)
-    sentence = f"The engine is stable on {stable} of {len(ours)} hard cases with exact answers."
-    yield Verdict("Hard cases", REPRODUCED if stable == len(ours) else LIMITED, sentence, "hard-cases")
+    tried = [case for case in evidence.hard_cases if not case.skipped]
+    ours = {case.name: next((case.outcomes[name] for name in _ENGINE if name in case.outcomes), "") for case in tried}
+    failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != "stable"]
+    skipped = len(evidence.hard_cases) - len(tried)
+    sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases with certain answers."
+                + (f" Not on: {'; '.join(failing)}." if failing else "")
+                + (f" {skipped} were skipped: their files are absent." if skipped else ""))  # fmt: skip
+    yield Verdict("Hard cases", LIMITED if failing else REPRODUCED, sentence, "hard-cases")
 
 
 def _topics(evidence: Evidence) -> Iterator[Verdict]:

@@ -13,7 +13,7 @@ from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.legend import swatch
-from reports.pages.records import OUTCOMES, Claim, Evidence, HardCase, Topic, Verdict
+from reports.pages.records import OUTCOMES, Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 
@@ -34,8 +34,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     page = _environment().get_template("page.html.j2")
     return page.render(
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
-        hard_methods=methods_of(evidence.hard_cases), subjects=verdicts(evidence.claims),
-        counts=count_outcomes(evidence.claims),
+        subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
     )
 
 
@@ -52,25 +51,10 @@ def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
     return {outcome: count for outcome, count in counts.items() if count}
 
 
-def methods_of(cases: Sequence[HardCase]) -> tuple[str, ...]:
-    """Return the methods that any case was tried with, in the order in which they first appear."""
-    return tuple(dict.fromkeys(result[0] for case in cases for result in case.results))
-
-
-def outcomes_by_method(results: Sequence[tuple[str, float | None, float | None, str]]) -> dict[str, str]:
-    """Return what came of one case with each method."""
-    return {method: outcome for method, _, _, outcome in results}
-
-
 def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Numbers], ...]:
     """Return the tables of a topic, with their names, that no figure was drawn from."""
     drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
     return tuple((name, table) for name, table in topic.tables.items() if f"{topic.id}/{name}" not in drawn)
-
-
-def known(value: float | None) -> float | None:
-    """Return the value, or None for one that a method did not deliver (its outcome says why)."""
-    return None if value is None or value != value else value
 
 
 def _environment() -> Environment:
@@ -81,8 +65,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, known=known, outcomes_by_method=outcomes_by_method,
-        tables_without=tables_without,
+        as_finding=FINDINGS.__getitem__, tables_without=tables_without,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

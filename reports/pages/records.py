@@ -76,12 +76,28 @@ class CrossCheck:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A named problem with an exact answer; `results` has one (method, error, energy gain, outcome) per method."""
+    """A named problem with a certain answer.
 
+    kind : "impact", tried with impact methods, or "motion", simulated in worlds
+    law : what the answer is, and why it is certain
+    numbers : a row per method or world; the first two columns are its name and what came of it
+    skipped : why it was not tried; empty where it was
+    """
+
+    id: str
     name: str
     source: str
-    expects: str
-    results: tuple[tuple[str, float | None, float | None, str], ...]
+    kind: str
+    why_hard: str
+    law: str
+    expected: str
+    numbers: Numbers
+    skipped: str = ""
+
+    @property
+    def outcomes(self) -> dict[str, str]:
+        """What came of it, by method or world; "stable" where every number is within its bound."""
+        return {str(row[0]): str(row[1]) for row in self.numbers.rows}
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -68,6 +70,11 @@ class Outline(HTMLParser):
             self.wrong.append(tag)
 
 
+def _hard_case(*rows: tuple[Any, ...]) -> HardCase:
+    numbers = Numbers(("method", "outcome", "forward error"), rows)
+    return HardCase("bar", "bar", "ours", "impact", "$0.5$ J", "exact", "no gain", numbers)
+
+
 @pytest.fixture(scope="module")
 def full() -> Evidence:
     claim = Claim("C01", "KE never rises <b>", "Thm 1", LIMITED, "half of the printed loss: $\\frac{1}{2}$",
@@ -78,7 +85,7 @@ def full() -> Evidence:
         claims=(claim, Claim("C02", "the same", "Thm 2", REFUTED, "no")),
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
-        hard_cases=(HardCase("bar", "ours", "$0.5$", (("factored", 1e-16, None, "exact"),)),),
+        hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
         topics=(Topic("mechanics", "Linkages", "Asked <here>.", (Finding("It holds to 1e-14.", REPRODUCED),),
                       {"trees": Numbers(("joints", "error"), ((3, 1e-14),))}, "All hold."),),
         effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
@@ -167,12 +174,25 @@ def test_a_subject_without_claims_has_no_verdict() -> None:
 
 
 def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
-    cases = (HardCase("bar", "ours", "no gain", (("factored", 1e-16, 0.0, "stable"),
-                                                 ("gram", float("nan"), float("nan"), "refused: dependent rows"))),)
-    page = build_report(Evidence(hard_cases=cases))
-    assert '<span class="good">✓</span> stable' in page
-    assert '<span class="bad">✕</span> refused' in page
+    page = build_report(Evidence(hard_cases=(_hard_case(("factored", "stable", 1e-16), ("gram", "refused", None)),)))
+    assert '<span class="good">✓</span> factored: stable' in page
+    assert '<span class="bad">✕</span> gram: refused' in page
+    assert "1 of 2 stable" in page
     assert "not a number" not in page
+
+
+def test_a_hard_case_without_its_files_says_so() -> None:
+    page = build_report(Evidence(hard_cases=(replace(_hard_case(), skipped="needs bowl.lcp"),)))
+    assert "Skipped: needs bowl.lcp." in page
+
+
+def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
+    stable, failing = _hard_case(("IAPB", "stable", 0.0)), _hard_case(("IAPB", "gains energy", 0.5))
+    (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, name="stiff wall"))))
+    assert verdict.outcome == LIMITED
+    assert "1 of 2" in verdict.sentence and "stiff wall (gains energy)" in verdict.sentence
+    (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, skipped="no file"))))
+    assert verdict.outcome == REPRODUCED and "1 were skipped" in verdict.sentence
 
 
 def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Evidence) -> None:

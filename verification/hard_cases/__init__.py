@@ -1,4 +1,4 @@
-"""Named impacts that break solvers: each with its source, why it is hard, exact truth, and a verdict per method."""
+"""Named impacts and motions that break solvers: each with source, reason, certain truth, and a verdict per method."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from verification.hard_cases.case import CaseAbsent as CaseAbsent
     from verification.hard_cases.case import HardCase as HardCase
+    from verification.hard_cases.case import TrajectoryCase as TrajectoryCase
     from verification.hard_cases.catalogue import HARD_CASES as HARD_CASES
+    from verification.hard_cases.judge import judge_hard_case as judge_hard_case
+    from verification.hard_cases.judge import judge_hard_cases as judge_hard_cases
     from verification.hard_cases.verdict import HardCaseVerdict as HardCaseVerdict
-    from verification.hard_cases.verdict import judge_hard_case as judge_hard_case
-    from verification.hard_cases.verdict import judge_hard_cases as judge_hard_cases
 
 _HOME = {
+    "CaseAbsent": "case",
     "HardCase": "case",
+    "TrajectoryCase": "case",
     "HARD_CASES": "catalogue",
     "HardCaseVerdict": "verdict",
-    "judge_hard_case": "verdict",
-    "judge_hard_cases": "verdict",
+    "judge_hard_case": "judge",
+    "judge_hard_cases": "judge",
 }
 
 __all__ = sorted(_HOME)

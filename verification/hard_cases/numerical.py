@@ -22,20 +22,43 @@ def thousand_copies() -> HardCase:
     )
 
 
+def no_contact() -> HardCase:
+    """c = 0."""
+    return _contacts(0, "No contact at all", "empty matrices: a shape that libraries disagree about",
+                     "nothing happens, and no error")  # fmt: skip
+
+
+def one_contact() -> HardCase:
+    """c = 1."""
+    return _contacts(1, "One contact", "nothing: the case that every method must get right", "(19) to rounding")
+
+
+def hundred_contacts() -> HardCase:
+    """c = 100, rank three."""
+    return _contacts(100, "100 contacts of rank three", "97 redundant rows, each exact in doubles",
+                     "exact rank, the motion of three contacts")  # fmt: skip
+
+
 def ten_thousand_contacts() -> HardCase:
-    """Whole-number rows of rank three."""
+    """c = 10,000, rank three."""
+    return _contacts(10_000, "10,000 contacts of rank three", "time and memory: the Delassus matrix has 1e8 entries",
+                     "linear time, exact rank; what forms the Delassus matrix is cut")  # fmt: skip
+
+
+def _contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
+    """Whole-number rows of rank three at most, so that doubles are exact."""
     rng = np.random.default_rng(10_000)
-    rows = rng.integers(-2, 3, size=(10_000, 3)) @ np.array([[1, 0, 2, -1], [0, 1, 1, 1], [1, 1, 0, 2]])
+    rows = rng.integers(-2, 3, size=(count, 3)) @ np.array([[1, 0, 2, -1], [0, 1, 1, 1], [1, 1, 0, 2]])
     return HardCase(
-        "10,000 contacts of rank three",
-        "meshes in contact",
-        "time and memory: the Delassus matrix has 1e8 entries",
-        "linear time, exact rank",
+        name,
+        "meshes in contact, at the haptic rate",
+        why_hard,
+        expected,
         np.diag([1.0, 2.0, 3.0, 4.0]),
-        rows.astype(float),
+        rows.astype(float).reshape(count, 4),
         np.array([-1.0, -0.5, 0.25, 2.0]),
         0.5,
-        methods=("factored", "svd"),
+        methods=("factored", "gram_pinv", "gram_cholesky", "damped", "svd"),
     )
 
 

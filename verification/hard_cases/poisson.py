@@ -22,16 +22,16 @@ def exact_poisson(
 
     Compression `0 ≤ p_c ⟂ γ_c ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (docs/theory.md).
     """
-    M, J = _fractions(mass_matrix), _fractions(contact_jacobian)
-    v, e = _fractions(velocity), _fractions(restitution)
-    columns = [_solve(M, row) for row in J]  # M⁻¹Jᵀ, one column per contact
-    W = [[_dot(row, column) for column in columns] for row in J]
-    gamma = [_dot(row, v) for row in J]
+    M, J = fractions(mass_matrix), fractions(contact_jacobian)
+    v, e = fractions(velocity), fractions(restitution)
+    columns = [solve(M, row) for row in J]  # M⁻¹Jᵀ, one column per contact
+    W = [[dot(row, column) for column in columns] for row in J]
+    gamma = [dot(row, v) for row in J]
     compression = _lcp(W, gamma)
     returned = [p + share * p for p, share in zip(compression, e, strict=True)]
-    extra = _lcp(W, [g + _dot(w, returned) for g, w in zip(gamma, W, strict=True)])
+    extra = _lcp(W, [g + dot(w, returned) for g, w in zip(gamma, W, strict=True)])
     impulse = [p + q for p, q in zip(returned, extra, strict=True)]
-    v_plus = tuple(x + _dot(impulse, [column[k] for column in columns]) for k, x in enumerate(v))
+    v_plus = tuple(x + dot(impulse, [column[k] for column in columns]) for k, x in enumerate(v))
     return v_plus, sum(p > 0 for p in impulse)
 
 
@@ -48,18 +48,18 @@ def _lcp(W: Matrix, q: Vector) -> Vector:
 
 def _try_set(W: Matrix, q: Vector, chosen: tuple[int, ...]) -> Vector | None:
     try:
-        active = _solve([[W[i][j] for j in chosen] for i in chosen], [-q[i] for i in chosen])
+        active = solve([[W[i][j] for j in chosen] for i in chosen], [-q[i] for i in chosen])
     except ZeroDivisionError:  # dependent contacts: another set has the same effect
         return None
     p = [Fraction(0)] * len(q)
     for i, value in zip(chosen, active, strict=True):
         p[i] = value
-    if min(p, default=Fraction(0)) < 0 or any(_dot(row, p) + b < 0 for row, b in zip(W, q, strict=True)):
+    if min(p, default=Fraction(0)) < 0 or any(dot(row, p) + b < 0 for row, b in zip(W, q, strict=True)):
         return None
     return p
 
 
-def _solve(matrix: Matrix, right: Vector) -> Vector:
+def solve(matrix: Matrix, right: Vector) -> Vector:
     """Gauss elimination; ZeroDivisionError where the matrix is singular."""
     n = len(right)
     rows = [[*matrix[i], right[i]] for i in range(n)]
@@ -73,11 +73,13 @@ def _solve(matrix: Matrix, right: Vector) -> Vector:
     return [row[n] for row in rows]
 
 
-def _dot(a: Vector, b: Vector) -> Fraction:
+def dot(a: Vector, b: Vector) -> Fraction:
+    """Sum of products."""
     return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
 
 
-def _fractions(array: ArrayLike) -> Any:
+def fractions(array: ArrayLike) -> Any:
+    """A vector or a matrix as lists of fractions, exactly."""
     given = np.array(array, dtype=object)
     if given.ndim == 1:
         return [Fraction(x) for x in given]

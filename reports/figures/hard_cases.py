@@ -1,0 +1,104 @@
+"""Hard cases at a glance: a row per case, a column per method or world, a mark per verdict, the decade of the error.
+
+A full dot is stable and the number in it is the decade of its error; every other mark is a failure with a shape of its
+own. The input is a `Numbers` with the columns named below, one row per case and method.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, VERMILION, LineStyle, styled
+from reports.figures.svg import to_svg
+
+KEY, TITLE, INPUT = "hard-cases-matrix", "Who survives what", "hard_cases"
+CASE, KIND, METHOD, OUTCOME, GAIN, ERROR = "case", "kind", "method", "outcome", "energy gain", "forward error"
+CAPTION = (
+    "A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, with the "
+    "decade of its error against the truth (−16: the last digit); without a number its error is zero, or energy is the "
+    "only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are wrong, with "
+    "the decade of the error. A diamond was cut: it took more than its limit of time."
+)
+STABLE = "stable"
+MARKS: dict[str, LineStyle] = {
+    STABLE: LineStyle(BLUE, "o", (), 0.0),
+    "gains energy": LineStyle(VERMILION, "X", (), 0.0),
+    "restitution unmet": LineStyle(PURPLE, "s", (), 0.0, filled=False),
+    "wrong motion": LineStyle(AMBER, "^", (), 0.0, filled=False),
+    "refused": LineStyle(MUTED, "_", (), 0.0),
+    "timed out": LineStyle(INK, "d", (), 0.0, filled=False),
+    "out of memory": LineStyle(INK, "d", (), 0.0, filled=False),
+    "failed": LineStyle(INK, "*", (), 0.0, filled=False),
+}
+_KINDS = (("impact", "Impacts, by method"), ("motion", "Motions, by world"))
+_ROW, _COLUMN, _LABELS, _HEAD = 0.25, 0.86, 3.45, 0.75  # inches
+_WRAPPED = 46  # characters of a case's name
+
+
+def draw(inputs: Mapping[str, Any]) -> Figure:
+    """Draw one matrix for the impacts and one for the motions."""
+    numbers: Numbers = inputs[INPUT]
+    kinds = {row[numbers.columns.index(KIND)] for row in numbers.rows}
+    panels = tuple(_panel(numbers, kind, label) for kind, label in _KINDS if kind in kinds)
+    seen = {row[numbers.columns.index(OUTCOME)] for row in numbers.rows}
+    legend = tuple((outcome, style) for outcome, style in MARKS.items() if outcome in seen)
+    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
+
+
+def decade(value: float | None) -> str:
+    """The power of ten of an error or gain, as text; a zero or none at all is no number."""
+    if value is None or value <= 0.0:
+        return ""
+    return str(math.floor(math.log10(value))).replace("-", "−")
+
+
+def _panel(numbers: Numbers, kind: str, label: str) -> Panel:
+    at = {name: numbers.columns.index(name) for name in (CASE, METHOD, OUTCOME, GAIN, ERROR)}
+    rows = [{name: row[place] for name, place in at.items()} for row in numbers.rows if row[1] == kind]
+    cases, methods = (tuple(dict.fromkeys(row[name] for row in rows)) for name in (CASE, METHOD))
+    svg = _matrix(f"{KEY}-{kind}", rows, cases, methods)
+    return Panel(svg, _words(rows, methods), label, wide=True)
+
+
+def _matrix(key: str, rows: Sequence[Mapping[str, Any]], cases: tuple[str, ...], methods: tuple[str, ...]) -> str:
+    size = (_LABELS + _COLUMN * len(methods), _HEAD + _ROW * len(cases))
+    with styled() as new_figure:
+        drawing = new_figure(figsize=size)
+        axes = drawing.add_axes((_LABELS / size[0], 0.02, 1.0 - _LABELS / size[0], (_ROW * len(cases)) / size[1]))
+        for row in rows:
+            _mark(axes, methods.index(row[METHOD]), cases.index(row[CASE]), row)
+        axes.set(xlim=(-0.5, len(methods) - 0.5), ylim=(len(cases) - 0.5, -0.5))
+        axes.set_yticks(range(len(cases)), [_short(case) for case in cases])
+        axes.set_xticks(range(len(methods)), [method.replace(" ", "\n").replace("_", "\n") for method in methods])
+        axes.tick_params(length=0, labeltop=True, labelbottom=False, top=False, bottom=False)
+        axes.grid(axis="x", visible=False)
+        for side in axes.spines.values():
+            side.set_visible(False)
+        return to_svg(drawing, key)
+
+
+def _mark(axes: Any, x: int, y: int, row: Mapping[str, Any]) -> None:
+    style = MARKS[row[OUTCOME]]
+    face = style.color if style.filled else PAPER
+    axes.plot(x - 0.16, y, style.marker, color=style.color, markersize=7.0, markerfacecolor=face,
+              markeredgecolor=style.color, markeredgewidth=1.3, linestyle="none", zorder=3)  # fmt: skip
+    value = row[GAIN] if row[OUTCOME] == "gains energy" else row[ERROR]
+    axes.text(x + 0.04, y, decade(value), fontsize=8.0, color=INK, ha="left", va="center")
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _WRAPPED else name[: _WRAPPED - 1].rstrip() + "…"
+
+
+def _words(rows: Sequence[Mapping[str, Any]], methods: tuple[str, ...]) -> str:
+    counts = []
+    for method in methods:
+        own = [row[OUTCOME] for row in rows if row[METHOD] == method]
+        counts.append(f"{method} is stable on {own.count(STABLE)} of {len(own)}")
+    return "Verdicts by case: " + ", ".join(counts) + "."
+
+
+RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="hard-cases")

@@ -1,0 +1,54 @@
+"""Judge methods and worlds on hard cases: one verdict each, in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from verification.hard_cases.case import AnyCase, CaseAbsent, HardCase
+from verification.hard_cases.catalogue import HARD_CASES
+from verification.hard_cases.judge_impact import METHODS, judge_impact
+from verification.hard_cases.judge_trajectory import Simulate, judge_trajectory, run_in_world
+from verification.hard_cases.verdict import HardCaseVerdict
+from verification.threads import one_thread
+
+
+def judge_hard_cases(
+    methods: Iterable[str] | None = None, cases: Iterable[str] | None = None, simulate: Simulate = run_in_world
+) -> tuple[HardCaseVerdict, ...]:
+    """Return the verdict of each method or world on each case.
+
+    Parameters
+    ----------
+    methods : names of impact methods and of worlds; default all that a case is about.
+    cases : names in `HARD_CASES`, by default all of them. Cases of files that are absent are left out: ask
+        `HARD_CASES[name]()` for the reason, which it raises as `CaseAbsent`.
+    simulate : how a scene is run in a world: ``simulate(scene, world) -> Run``.
+    """
+    wanted = None if methods is None else tuple(methods)
+    found = (verdict for name in (HARD_CASES if cases is None else cases) for verdict in _of(name, wanted, simulate))
+    with one_thread():
+        return tuple(found)
+
+
+def methods_for(case: AnyCase) -> tuple[str, ...]:
+    """The impact methods or the worlds that a case is about."""
+    if isinstance(case, HardCase):
+        return METHODS if case.methods is None else case.methods
+    return case.worlds
+
+
+def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> HardCaseVerdict:
+    """Return the verdict of one method on one impact, or of one world on one trajectory."""
+    if isinstance(case, HardCase):
+        return judge_impact(case, method)
+    return judge_trajectory(case, method, simulate)
+
+
+def _of(name: str, wanted: tuple[str, ...] | None, simulate: Simulate) -> Iterator[HardCaseVerdict]:
+    try:
+        case = HARD_CASES[name]()
+    except CaseAbsent:
+        return
+    for method in methods_for(case):
+        if wanted is None or method in wanted:
+            yield judge_hard_case(case, method, simulate)
