@@ -60,11 +60,12 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
     from reports.commands.progress import stage_progress
     from reports.evidence.gather import gather
     from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+    from reports.pages.builder import figure_inputs
     from reports.runner import Runner
 
     if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
         with stage_progress() as progress:
-            return gather(out, depth, progress).inputs
+            return figure_inputs(gather(out, depth, progress))
     runner = Runner(out / "runs")
     found: dict[str, Any] = {}
     for name in needs:
