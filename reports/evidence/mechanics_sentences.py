@@ -112,8 +112,8 @@ def coordinate_invariance(study: Study) -> Finding:
     return Finding(
         f"C06: the same impact in two parametrizations agrees to {max(row['error'] for row in moderate):.1e} in the "
         f"{len(moderate)} cases of moderate condition (tolerance {AGREEMENT:g}); in {len(beyond)} worse ones, up to "
-        f"the singular pose, the error is at most {max(row['error'] / row['bound'] for row in beyond):.1e} of its bound "
-        f"C ε κ/σ_min. In {silent} the bound exceeds 1 and says nothing.", _outcome(study.passed))  # fmt: skip
+        f"the singular pose, the error is at most {max(row['error'] / row['bound'] for row in beyond):.1e} of its "
+        f"bound C ε κ/σ_min. In {silent} the bound exceeds 1 and says nothing.", _outcome(study.passed))  # fmt: skip
 
 
 def operating(study: Study) -> Finding:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reports.figures import (
     agreement_map,
+    coordinate_invariance,
     cost_of_contacts,
     energy_gains,
     fig01_contact_forces,
@@ -21,11 +22,14 @@ from reports.figures import (
     hard_cases,
     hardness,
     hero_corner,
+    linked_impacts,
     performance_profile,
     rigid_convergence,
     scenes_gallery,
     scenes_ledger,
+    socket_collisions,
     stability_map,
+    tumbling_drift,
     work_precision,
 )
 from reports.figures.figure import Recipe
@@ -48,6 +52,10 @@ RECIPES: tuple[Recipe, ...] = (
     fig13_device_forces.RECIPE,
     energy_gains.RECIPE,
     work_precision.RECIPE,
+    linked_impacts.RECIPE,
+    coordinate_invariance.RECIPE,
+    tumbling_drift.RECIPE,
+    socket_collisions.RECIPE,
     hard_cases.RECIPE,
     stability_map.RECIPE,
     hardness.RECIPE,

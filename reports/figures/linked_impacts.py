@@ -1,0 +1,182 @@
+"""Newton's cradle and Bernoulli's three balls: the same blow by relative rows, by per-body rows, and event by event.
+
+What is conserved stands beside each outcome; that all but the per-body rows conserve everything and still differ shows
+what the choice of rows decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from reports.figures.canvas import arrow, note
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.style import BLUE, GREEN, INK, MUTED, PAPER, VERMILION, LineStyle, line_arguments, styled
+from reports.figures.svg import to_svg
+
+KEY, TITLE, INPUT = "linked-impacts", "A blow to balls that touch", "mechanics/linked impacts"
+CAPTION = (
+    "Arrows are velocities after an elastic blow of 1 m/s from the left. With relative rows (12), and event by event, "
+    "energy and momentum are kept, and yet the outcomes differ: which contacts are taken to collide decides. With "
+    "per-body rows, (13) and (14), the striker comes back as from a wall and the others never learn of it: the energy "
+    "is right, the momentum is not. The last panel has the cradles of two to seven balls."
+)
+# start of a treatment's name -> its look
+LOOKS = {
+    "simultaneous, relative": LineStyle(BLUE, "o"),
+    "simultaneous, per-body": LineStyle(VERMILION, "s", (5, 1.6)),
+    "event-driven": LineStyle(GREEN, "^", (1.4, 1.4)),
+}
+LEGEND = tuple(zip(("relative rows (12)", "per-body rows (13)-(14)", "event by event"), LOOKS.values(), strict=True))
+CRADLE, BERNOULLI = "cradle of 5", "Bernoulli"
+ROUNDING = 1e-12  # changes below this are none
+_RADIUS = 0.5
+_ORDERS = {"contact 0, then 1": "the upper ball first", "contact 1, then 0": "the lower ball first"}
+
+
+class Outcome(NamedTuple):
+    """One treatment of one problem: velocities after [m/s], and the relative changes."""
+
+    treatment: str
+    rows: str
+    velocity: tuple[tuple[float, float], ...]
+    energy: float
+    momentum: float
+
+    @property
+    def look(self) -> LineStyle:
+        """Colour and marker of its treatment."""
+        return next(look for start, look in LOOKS.items() if self.treatment.startswith(start))
+
+
+def outcomes(numbers: Numbers, problem: str) -> list[Outcome]:
+    """Return the outcomes of one problem from the table, which has a row per ball."""
+    found: dict[tuple[str, str], list[Any]] = {}
+    for row in numbers.rows:
+        if row[0] == problem:
+            found.setdefault((row[1], row[2]), []).append(row)
+    return [Outcome(*names, tuple((r[5], r[6]) for r in rows), rows[0][7], rows[0][8])
+            for names, rows in found.items()]  # fmt: skip
+
+
+def draw(inputs: Mapping[str, Any]) -> Figure:
+    """Draw both problems, and what the last ball of a cradle gets."""
+    numbers: Numbers = inputs[INPUT]
+    cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
+    panels = (
+        Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
+        Panel(_bernoulli(bernoulli), _words(bernoulli), "Bernoulli's three balls: velocities after", wide=True),
+        Panel(_last_ball(numbers), "Velocity of the last ball of cradles of 2 to 7 balls, by treatment.",
+              "Cradles of two to seven balls: what the last ball gets"),
+    )  # fmt: skip
+    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, LEGEND, (INPUT,))
+
+
+def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
+    """Draw once what comes out alike by two choices of rows of the same treatment, under both their names."""
+    kept: dict[Any, Outcome] = {}
+    for outcome in found:
+        key = (outcome.treatment, tuple(round(v, 9) + 0.0 for ball in outcome.velocity for v in ball))
+        twin = kept.get(key)
+        kept[key] = outcome if twin is None else twin._replace(rows=f"{twin.rows.split()[0]} or {outcome.rows}")
+    return list(kept.values())
+
+
+def _cradle(found: Sequence[Outcome]) -> str:
+    pitch, step = 1.02, 1.35
+    with styled() as new_figure:
+        drawing = new_figure(figsize=(8.6, 0.52 * (len(found) + 1) + 0.3))
+        axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=(-8.6, 12.4), ylim=(-step * len(found) + 0.4, 2.5))
+        axes.set_axis_off()
+        for x, text in ((-8.4, "rows taken, or order"), (9.0, "energy"), (11.0, "momentum")):
+            note(axes, (x, 2.2), text, ha="left" if x < 0 else "center", color=MUTED, fontsize=8.5)
+        note(axes, (-8.4, step), "before the blow", ha="left")
+        before = tuple((1.0 if ball == 0 else 0.0, 0.0) for ball in range(len(found[0].velocity)))
+        _balls(axes, [(pitch * k, step) for k in range(len(before))], before, INK, 1.7)
+        for number, outcome in enumerate(found):
+            y = -step * number
+            note(axes, (-8.4, y), _label(outcome), ha="left", color=outcome.look.color)
+            _balls(axes, [(pitch * k, y) for k in range(len(before))], outcome.velocity, outcome.look.color, 1.7)
+            _kept(axes, (9.0, y), outcome.energy)
+            _kept(axes, (11.0, y), outcome.momentum)
+        return to_svg(drawing, f"{KEY}-cradle")
+
+
+def _label(outcome: Outcome) -> str:
+    if outcome.treatment.startswith("event"):
+        return _ORDERS.get(outcome.rows, outcome.rows)
+    return f"{outcome.treatment.split(', ')[1].split(' (')[0]}: {outcome.rows}"
+
+
+def _balls(axes: Any, centers: Sequence[tuple[float, float]], velocities: Sequence[tuple[float, float]], color: str,
+           scale: float) -> None:  # fmt: skip
+    from matplotlib.patches import Circle
+
+    for center, velocity in zip(centers, velocities, strict=True):
+        axes.add_patch(Circle(center, _RADIUS, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
+        if max(abs(v) for v in velocity) > ROUNDING:
+            arrow(axes, center, [scale * v for v in velocity], color=color, width=1.8, head=10.0)
+
+
+def _kept(axes: Any, place: tuple[float, float], change: float) -> None:
+    """Write "kept", or by how much of itself it changed."""
+    if abs(change) < ROUNDING:
+        note(axes, place, "kept", color=INK)
+    else:
+        note(axes, place, f"changed ×{change:.2g}", color=VERMILION, fontweight="bold")
+
+
+def _bernoulli(found: Sequence[Outcome]) -> str:
+    half = 0.75**0.5
+    centers = ((0.0, 0.0), (2 * _RADIUS * half, _RADIUS), (2 * _RADIUS * half, -_RADIUS))
+    with styled() as new_figure:
+        drawing = new_figure(figsize=(8.6, 4.3))
+        columns = -(-len(found) // 2)
+        for number, outcome in enumerate(found):
+            row, column = divmod(number, columns)
+            axes = drawing.add_axes((column / columns, 0.5 * (1 - row), 1.0 / columns, 0.5))
+            axes.set(xlim=(-2.0, 3.2), ylim=(-1.9, 2.1), aspect="equal")
+            axes.set_axis_off()
+            _balls(axes, centers, outcome.velocity, outcome.look.color, 1.6)
+            note(axes, (0.6, 1.65), _label(outcome).replace(": ", ":\n"), color=outcome.look.color, fontsize=8.5)
+            kept = abs(outcome.momentum) < ROUNDING
+            note(axes, (0.6, -1.6), "all kept" if kept else f"momentum changed ×{outcome.momentum:.2g}",
+                 color=INK if kept else VERMILION, fontweight="normal" if kept else "bold", fontsize=8.5)  # fmt: skip
+        return to_svg(drawing, f"{KEY}-bernoulli")
+
+
+def _series(numbers: Numbers) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
+    """The outcomes of all cradles by treatment and rows, each with the number of balls."""
+    series: dict[tuple[str, str], list[tuple[int, Outcome]]] = {}
+    for problem in dict.fromkeys(row[0] for row in numbers.rows):
+        for outcome in outcomes(numbers, problem):
+            if problem.startswith("cradle") and "LCP" not in outcome.rows:  # as simultaneous, all rows
+                series.setdefault((outcome.treatment, outcome.rows), []).append((len(outcome.velocity), outcome))
+    return series
+
+
+def _last_ball(numbers: Numbers) -> str:
+    with styled() as new_figure:
+        drawing = new_figure(figsize=(4.1, 3.0), layout="constrained")
+        axes = drawing.add_subplot()
+        for (treatment, rows), found in _series(numbers).items():
+            if treatment.startswith("simultaneous, per-body") and "all" in rows:
+                continue  # as with the approaching ones
+            values = [outcome.velocity[-1][0] for _, outcome in found]
+            axes.plot([n for n, _ in found], values, **line_arguments(found[0][1].look))
+            words = rows.removesuffix(" contacts").removesuffix(" along the row")
+            mine = "per-body rows" if "per-body" in treatment else words
+            below = (0, -9) if "per-body" in treatment else (0, 8)
+            note(axes, (found[-1][0], values[-1]), mine, below, ha="right", color=found[0][1].look.color, fontsize=8)
+        axes.set(xlabel="balls in the cradle", ylabel="velocity of the last ball [m/s]", ylim=(-0.18, 1.2))
+        return to_svg(drawing, f"{KEY}-last")
+
+
+def _words(found: Sequence[Outcome]) -> str:
+    lost = [outcome for outcome in found if abs(outcome.momentum) > ROUNDING]
+    return (f"{len(found)} outcomes of one blow; {len(found) - len(lost)} keep energy and momentum, "
+            f"{len(lost)} by per-body rows keep the energy only.")  # fmt: skip
+
+
+RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="mechanics")
