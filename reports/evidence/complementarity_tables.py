@@ -159,7 +159,9 @@ def solvers() -> Numbers:
 
     takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
     rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
-    return Numbers(("solver", "method", "package", "takes"), rows)
+    note = ("Siconos is a package of the machine, asked through the system's Python; its time is that of its compiled "
+            "solve, the others' that of their call.")  # fmt: skip
+    return Numbers(("solver", "method", "package", "takes"), rows, note=note)
 
 
 def worlds(runner: Runner) -> Numbers:

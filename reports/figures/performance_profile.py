@@ -13,6 +13,7 @@ from reports.figures.svg import to_svg
 KEY, TITLE = "performance-profile", "Which solver solves what, and how fast"
 INPUT = "complementarity/profile"
 COLLECTION, KIND, SOLVER, FACTOR, SHARE = "collection", "kind", "solver", "factor", "share solved"
+KINDS = ("frictionless", "friction")
 CAPTION = (
     "How high a curve starts: the share of problems on which the solver is the fastest. How high it ends: the "
     "share that it solves at all, by residuals recomputed from the problem; refusals and wrong answers both count "
@@ -25,12 +26,19 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw a panel for each collection and kind of problem."""
     numbers: Numbers = inputs[INPUT]
     rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
-    solvers = tuple(dict.fromkeys(row[SOLVER] for row in rows))
+    kinds = {kind: _solvers(rows, kind) for kind in KINDS}
+    places = dict.fromkeys((row[COLLECTION], row[KIND]) for row in rows)
     panels = tuple(
-        Panel(_steps(rows, solvers, place), _words(rows, place), f"{place[0]}, {place[1]}")
-        for place in dict.fromkeys((row[COLLECTION], row[KIND]) for row in rows)
-    )
-    return Figure(KEY, "", TITLE, CAPTION, panels, _ends(rows), series_legend(solvers), (INPUT,))
+        Panel(_steps(rows, kinds[kind], (collection, kind)), _words(rows, (collection, kind)), f"{collection}, {kind}")
+        for kind in KINDS for collection, found in places if found == kind
+    )  # fmt: skip
+    legend = tuple(entry for kind in KINDS for entry in series_legend(kinds[kind]))
+    return Figure(KEY, "", TITLE, CAPTION, panels, _ends(rows), legend, (INPUT,))
+
+
+def _solvers(rows: list[dict[str, Any]], kind: str) -> tuple[str, ...]:
+    """Solvers of a kind of problem: the two kinds share none, and are numbered apart."""
+    return tuple(dict.fromkeys(row[SOLVER] for row in rows if row[KIND] == kind))
 
 
 def _steps(rows: list[dict[str, Any]], solvers: tuple[str, ...], place: tuple[str, str]) -> str:

@@ -33,6 +33,7 @@ _FILES = (
     "c19_haptic_rate",
     "c20_damping_bound",
     "c21_impulses_or_damping",
+    "c22_cost",
 )
 CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)

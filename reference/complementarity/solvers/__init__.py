@@ -31,10 +31,12 @@ class SolverEntry:
     takes: str
     bilateral: bool = False  # takes two-sided rows as well
     option: str = ""  # handed to the module's solve where it serves several solvers
+    of_the_machine: bool = False  # no package of this environment: the module starts it, and says where it is not
 
 
 _CVXPY = "reference.complementarity.solvers.cvxpy_qp"
 _PINOCCHIO = "reference.complementarity.solvers.pinocchio_contact"
+_SICONOS = "reference.complementarity.solvers.siconos"
 _HERE = "reference.complementarity.solvers"
 
 SOLVERS: dict[str, SolverEntry] = {
@@ -55,6 +57,9 @@ SOLVERS: dict[str, SolverEntry] = {
     "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "cvxpy clarabel", "interior point, fixed point", "cone"),
     "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
     "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
+    "siconos_lemke": SolverEntry(_SICONOS, "siconos", "complementary pivoting (Lemke)", "lcp", False, "LEMKE", True),
+    "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", False, "NSGS", True),
+    "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", False, "NSN_AC", True),
 }
 _INSTALL_NAMES = {"pinocchio": "pin"}  # where a package is not installed under the name it is imported by
 
@@ -97,10 +102,14 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
         answer = Answer(None, f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - started
     impulse = None if answer.impulse is None else np.asarray(answer.impulse, dtype=np.float64)
-    return Solution(problem, impulse, solver, answer.note, answer.refused, seconds)
+    return Solution(problem, impulse, solver, answer.note, answer.refused, answer.seconds or seconds)
 
 
 def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
+    if entry.of_the_machine:
+        module = importlib.import_module(entry.module)
+        module.start()
+        return module.solve
     try:
         for package in entry.package.split():  # here, so that imports do not count as the solver's time
             importlib.import_module(package)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Answer:
-    """Impulse (n,) [N s] or None, with what the solver said."""
+    """Impulse (n,) [N s] or None, with what the solver said; `seconds` where it keeps its own time."""
 
     impulse: NDArray[np.float64] | None
     note: str = ""
     refused: bool = False
+    seconds: float | None = None

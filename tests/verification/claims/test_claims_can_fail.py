@@ -58,6 +58,10 @@ PLANTED = {
         {"impulses settle after": 0.1, "penalty settles after": np.inf},
         {"impulses settle after": 0.2, "penalty settles after": 0.1},
     ),
+    "C22": (
+        {"ratio": 3.0, "least ratio": 2.0, "largest ratio": 4.0},
+        {"ratio": 0.3, "least ratio": 0.2, "largest ratio": 0.5},
+    ),
     "C05": ({"error": 0.0, "bound": 0.0}, {"error": np.nan, "bound": 1.0}),
     "C10": ({"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
 }
