@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from verification.properties.bounds import KIT, Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, ResolverFault
+from verification.properties.case import ImpactCase, Resolver
 from verification.properties.families import draw_case, with_unequal_restitution
-from verification.properties.laws import LAWS, UNEQUAL_LAWS, Law
+from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.passivity_report import LawVerdict, PassivityReport
 from verification.properties.pasteable import name_of
 from verification.properties.shrink import search_counterexample, shrink
+from verification.properties.tally import Tally, residual_of
 from verification.threads import one_thread
 
 NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
 LARGEST_CONDITION = 1e8  # κ(M) of the default families; beyond it plain Cholesky loses what the laws compare
-PATIENCE = 600.0  # [s] ten times what a resolver of 30 µs a call takes at the default depth
+IMPACTS = 5000  # by default: about a minute for a resolver of 50 µs a call
+PATIENCE = 600.0  # [s] ten times that
 
 
 def check_passivity(
     resolver: Resolver,
     *,
-    impacts: int = 1500,
+    impacts: int = IMPACTS,
     seed: int = 0,
     search: int = 200,
     bounds: Bounds = KIT,
@@ -59,9 +61,9 @@ def check_passivity(
     ...     assert report.passed, report
     """
     ends = time.monotonic() + patience
-    tallies = {name: _Tally(name, law) for name, law in LAWS.items()}
+    tallies = {name: Tally(name, law) for name, law in LAWS.items()}
     if unequal_restitution:
-        tallies |= {name: _Tally(name, law) for name, law in UNEQUAL_LAWS.items()}
+        tallies |= {name: Tally(name, law) for name, law in UNEQUAL_LAWS.items()}
     with one_thread():
         done = _try_all(tallies, resolver, bounds, _Draw(impacts, seed, largest_condition), ends, progress)
         verdicts = tuple(tally.verdict() for tally in tallies.values())
@@ -79,7 +81,7 @@ class _Draw:
     largest_condition: float
 
 
-def _try_all(tallies: dict[str, _Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
+def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
     """Put every impact to every law; return how many there was time for."""
     rng, other = np.random.default_rng(draw.seed), np.random.default_rng([draw.seed, 1])
@@ -94,45 +96,6 @@ def _try_all(tallies: dict[str, _Tally], resolver: Resolver, bounds: Bounds, dra
         if progress is not None:
             progress(done + 1, draw.impacts)
     return draw.impacts
-
-
-@dataclass
-class _Tally:
-    """The verdict on one law in the making."""
-
-    name: str
-    law: Law
-    checked: int = 0
-    failures: int = 0
-    fault: str = ""
-    largest: float = -np.inf
-    worst: LawResidual | None = None
-    worst_case: ImpactCase | None = field(default=None, repr=False)
-
-    def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
-        """Try one impact."""
-        residual, complaint = residual_of(self.law, case, resolver, bounds)
-        if residual is None:
-            return
-        self.checked += 1
-        self.failures += not residual.passed
-        self.fault = self.fault or complaint
-        self.largest = max(self.largest, residual.value)
-        if self.worst is None or residual.ratio > self.worst.ratio:
-            self.worst, self.worst_case = residual, case
-
-    def verdict(self) -> LawVerdict:
-        """What became of it."""
-        return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.fault)
-
-
-def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
-    """The law's residual; infinite, with the complaint, where the resolver gave nothing usable."""
-    try:
-        return law.check(case, resolver, bounds), ""
-    except ResolverFault as fault:
-        return LawResidual("", np.inf, 0.0), str(fault)
 
 
 def _counterexample(
