@@ -11,7 +11,19 @@ from numpy.typing import NDArray
 
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
 from reports.figures.numbers import format_number
-from reports.figures.style import AMBER, BLUE, FORCE, INK, LINK, MUTED, PURPLE, SKY, VERMILION, LineStyle, styled
+from reports.figures.style import (
+    AMBER,
+    BLUE,
+    FORCE,
+    INK,
+    LINK,
+    MUTED,
+    PURPLE,
+    SKY,
+    VERMILION,
+    LineStyle,
+    styled,
+)
 from reports.figures.svg import to_svg
 
 KEY, TITLE = "scene-ledger", "Every scene at a glance"
@@ -43,9 +55,9 @@ _LONGEST = 2.0  # times the longest step: right end of the scale of times
 
 @dataclass(frozen=True)
 class Strip:
-    """One scene: `layers` (5, n) and `line` (n,) [J] over `time` (n,) [s]; `struck`: an impact since the instant before.
+    """One scene: `layers` (5, n) and `line` (n,) [J] over `time` (n,) [s].
 
-    at_rest : nothing moves in it but rounding
+    struck : whether there was an impact since the instant before; at_rest : nothing moves in it but rounding
     """
 
     scene: str

@@ -1,0 +1,184 @@
+"""Scenes in space: each where it starts and where its run ends, drawn from the run alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from iapb.run import Run
+from reports.figures.canvas import arrow, note, widened
+from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.spatial import (
+    Floats,
+    View,
+    body_placements,
+    cuboid_faces,
+    cuboid_of_inertia,
+    links,
+    placement,
+    view,
+)
+from reports.figures.style import FORCE, INK, LINK, MUTED, PANEL, PEG, RULE, WALL, styled
+from reports.figures.svg import to_svg
+
+KEY, TITLE = "scenes-space", "The scenes in space"
+CAPTION = (
+    "Each scene at its start, under way and at its end; bodies and walls are drawn see-through. First a peg with a "
+    "collar goes into a square hole in a plate, and strikes the loose boxes and balls about the mouth. Then a six-axis "
+    "arm, pulled at its tool along the red arrow, meets a post, a knob and a table, and knocks a loose block away (no "
+    "gravity: it flies on). Last a free body spins about its middle axis and turns over again and again; it has no "
+    "shape, so the even box of its mass and inertia is drawn, with the same corner marked in every picture."
+)
+_MARGIN = 0.06
+_LINK_WIDTH = 4.0  # points
+_MARK = 0.04  # radius of the marked corner, as a share of the box's longest side
+_BODY_SHOWS, _WALL_SHOWS = 0.7, 0.35  # how much of what lies behind them they hide
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How to look at a scene: from where, and at which `moments` of its run, as shares of its length."""
+
+    run: str
+    seen: View
+    moments: tuple[float, ...]
+    floor: float = 0.0  # half side [m] of the piece of a half-space that is drawn; 0 = none
+    walls_around: float = 0.0  # half side [m] to which boxes of the static world are cut; 0 = whole
+
+
+SIGHTS = (
+    Sight("space/peg_hole", view(-1.2, 0.2), (0.0, 0.07, 1.0), walls_around=0.075),
+    Sight("space/arm_obstacles", view(-0.75, 0.5), (0.0, 0.4, 1.0), floor=0.5),
+    Sight("space/tumbling_body", view(-1.0, 0.4), (0.0, 0.45, 1.0)),
+)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Something to draw: a ring or line of points (n, 3) [m]."""
+
+    points: Floats
+    face: str
+    edge: str = INK
+    width: float = 0.9
+    nearness: float = 0.0  # what is nearer to the reader is drawn later
+    alpha: float = 1.0
+
+
+def draw(inputs: Mapping[str, Any]) -> Figure:
+    """Draw every scene at its moments."""
+    panels = tuple(panel for sight in SIGHTS for panel in panels_of(sight, inputs[sight.run]))
+    return Figure(KEY, "", TITLE, CAPTION, panels, None, (), RECIPE.needs)
+
+
+def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
+    """Yield a picture of the run for each moment, all of one scene at one scale."""
+    scene = run.scene_resolved
+    steps = [round(share * run.steps) for share in sight.moments]
+    drawn = [sorted(pieces(sight, scene, run.q[step]), key=lambda piece: piece.nearness) for step in steps]
+    corners = np.vstack([sight.seen.flat(piece.points) for each in drawn for piece in each])
+    margin = _MARGIN * np.ptp(corners, axis=0).max()
+    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+    for step, each in zip(steps, drawn, strict=True):
+        with styled() as new_figure:
+            drawing = new_figure(figsize=PANEL)
+            axes = _canvas(drawing, low, high)
+            for order, piece in enumerate(each):
+                _fill(axes, sight.seen, piece, order)
+            _hand(axes, sight.seen, scene, run.q[step], 0.16 * float(max(high - low)))
+            svg = to_svg(drawing, f"{KEY}-{run.scene_name}-{step}")
+        moment = f"{run.time[step]:.2f} s"
+        yield Panel(svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
+
+
+def _canvas(drawing: Any, low: Floats, high: Floats) -> Any:
+    axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
+    low, high = widened(low, high, drawing.get_figwidth() / drawing.get_figheight())
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_axis_off()
+    return axes
+
+
+def _fill(axes: Any, seen: View, piece: Piece, order: int) -> None:
+    flat = seen.flat(piece.points)
+    if len(flat) == 2:
+        axes.plot(*flat.T, color=piece.edge, linewidth=piece.width, zorder=2 + 1e-3 * order)
+    else:
+        axes.fill(*flat.T, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, zorder=2 + 1e-3 * order)
+        axes.fill(*flat.T, facecolor="none", edgecolor=piece.edge, linewidth=piece.width, joinstyle="round",
+                  zorder=2 + 1e-3 * order)  # fmt: skip
+
+
+def pieces(sight: Sight, scene: Mapping[str, Any], q: Floats) -> Iterator[Piece]:
+    """Yield the faces, discs and lines of a scene at q that are turned to the reader."""
+    seen = sight.seen
+    for wall in scene["walls"]:
+        yield from _wall(sight, wall)
+    places = body_placements(scene, q)
+    for line in links(scene, q):
+        yield Piece(np.array(line), "none", LINK, _LINK_WIDTH, seen.depth(line))
+    for body in scene["bodies"]:
+        frame = places[body["name"]]
+        for shape in body["shapes"]:
+            yield from _shape(seen, frame, shape)
+        if not body["shapes"] and body["joint"] == "free_flyer":
+            box = {"kind": "box", "size": cuboid_of_inertia(body), "center": body["center_of_mass"], "rpy": (0, 0, 0)}
+            yield from _shape(seen, frame, box)
+            corner = frame.of(np.asarray(box["center"]) + np.asarray(box["size"]) / 2.0)
+            yield Piece(seen.disc(corner, _MARK * max(box["size"])), FORCE, FORCE, 0.5, np.inf)
+
+
+def _wall(sight: Sight, wall: Mapping[str, Any]) -> Iterator[Piece]:
+    if wall["kind"] != "half_space":
+        yield from _shape(sight.seen, placement(), _cut(wall, sight.walls_around), WALL, MUTED, _WALL_SHOWS)
+    elif sight.floor:
+        normal = np.asarray(wall["normal"], dtype=float) / np.linalg.norm(wall["normal"])
+        along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+        along = along / np.linalg.norm(along)
+        side, point = np.cross(normal, along), np.asarray(wall["point"], dtype=float)
+        sides = sight.floor * np.array([along + side, side - along, -along - side, along - side])
+        yield Piece(point + sides + _onwards(sight), RULE, MUTED, 0.6, -np.inf)
+
+
+def _onwards(sight: Sight) -> Floats:
+    """Shift a floor to where an arm reaches, x > 0."""
+    return np.array([0.7 * sight.floor, 0.0, 0.0])
+
+
+def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
+    """Return a static box, cut to a square of half side `reach` about the origin."""
+    if not reach or wall["kind"] != "box":
+        return wall
+    half, center = np.asarray(wall["size"]) / 2.0, np.asarray(wall["center"], dtype=float)
+    low, high = center - half, center + half
+    low[:2], high[:2] = np.maximum(low[:2], -reach), np.minimum(high[:2], reach)
+    return {**wall, "size": high - low, "center": (low + high) / 2.0}
+
+
+def _shape(seen: View, frame: Any, shape: Mapping[str, Any], face: str = PEG, edge: str = INK,
+           alpha: float = _BODY_SHOWS) -> Iterator[Piece]:  # fmt: skip
+    own = frame @ placement(shape["center"], shape.get("rpy", (0.0, 0.0, 0.0)))
+    middle = seen.depth(own.origin)
+    if shape["kind"] == "sphere":
+        yield Piece(seen.disc(own.origin, shape["radius"]), face, edge, 0.9, middle, alpha)
+        return
+    for ring in cuboid_faces(own, shape["size"]):
+        if seen.faces_reader(ring):
+            yield Piece(ring, face, edge, 0.9, middle, alpha)
+
+
+def _hand(axes: Any, seen: View, scene: Mapping[str, Any], q: Floats, length: float) -> None:
+    hand = scene["hand"]
+    if not hand:
+        return
+    start = seen.flat(body_placements(scene, q)[hand["body"]].of(hand["point"]))
+    force = seen.flat(hand["force"][:3])
+    if np.hypot(*force) > 0.0:
+        arrow(axes, start, length * force / np.hypot(*force))
+        note(axes, start, "hand", (0, 9), color=FORCE)
+
+
+RECIPE = Recipe(KEY, "", TITLE, tuple(sight.run for sight in SIGHTS), draw, section="scene-ledger")
