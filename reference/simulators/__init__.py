@@ -23,8 +23,8 @@ SIMULATORS: dict[str, str] = {
     "mujoco": f"{_HERE}.mujoco_adapter:MuJoCo",
     "pinocchio": f"{_HERE}.pinocchio_adapter:Pinocchio",
     "bullet": f"{_HERE}.bullet_adapter:Bullet",
-    # "drake": f"{_HERE}.drake_adapter:Drake",
-    # "siconos": f"{_HERE}.siconos_adapter:Siconos",
+    "drake": f"{_HERE}.drake_adapter:Drake",
+    "siconos": f"{_HERE}.siconos_adapter:Siconos",
 }
 
 

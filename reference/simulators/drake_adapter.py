@@ -1,0 +1,157 @@
+"""Drake: compliant point contacts; an error-controlled integrator for bouncing, its discrete solver for fixed steps."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import MissingDependencyError
+from reference.simulators.linear_spring import viscous_dissipation_for
+from reference.simulators.scene import Cuboid, FixedScene, RigidBody, Sphere
+from reference.simulators.simulator import Settings
+from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
+
+STEP = 1e-3  # [s] its default for discrete plants
+NO_RESTITUTION = "no coefficient e: a stiffness and, for e < 1, Hunt and Crossley's damping at the known speed stand in"
+DISSIPATES = "no coefficient e, and discrete steps dissipate even undamped contacts"
+# Radius [m] of the small balls at a box's corners, inset by it (faces would meet in one point). A ball that sinks in
+# by more than its radius at the rim of a face is pushed out sideways: under a heavy load they are larger.
+CORNER, LOADED_CORNER = 1e-3, 2e-2
+OWN_STIFFNESS = 1e7  # [N/m] half a period of 1 ms with 1 kg
+GIVEN_STIFFNESS = 1e4  # [N/m] of 1e2 to 1e6 the one with the smallest of the largest errors, at 1 ms
+DISCRETE, CONTINUOUS = "discrete (SAP)", "continuous (runge_kutta3)"
+
+
+class Drake:
+    """Adapter to a MultibodyPlant."""
+
+    title = "Drake"
+
+    def version(self) -> str:
+        """Installed version."""
+        _pydrake()
+        from importlib.metadata import version
+
+        return version("drake")
+
+    def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
+        """Its discrete defaults at rest; undamped springs for bouncing, integrated with error control where it may."""
+        stacked = scene.rests and len(scene.bodies) > 1
+        corners: dict[str, str | float] = {"corner radius": LOADED_CORNER if stacked else CORNER}
+        if scene.rests:
+            return Settings(step or STEP, {"mode": DISCRETE, "material": "default", **corners})
+        if step is None:
+            lossy = viscous_dissipation_for(scene.restitution, scene.fastest)
+            return Settings(STEP, {"mode": CONTINUOUS, "accuracy": 1e-8, "point_contact_stiffness": OWN_STIFFNESS,
+                                   "hunt_crossley_dissipation": lossy, **corners}, NO_RESTITUTION)  # fmt: skip
+        return Settings(step, {"mode": DISCRETE, "point_contact_stiffness": GIVEN_STIFFNESS, "relaxation_time": 0.0,
+                               "sap_near_rigid_threshold": 0.0, **corners}, DISSIPATES)  # fmt: skip
+
+    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
+        """Simulate by `Simulator.AdvanceTo`."""
+        drake = _pydrake()
+        plant, diagram, bodies = _build(drake, scene, settings, step)
+        simulator = drake.Simulator(diagram)
+        if settings.options["mode"] == CONTINUOUS:
+            config = drake.SimulatorConfig(integration_scheme="runge_kutta3", max_step_size=step,
+                                           accuracy=float(settings.options["accuracy"]))  # fmt: skip
+            drake.ApplySimulatorConfig(config, simulator)
+        context = plant.GetMyContextFromRoot(simulator.get_mutable_context())
+        _start(drake, plant, context, scene, bodies)
+        simulator.Initialize()
+        record, interval = Recorder(), max(step, SAMPLE_INTERVAL)
+        for k in range(round(duration / interval) + 1):
+            simulator.AdvanceTo(k * interval)
+            _keep(plant, context, record, k * interval, bodies)
+        return record.trajectory()
+
+
+def _pydrake() -> Any:
+    try:
+        import pydrake.all as drake
+    except ImportError as error:
+        raise MissingDependencyError("drake", "The Drake adapter", "pip install 'iapb[peers]'") from error
+    return drake
+
+
+def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tuple[Any, Any, list[Any]]:
+    """Plant, diagram and bodies."""
+    builder = drake.DiagramBuilder()
+    time_step = 0.0 if settings.options["mode"] == CONTINUOUS else step
+    plant, geometry = drake.AddMultibodyPlantSceneGraph(builder, time_step)
+    if time_step:
+        plant.set_discrete_contact_approximation(drake.DiscreteContactApproximation.kSap)
+    if "sap_near_rigid_threshold" in settings.options:
+        plant.set_sap_near_rigid_threshold(float(settings.options["sap_near_rigid_threshold"]))
+    plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
+    material = _material(drake, settings)
+    for wall in scene.obstacles:
+        x, y, z, w = wall.orientation
+        place = drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(wall.center))
+        plant.RegisterCollisionGeometry(plant.world_body(), place, drake.Box(*wall.size), wall.name, material)
+    balls, boxes = drake.GeometrySet(), drake.GeometrySet()
+    radius, others = float(settings.options["corner radius"]), len(scene.bodies) > 1
+    bodies = [_add(drake, plant, body, material, radius, others, balls, boxes) for body in scene.bodies]
+    plant.Finalize()
+    if any(isinstance(shape, Cuboid) for body in scene.bodies for shape in body.shapes):
+        rules = drake.CollisionFilterDeclaration().ExcludeWithin(balls).ExcludeWithin(boxes)
+        geometry.collision_filter_manager().Apply(rules)  # corners meet faces, nothing else
+    return plant, builder.Build(), bodies
+
+
+def _material(drake: Any, settings: Settings) -> Any:
+    """Frictionless; two equal springs in series make a contact."""
+    given, properties = settings.options, drake.ProximityProperties()
+    stiffness = given.get("point_contact_stiffness")
+    drake.AddContactMaterial(
+        given.get("hunt_crossley_dissipation"), None if stiffness is None else 2.0 * float(stiffness),
+        drake.CoulombFriction(0.0, 0.0), properties,
+    )  # fmt: skip
+    if "relaxation_time" in given:
+        properties.AddProperty("material", "relaxation_time", given["relaxation_time"])
+    return properties
+
+
+def _add(drake: Any, plant: Any, body: RigidBody, material: Any, radius: float, others: bool, balls: Any,
+         boxes: Any) -> Any:  # fmt: skip
+    """Add a body; a box is small balls at its corners and, where others may touch it, its faces."""
+    unit = [moment / body.mass for moment in body.inertia]
+    inertia = drake.SpatialInertia(body.mass, np.zeros(3), drake.UnitInertia(*unit))
+    made = plant.AddRigidBody(body.name, inertia)
+
+    def register(shape: Any, center: Any, name: str) -> Any:
+        place = drake.RigidTransform(np.array(center))
+        return plant.RegisterCollisionGeometry(made, place, shape, f"{body.name} {name}", material)
+
+    for number, shape in enumerate(body.shapes):
+        if isinstance(shape, Sphere):
+            register(drake.Sphere(shape.radius), shape.center, f"ball {number}")
+            continue
+        reach = 0.5 * np.array(shape.size) - radius
+        for sign in product((-1.0, 1.0), repeat=3):
+            corner = np.array(shape.center) + reach * np.array(sign)
+            balls.Add(register(drake.Sphere(radius), corner, f"corner {number} {sign}"))
+        if others:
+            boxes.Add(register(drake.Box(*shape.size), shape.center, f"box {number}"))
+    return made
+
+
+def _start(drake: Any, plant: Any, context: Any, scene: FixedScene, bodies: list[Any]) -> None:
+    for body, made in zip(scene.bodies, bodies, strict=True):
+        x, y, z, w = body.orientation
+        place = drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(body.position))
+        plant.SetFreeBodyPose(context, made, place)
+        speed = drake.SpatialVelocity(np.array(body.spin), np.array(body.velocity))
+        plant.SetFreeBodySpatialVelocity(context, made, speed)
+
+
+def _keep(plant: Any, context: Any, record: Recorder, time: float, bodies: list[Any]) -> None:
+    places = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
+    speeds = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
+    wxyz = np.array([place.rotation().ToQuaternion().wxyz() for place in places])
+    contacts = plant.get_contact_results_output_port().Eval(context).num_point_pair_contacts()
+    record.add(time, np.array([place.translation() for place in places]), wxyz[:, [1, 2, 3, 0]],
+               np.array([speed.translational() for speed in speeds]),
+               np.array([speed.rotational() for speed in speeds]), contacts)  # fmt: skip

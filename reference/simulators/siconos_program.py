@@ -1,0 +1,115 @@
+"""Siconos on one scene: a program for the Python that Siconos is installed for, without our code. JSON in, JSON out.
+
+Moreau-Jean steps with theta; contacts by Siconos' own use of Bullet's detection, without margins; frictionless
+impact law solved by nonsmooth Gauss-Seidel. Siconos prints to standard output: the answer goes to the file named last.
+"""
+
+import json
+import sys
+
+import numpy as np
+import siconos.kernel as sk
+import siconos.numerics as sn
+from siconos.mechanics.collision import (
+    RigidBodyDS,
+    SiconosBox,
+    SiconosContactor,
+    SiconosContactorSet,
+    SiconosSphere,
+)
+from siconos.mechanics.collision.bullet import SiconosBulletCollisionManager, SiconosBulletOptions
+
+
+def shape_of(given):
+    """A ball or a box without margins."""
+    shape = SiconosSphere(given["radius"]) if "radius" in given else SiconosBox(*given["size"])
+    shape.setInsideMargin(0.0)
+    shape.setOutsideMargin(0.0)
+    return shape
+
+
+def contactors(shapes, kept):
+    """Return the contactor set of shapes at their centres; `kept` holds what Siconos only refers to."""
+    made = SiconosContactorSet()
+    for given in shapes:
+        shape = shape_of(given)
+        contactor = SiconosContactor(shape, [*given["center"], 1.0, 0.0, 0.0, 0.0])
+        made.append(contactor)
+        kept += [shape, contactor]
+    kept.append(made)
+    return made
+
+
+def pose(position, orientation):
+    """Return x, y, z, w, x, y, z."""
+    x, y, z, w = orientation
+    return [*position, w, x, y, z]
+
+
+def body_of(given, gravity, kept):
+    """A rigid body under gravity; the spin is given in body axes."""
+    made = RigidBodyDS(pose(given["position"], given["orientation"]), [*given["velocity"], *given["local_spin"]],
+                       given["mass"], np.diag(given["inertia"]))
+    made.setContactors(contactors(given["shapes"], kept))
+    weight = given["mass"] * np.array(gravity)
+    made.setFExtPtr(weight)
+    kept.append(weight)
+    return made
+
+
+def simulation_of(task, model, kept):
+    """The time-stepping with integrator, solver and collision manager."""
+    options = SiconosBulletOptions()
+    options.contactBreakingThreshold = task["contactBreakingThreshold"]
+    options.minimumPointsPerturbationThreshold = int(task["minimumPointsPerturbationThreshold"])
+    manager = SiconosBulletCollisionManager(options)
+    manager.insertNonSmoothLaw(sk.NewtonImpactFrictionNSL(task["restitution"], 0.0, 0.0, 3), 0, 0)
+    for wall in task["obstacles"]:
+        box = contactors([{"size": wall["size"], "center": [0.0, 0.0, 0.0]}], kept)
+        manager.insertStaticContactorSet(box, pose(wall["center"], wall["orientation"]))
+    solver = sk.FrictionContact(3, sn.SICONOS_FRICTION_3D_NSGS)
+    solver.numericsSolverOptions().iparam[sn.SICONOS_IPARAM_MAX_ITER] = int(task["iterations"])
+    solver.numericsSolverOptions().dparam[sn.SICONOS_DPARAM_TOL] = task["tolerance"]
+    simulation = sk.TimeStepping(model, sk.TimeDiscretisation(0.0, task["step"]))
+    integrator = sk.MoreauJeanOSI(task["theta"])
+    simulation.insertIntegrator(integrator)
+    simulation.insertNonSmoothProblem(solver)
+    simulation.insertInteractionManager(manager)
+    simulation.setNewtonOptions(sk.SICONOS_TS_LINEAR)
+    simulation.setNewtonMaxIteration(1)
+    kept += [options, manager, solver, integrator]
+    return simulation, solver
+
+
+def simulate(task):
+    """Return the samples [time, contacts, [[q, twist] per body]] and the largest residual of the solver."""
+    kept = []
+    model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
+    bodies = [body_of(given, task["gravity"], kept) for given in task["bodies"]]
+    for body in bodies:
+        model.insertDynamicalSystem(body)
+    simulation, solver = simulation_of(task, model, kept)
+    samples, worst, steps, last = [], 0.0, 0, round(task["duration"] / task["step"])
+
+    def sample(contacts):
+        states = [[body.q().tolist(), body.twist().tolist()] for body in bodies]
+        samples.append([steps * task["step"], contacts, states])
+
+    sample(0)
+    while simulation.hasNextEvent() and steps < last:
+        simulation.computeOneStep()
+        simulation.nextStep()
+        steps += 1
+        size = int(solver.getSizeOutput()) // 3
+        if size:
+            worst = max(worst, float(solver.numericsSolverOptions().dparam[sn.SICONOS_DPARAM_RESIDU]))
+        if steps % task["stride"] == 0 or steps == last:
+            sample(size)
+    return {"samples": samples, "residual": worst}
+
+
+if __name__ == "__main__":
+    with open(sys.argv[1], encoding="utf-8") as file:
+        answer = simulate(json.load(file))
+    with open(sys.argv[2], "w", encoding="utf-8") as file:
+        json.dump(answer, file)
