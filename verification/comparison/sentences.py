@@ -203,7 +203,7 @@ def problems(study: ProblemStudy) -> tuple[str, ...]:
 def _spread(study: ProblemStudy, friction: int) -> float:
     """Largest spread of contact velocities among the problems without (0) or with friction (1)."""
     spreads = [line.spread for line in study.lines if line.friction == bool(friction)]
-    return float(np.nanmax(spreads, initial=0.0))
+    return max((spread for spread in spreads if np.isfinite(spread)), default=0.0)
 
 
 def _left_out(study: ProblemStudy) -> str:
