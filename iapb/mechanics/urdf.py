@@ -4,16 +4,15 @@ Independent of Pinocchio's reader, so that a comparison of the two checks the re
 q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the alphabetical order of
 their joints' names; continuous joints (cos, sin); planar and floating joints as SE(2) and SE(3) with
 velocities in body axes; mimic joints independent. Fixed joints stay as bodies without degrees of freedom.
+What can touch (<collision>) is no part of a mechanism: `iapb.mechanics.urdf_collision` reads it.
 Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML).
 """
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import NamedTuple, NoReturn
-from xml.parsers import expat
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
+from iapb.mechanics.urdf_elements import elements_by_name, numbers_in, origin_of, parse_robot, where_of
 
 Floats = NDArray[np.float64]
 
@@ -67,9 +67,9 @@ def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
         The file cannot be read, is not a URDF robot, or one of its elements is wrong; the message names the
         file, the element and what was expected.
     """
-    robot = _parse(Path(path))
-    links = _unique(robot, "link")
-    connections = [_connection(element) for element in _unique(robot, "joint").values()]
+    robot = parse_robot(Path(path))
+    links = elements_by_name(robot, "link")
+    connections = [_connection(element) for element in elements_by_name(robot, "joint").values()]
     inertials = {name: _inertial(element) for name, element in links.items()}
     root = _root(connections, inertials)
     base = Joint("free_flyer" if floating_base else "fixed")
@@ -85,92 +85,22 @@ def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
     return bodies
 
 
-def _refuse_doctype(*_: object) -> NoReturn:
-    raise ArgumentError("URDF file", "<!DOCTYPE", "no document type: it could declare entities without end")
-
-
-def _parse(path: Path) -> ElementTree.Element:
-    """Return the robot element; document types are refused before anything is expanded."""
-    try:
-        text = path.read_bytes()
-        scanner = expat.ParserCreate()
-        scanner.StartDoctypeDeclHandler = _refuse_doctype
-        scanner.Parse(text, True)
-        robot = ElementTree.fromstring(text)
-    except OSError as error:
-        raise ArgumentError("path", str(path), f"a readable URDF file ({error.strerror})") from None
-    except (expat.ExpatError, ElementTree.ParseError) as error:
-        raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
-    if robot.tag != "robot":
-        raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")
-    return robot
-
-
-def _unique(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:
-    """Return the robot's elements of that tag by name."""
-    found: dict[str, ElementTree.Element] = {}
-    for element in robot.findall(tag):
-        name = element.get("name")
-        if not name:
-            raise ArgumentError(f"<{tag}> number {len(found) + 1}: name", name, "a name")
-        if name in found:
-            raise ArgumentError(f"<{tag} name={name!r}>", name, f"a name that no other {tag} has")
-        found[name] = element
-    return found
-
-
-def _where(element: ElementTree.Element) -> str:
-    return f"<{element.tag} name={element.get('name')!r}>"
-
-
-def _numbers(where: str, text: str | None, count: int) -> Floats:
-    """Return `count` finite numbers from an attribute."""
-    try:
-        values = np.array([float(word) for word in (text or "").split()])
-    except ValueError:
-        values = np.zeros(0)
-    if len(values) != count or not np.isfinite(values).all():
-        raise ArgumentError(where, text, f"{count} finite number{'s' if count > 1 else ''}")
-    return values
-
-
-def _origin(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
-    """Return (rotation, position) of an optional <origin xyz rpy>; rpy turns about fixed x, then y, then z."""
-    element = owner.find("origin")
-    if element is None:
-        return np.eye(3), np.zeros(3)
-    if "quat_xyzw" in element.attrib:
-        raise ArgumentError(f"{where} origin quat_xyzw", element.get("quat_xyzw"), "the rotation as rpy")
-    position = _numbers(f"{where} origin xyz", element.get("xyz", "0 0 0"), 3)
-    roll, pitch, yaw = _numbers(f"{where} origin rpy", element.get("rpy", "0 0 0"), 3)
-    return _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll), position
-
-
-def _turn(axis: int, angle: float) -> Floats:
-    """Rotation about a coordinate axis."""
-    rotation, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
-    rotation[i, i] = rotation[j, j] = math.cos(angle)
-    rotation[j, i] = math.sin(angle)
-    rotation[i, j] = -rotation[j, i]
-    return rotation
-
-
 def _inertial(link: ElementTree.Element) -> _Inertial:
     """Return mass, centre of mass and inertia about it, in link axes; nothing where there is no <inertial>."""
-    inertial, where = link.find("inertial"), f"{_where(link)} inertial"
+    inertial, where = link.find("inertial"), f"{where_of(link)} inertial"
     if inertial is None:
         return _Inertial()
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
     if mass is None or tensor is None:
         raise ArgumentError(where, "incomplete", "a <mass> and an <inertia>")
-    rotation, center = _origin(inertial, where)
+    rotation, center = origin_of(inertial, where)
     entries = {
-        key: _numbers(f"{where} inertia {key}", tensor.get(key), 1)[0]
+        key: numbers_in(f"{where} inertia {key}", tensor.get(key), 1)[0]
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     }
     matrix = np.array([[entries["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
     turned = rotation @ matrix @ rotation.T
-    value = float(_numbers(f"{where} mass", mass.get("value"), 1)[0])
+    value = float(numbers_in(f"{where} mass", mass.get("value"), 1)[0])
     if value < 0.0:
         raise ArgumentError(f"{where} mass", value, "at least 0 kg")
     return _Inertial(value, center, 0.5 * (turned + turned.T))
@@ -178,7 +108,7 @@ def _inertial(link: ElementTree.Element) -> _Inertial:
 
 def _connection(element: ElementTree.Element) -> _Connection:
     """Return a joint with the links it connects."""
-    where, kind = _where(element), element.get("type", "")
+    where, kind = where_of(element), element.get("type", "")
     if kind not in KIND_OF_TYPE:
         raise ArgumentError(f"{where} type", kind, f"one of {', '.join(KIND_OF_TYPE)}")
     ends = {tag: element.find(tag) for tag in ("parent", "child")}
@@ -188,12 +118,12 @@ def _connection(element: ElementTree.Element) -> _Connection:
             raise ArgumentError(f"{where} {tag}", name, f'<{tag} link="..."/>')
     axis = np.array(DEFAULT_AXIS)
     if kind in WITH_AXIS and (given := element.find("axis")) is not None:
-        axis = _numbers(f"{where} axis", given.get("xyz"), 3)
+        axis = numbers_in(f"{where} axis", given.get("xyz"), 3)
         if not axis.any():
             raise ArgumentError(f"{where} axis", given.get("xyz"), "a vector that is not zero")
     joint = Joint(KIND_OF_TYPE[kind], (float(axis[0]), float(axis[1]), float(axis[2])))
     name = element.get("name") or ""
-    return _Connection(name, str(names["parent"]), str(names["child"]), joint, _origin(element, where))
+    return _Connection(name, str(names["parent"]), str(names["child"]), joint, origin_of(element, where))
 
 
 def _root(connections: list[_Connection], links: dict[str, _Inertial]) -> str:

@@ -65,7 +65,7 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     mistakes = [
         Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated
     ]
-    given, wrong = with_robots(root.value, file)
+    given, wrong = with_robots(root.value, file, lambda path: _stands_at(root, path, key=False))
     try:
         scene = scene_kind(given).model_validate(given)
     except ValidationError as failure:

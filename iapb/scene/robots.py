@@ -4,15 +4,22 @@
       - {name: arm, urdf: robots/six_axis_arm.urdf, shapes: {forearm: [{kind: sphere, radius: 0.05}]},
          position: {upper_arm: [0.3]}}
 
-Each link becomes the body ``<robot>_<link>``. After reading the scene holds the bodies themselves: its text and its
-runs need the URDF no more. Paths are relative to the scene file and do not lead out of its folder.
+What can touch is nothing, until `shapes` says what, link by link, or ``collisions: urdf`` takes the boxes and spheres
+of the file's <collision> elements. `shapes` of a link replace those of the file: so a link drawn as a cylinder,
+capsule or mesh, which the scene cannot hold, gets boxes and spheres instead, or ``[]``.
+
+Each link becomes the body ``<robot>_<link>``, dots and blanks as ``_``. After reading the scene holds the bodies
+themselves: its text and its runs need the URDF no more. Paths are relative to the scene file and do not lead out of
+its folder.
 """
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -20,6 +27,9 @@ from pydantic import Field
 from iapb.errors import ArgumentError, Mistake, shown
 from iapb.scene.parts import Name, Part
 from iapb.scene.space import JOINTS, ORIGIN, SpatialShape, Vector3
+
+HELD = ("box", "sphere")  # of the URDF's geometries, those that the compiled narrow phase knows
+Place = tuple[str | int, ...]
 
 
 class Robot(Part):
@@ -30,8 +40,12 @@ class Robot(Part):
     origin: Vector3 = Field(ORIGIN, description="where its root link lies [m], world axes")
     rpy: Vector3 = Field(ORIGIN, description="how its root link is turned: roll, pitch, yaw [rad]")
     floating: bool = Field(False, description="true: the root link moves freely; default: fixed to the world")
+    collisions: Literal["none", "urdf"] = Field(
+        "none", description="urdf: boxes and spheres of the file's <collision> elements can touch, where shapes says "
+        "nothing about the link; none: shapes alone"
+    )  # fmt: skip
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(
-        default_factory=dict, description="what can touch, by link; link axes"
+        default_factory=dict, description="what can touch, by link; link axes; [] for nothing"
     )
     position: dict[str, tuple[float, ...]] = Field(
         default_factory=dict, description="coordinates at the start of the joint that carries a link; default: at rest"
@@ -45,17 +59,41 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
     Raises
     ------
     ArgumentError
-        The path leads out of the folder, the file is no URDF robot, or a link that is named does not exist.
+        The path leads out of the folder, the file is no URDF robot, a link that is named does not exist, or a
+        link's <collision> is no box or sphere.
     """
     from iapb.mechanics.urdf import read_urdf
 
-    links = read_urdf(urdf_path(robot.urdf, folder), robot.floating)
+    path = urdf_path(robot.urdf, folder)
+    links = read_urdf(path, robot.floating)
     names = {link.name for link in links}
     for field in ("shapes", "position", "velocity"):
         for link in getattr(robot, field):
             if link not in names:
                 raise ArgumentError(f"{field} of robot {robot.name}", link, f"a link of it: {', '.join(sorted(names))}")
-    return [_plain_body(robot, link) for link in links]
+    shapes = {link: [shape.model_dump(mode="json") for shape in given] for link, given in robot.shapes.items()}
+    if robot.collisions == "urdf":
+        shapes = _collisions_of(robot, path) | shapes
+    return [_plain_body(robot, link, shapes.get(link.name, [])) for link in links]
+
+
+def _collisions_of(robot: Robot, path: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the URDF file's collision shapes by link, for the links that `shapes` says nothing about."""
+    from iapb.mechanics.urdf_collision import read_collisions
+
+    read = {link: shapes for link, shapes in read_collisions(path).items() if link not in robot.shapes}
+    foreign = [f"{link} <{shape.kind}>" for link, shapes in read.items() for shape in shapes if shape.kind not in HELD]
+    if foreign:
+        expected = "links with boxes and spheres; give the others boxes and spheres, or [], under shapes"
+        raise ArgumentError("collisions", ", ".join(dict.fromkeys(foreign)), expected)
+    return {link: [_plain_shape(shape) for shape in shapes] for link, shapes in read.items()}
+
+
+def _plain_shape(shape: Any) -> dict[str, Any]:
+    center = shape.center.tolist()
+    if shape.kind == "sphere":
+        return {"kind": "sphere", "radius": float(shape.lengths[0]), "center": center}
+    return {"kind": "box", "size": shape.lengths.tolist(), "center": center, "rpy": list(angles_of(shape.rotation))}
 
 
 def urdf_path(text: str, folder: Path) -> Path:
@@ -67,27 +105,32 @@ def urdf_path(text: str, folder: Path) -> Path:
     return root / path
 
 
-def _plain_body(robot: Robot, link: Any) -> dict[str, Any]:
+def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[str, Any]:
     rotation, origin = link.placement
     if link.parent is None:
         turn = rotation_of(robot.rpy)
         rotation, origin = turn @ rotation, turn @ origin + np.array(robot.origin)
     body = {
-        "name": f"{robot.name}_{link.name}",
-        "parent": "world" if link.parent is None else f"{robot.name}_{link.parent}",
+        "name": body_name(robot.name, link.name),
+        "parent": "world" if link.parent is None else body_name(robot.name, link.parent),
         "joint": link.joint.kind,
         "origin": origin.tolist(),
         "rpy": list(angles_of(rotation)),
         "center_of_mass": link.center_of_mass.tolist(),
         "mass": link.mass,
         "inertia": link.inertia.tolist(),
-        "shapes": [shape.model_dump(mode="json") for shape in robot.shapes.get(link.name, ())],
+        "shapes": shapes,
         "position": list(robot.position.get(link.name, JOINTS.get(link.joint.kind, (0, 0, ()))[2])),
         "velocity": list(robot.velocity.get(link.name, ())),
     }
     if link.joint.kind in ("revolute", "continuous", "prismatic"):
         body["axis"] = list(link.joint.axis)
     return body
+
+
+def body_name(robot: str, link: str) -> str:
+    """Return the name of a link's body: <robot>_<link>, with _ for what names of scenes do not hold (link_3.0)."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", f"{robot}_{link}")
 
 
 def rotation_of(rpy: Any) -> np.ndarray:
@@ -109,8 +152,11 @@ def angles_of(rotation: np.ndarray) -> tuple[float, float, float]:
     return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
 
 
-def with_robots(given: Any, file: str) -> tuple[Any, list[Mistake]]:
-    """Return plain values of a scene with its robots turned into bodies, and what is wrong with them."""
+def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, int]]) -> tuple[Any, list[Mistake]]:
+    """Return plain values of a scene with its robots turned into bodies, and what is wrong with them.
+
+    `stands_at` gives line and column of a path such as ("robots", 0, "urdf") in the file.
+    """
     from pydantic import ValidationError
 
     if not (isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)):
@@ -121,9 +167,11 @@ def with_robots(given: Any, file: str) -> tuple[Any, list[Mistake]]:
             bodies += bodies_of(Robot.model_validate(item), Path(file).parent)
         except ValidationError as failure:
             for error in failure.errors(include_url=False):
-                path = ".".join(map(str, ("", *error["loc"])))
-                mistakes.append(Mistake(file, 0, 0, f"robots[{i}]{path}", shown(error["input"]), error["msg"]))
+                place = ("robots", i, *error["loc"])
+                where = f"robots[{i}]" + "".join(f".{step}" for step in error["loc"])
+                mistakes.append(Mistake(file, *stands_at(place), where, shown(error["input"]), error["msg"]))
         except ArgumentError as failure:
-            where = f"robots[{i}].{failure.argument}"
-            mistakes.append(Mistake(file, 0, 0, where, shown(failure.value), failure.expected))
+            where, field = f"robots[{i}].{failure.argument}", failure.argument.split(" ")[0]
+            place = ("robots", i, field if field in Robot.model_fields else "urdf")
+            mistakes.append(Mistake(file, *stands_at(place), where, shown(failure.value), failure.expected))
     return {key: value for key, value in given.items() if key != "robots"} | {"bodies": bodies}, mistakes

@@ -1,0 +1,87 @@
+"""Elements of a URDF file, by the standard library's XML parser: the robot, its named parts, numbers and origins."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError
+
+Floats = NDArray[np.float64]
+
+
+def _refuse_doctype(*_: object) -> NoReturn:
+    raise ArgumentError("URDF file", "<!DOCTYPE", "no document type: it could declare entities without end")
+
+
+def parse_robot(path: Path) -> ElementTree.Element:
+    """Return the robot element; document types are refused before anything is expanded."""
+    try:
+        text = path.read_bytes()
+        scanner = expat.ParserCreate()
+        scanner.StartDoctypeDeclHandler = _refuse_doctype
+        scanner.Parse(text, True)
+        robot = ElementTree.fromstring(text)
+    except OSError as error:
+        raise ArgumentError("path", str(path), f"a readable URDF file ({error.strerror})") from None
+    except (expat.ExpatError, ElementTree.ParseError) as error:
+        raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
+    if robot.tag != "robot":
+        raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")
+    return robot
+
+
+def elements_by_name(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:
+    """Return the robot's elements of that tag by name."""
+    found: dict[str, ElementTree.Element] = {}
+    for element in robot.findall(tag):
+        name = element.get("name")
+        if not name:
+            raise ArgumentError(f"<{tag}> number {len(found) + 1}: name", name, "a name")
+        if name in found:
+            raise ArgumentError(f"<{tag} name={name!r}>", name, f"a name that no other {tag} has")
+        found[name] = element
+    return found
+
+
+def where_of(element: ElementTree.Element) -> str:
+    """Return how messages name an element."""
+    return f"<{element.tag} name={element.get('name')!r}>"
+
+
+def numbers_in(where: str, text: str | None, count: int) -> Floats:
+    """Return `count` finite numbers from an attribute."""
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise ArgumentError(where, text, f"{count} finite number{'s' if count > 1 else ''}")
+    return values
+
+
+def origin_of(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
+    """Return (rotation, position) of an optional <origin xyz rpy>; rpy turns about fixed x, then y, then z."""
+    element = owner.find("origin")
+    if element is None:
+        return np.eye(3), np.zeros(3)
+    if "quat_xyzw" in element.attrib:
+        raise ArgumentError(f"{where} origin quat_xyzw", element.get("quat_xyzw"), "the rotation as rpy")
+    position = numbers_in(f"{where} origin xyz", element.get("xyz", "0 0 0"), 3)
+    roll, pitch, yaw = numbers_in(f"{where} origin rpy", element.get("rpy", "0 0 0"), 3)
+    return _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll), position
+
+
+def _turn(axis: int, angle: float) -> Floats:
+    """Rotation about a coordinate axis."""
+    rotation, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    rotation[i, i] = rotation[j, j] = math.cos(angle)
+    rotation[j, i] = math.sin(angle)
+    rotation[i, j] = -rotation[j, i]
+    return rotation
