@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_WRITING = ".writing"
+WRITING = ".writing"  # ends the name of a file that is not yet whole
 # A write takes seconds; what is older than this was left by a writer that was killed.
 _ABANDONED_AFTER_SECONDS = 3600.0
 
@@ -29,7 +29,7 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
     A crash at any moment leaves `target` as it was. With ``replace=False`` a target that exists by then
     stays, and what was written aside is dropped: the first of two writers wins.
     """
-    aside = target.with_name(f".{target.name}.{os.getpid()}{_WRITING}")
+    aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
     try:
         yield aside
         sync(aside)
@@ -54,7 +54,7 @@ def _move_if_absent(aside: Path, target: Path) -> None:
 
 def remove_abandoned(folder: Path) -> None:
     """Remove what killed writers left in `folder`; files of writers still at work are younger."""
-    for path in folder.glob(f".*{_WRITING}"):
+    for path in folder.glob(f".*{WRITING}"):
         with suppress(FileNotFoundError):
             if time.time() - path.stat().st_mtime > _ABANDONED_AFTER_SECONDS:
                 path.unlink()

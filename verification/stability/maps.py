@@ -12,7 +12,7 @@ from verification.stability.sampled_wall import LAWS, Contact, Floats, Loop, tou
 SETTLES, BOUNCES_ON, GROWS = "settles", "bounces on", "grows"
 
 # Resolution of the emulated encoder, 1 µm, and one sample late each way: what the report's device runs assume too.
-LATE = {"delay": 1, "resolution": 1e-6}
+LATE = (1, 1e-6)  # delay [samples], resolution [m]
 GRIDS = {"quick": (17, 14), "full": (49, 40)}  # stiffnesses, dampings
 
 
@@ -63,8 +63,9 @@ def walls(stiffness: Floats, damping: Floats) -> tuple[Floats, Floats]:
 
 def loops() -> tuple[Loop, ...]:
     """The loops: 512 Hz and 1 kHz, ideal and late sensors, without physical damping (the paper's device) and with."""
-    return tuple(Loop(rate=rate, device_damping=b, **(LATE if late else {}))
-                 for rate in (512.0, 1000.0) for late in (False, True) for b in (0.0, 5.0))  # type: ignore[arg-type]
+    kinds = [(rate, late, b) for rate in (512.0, 1000.0) for late in (False, True) for b in (0.0, 5.0)]
+    return tuple(Loop(rate=rate, device_damping=b, delay=LATE[0] if late else 0, resolution=LATE[1] if late else 0.0)
+                 for rate, late, b in kinds)  # fmt: skip
 
 
 def grid(depth: str) -> tuple[Floats, Floats]:

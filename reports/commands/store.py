@@ -1,0 +1,97 @@
+"""`iapb store ACTION`: are the results whole, what can go, and do they come out the same again?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from reports.store_care import FileState
+
+
+class Action(str, Enum):
+    """What to do with a folder of results."""
+
+    check = "check"
+    repair = "repair"
+    gc = "gc"
+    again = "again"
+
+
+_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: remove what "
+           "nothing needs. again: simulate runs again and compare bit for bit.")
+
+
+def store(
+    action: Annotated[Action, typer.Argument(help=_ACTION)],
+    where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (again).")] = Path("out"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="gc: only say what would be removed.")] = False,
+) -> None:
+    """Look after the run and table files below a folder."""
+    from iapb.errors import ArgumentError
+
+    if not where.exists():
+        raise ArgumentError("where", str(where), "a folder of results, or a run file")
+    {Action.check: _check, Action.repair: _repair, Action.gc: _gc, Action.again: _again}[action](where, dry_run)
+
+
+def _check(where: Path, _: bool) -> None:
+    from reports.store_care import DAMAGED, check_store
+
+    states = check_store(where)
+    _tell(states)
+    if any(state.state == DAMAGED for state in states):
+        print("Set the damaged files aside, to be computed again, with: iapb store repair")
+        raise typer.Exit(1)
+
+
+def _repair(where: Path, _: bool) -> None:
+    from reports.store_care import DAMAGED, repair_store
+
+    states = repair_store(where)
+    _tell(states)
+    aside = sum(state.state == DAMAGED for state in states)
+    print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
+
+
+def _tell(states: Sequence[FileState]) -> None:
+    from collections import Counter
+
+    from reports.store_care import WHOLE
+
+    for state in states:
+        if state.state != WHOLE:
+            print(f"{state.path}: {state.state}: {state.why}")
+    count = Counter(state.state for state in states)
+    print(f"{len(states)} files: " + (", ".join(f"{number} {state}" for state, number in count.most_common()) or "none"))
+
+
+def _gc(where: Path, dry_run: bool) -> None:
+    from reports.store_care import collect_garbage, garbage
+
+    found = garbage(where)
+    size = sum(state.size for state in found) / 1e6
+    for state in found:
+        print(f"{state.path}: {state.state}: {state.why}")
+    if not dry_run:
+        collect_garbage(where)
+    print(f"{len(found)} files, {size:.1f} MB, {'would be removed' if dry_run else 'removed'}; results of the present "
+          "code are kept.")
+
+
+def _again(where: Path, _: bool) -> None:
+    from reports.resimulate import repeat_run
+
+    files = sorted(where.rglob("*.h5")) if where.is_dir() else [where]
+    other = 0
+    for path in files:
+        found = repeat_run(path)
+        other += not found.same
+        print(f"{path}: " + ("the same to the last bit" if found.same else "differs in " + ", ".join(found.differs)))
+    print(f"{len(files) - other} of {len(files)} runs came out the same.")
+    if other:
+        raise typer.Exit(1)
