@@ -38,8 +38,8 @@ class Siconos:
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Theta 1/2, which conserves at e = 1; Gauss-Seidel, since Lemke's method fails on redundant corners."""
-        return Settings(step or STEP, {"theta": 0.5, "solver": "NSGS", "iterations": 1e4, "tolerance": 1e-12,
-                                       "contactBreakingThreshold": 0.02, "minimumPointsPerturbationThreshold": 3.0,
+        return Settings(step or STEP, {"theta": 0.5, "solver": "NSGS", "iterations": 1e3, "tolerance": 1e-10,
+                                       "contactBreakingThreshold": 2e-3, "minimumPointsPerturbationThreshold": 3.0,
                                        "margins": 0.0})  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
