@@ -38,8 +38,9 @@ def compute(runner: Runner, progress: Callable[[int, int], None]) -> tuple[HardC
 
 def summary(cases: Sequence[HardCase]) -> Numbers:
     """All cases in one table: a row per case and method or world."""
-    rows = tuple((case.name, case.kind, *row) for case in cases for row in case.numbers.rows)
-    return Numbers((CASE, KIND, *COLUMNS), rows, 2)
+    shown = len(COLUMNS) - 1  # all but the notes
+    rows = tuple((case.name, case.kind, *row[:shown]) for case in cases for row in case.numbers.rows)
+    return Numbers((CASE, KIND, *COLUMNS[:shown]), rows, 2)
 
 
 def _record(name: str, runner: Runner) -> HardCase:
@@ -52,17 +53,21 @@ def _record(name: str, runner: Runner) -> HardCase:
         return HardCase(name, title, "problems of others", "", "", "", "", nothing, skipped=str(absent))
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
     rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner))
-    numbers = Numbers(COLUMNS, rows, 2, _NOTES[kind])
+    noted = any(row[-1] for row in rows)
+    numbers = Numbers(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind])
     return HardCase(name, case.name, case.source, kind, case.why_hard, case.law, case.expected, numbers)
+
+
+def _without_last(rows: tuple[tuple[Any, ...], ...]) -> tuple[tuple[Any, ...], ...]:
+    return tuple(row[:-1] for row in rows)
 
 
 def _row(found: Any) -> tuple[Any, ...]:
     """A verdict as a row; what does not apply or was not delivered is a dash."""
-    answered, motion = not found.note, found.exact_rank < 0
     return (
         found.method, found.verdict, _known(found.energy_gain), _known(found.energy_bound),
         _known(found.restitution_residual), _known(found.forward_error), _known(found.forward_bound),
-        found.rank if answered else None, None if motion else found.exact_rank, _known(found.seconds * 1e6), found.note,
+        None if found.note else found.rank, found.exact_rank, _known(found.seconds * 1e6), found.note,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
-from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, VERMILION, LineStyle, styled
+from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, RULE, VERMILION, LineStyle, styled
 from reports.figures.svg import to_svg
 
 KEY, TITLE, INPUT = "hard-cases-matrix", "Who survives what", "hard_cases"
@@ -20,7 +20,7 @@ CAPTION = (
     "A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, with the "
     "decade of its error against the truth (−16: the last digit); without a number its error is zero, or energy is the "
     "only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are wrong, with "
-    "the decade of the error. A diamond was cut: it took more than its limit of time."
+    "the decade of the error. A ring refused the input, a diamond was cut at its limit of time."
 )
 STABLE = "stable"
 MARKS: dict[str, LineStyle] = {
@@ -28,14 +28,15 @@ MARKS: dict[str, LineStyle] = {
     "gains energy": LineStyle(VERMILION, "X", (), 0.0),
     "restitution unmet": LineStyle(PURPLE, "s", (), 0.0, filled=False),
     "wrong motion": LineStyle(AMBER, "^", (), 0.0, filled=False),
-    "refused": LineStyle(MUTED, "_", (), 0.0),
-    "timed out": LineStyle(INK, "d", (), 0.0, filled=False),
-    "out of memory": LineStyle(INK, "d", (), 0.0, filled=False),
-    "failed": LineStyle(INK, "*", (), 0.0, filled=False),
+    "refused": LineStyle(MUTED, "o", (), 0.0, filled=False),
+    "timed out": LineStyle(INK, "D", (), 0.0, filled=False),
+    "out of memory": LineStyle(INK, "D", (), 0.0),
+    "failed": LineStyle(INK, "*", (), 0.0),
 }
 _KINDS = (("impact", "Impacts, by method"), ("motion", "Motions, by world"))
-_ROW, _COLUMN, _LABELS, _HEAD = 0.25, 0.86, 3.45, 0.75  # inches
-_WRAPPED = 46  # characters of a case's name
+_ROW, _COLUMN, _LABELS, _HEAD = 0.23, 0.74, 4.0, 0.6  # inches
+_COLUMNS = 7  # of either matrix, filled or not: so both are drawn to one scale
+_LONGEST = 58  # characters of a case's name that fit beside the matrix
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -58,23 +59,26 @@ def decade(value: float | None) -> str:
 def _panel(numbers: Numbers, kind: str, label: str) -> Panel:
     at = {name: numbers.columns.index(name) for name in (CASE, METHOD, OUTCOME, GAIN, ERROR)}
     rows = [{name: row[place] for name, place in at.items()} for row in numbers.rows if row[1] == kind]
-    cases, methods = (tuple(dict.fromkeys(row[name] for row in rows)) for name in (CASE, METHOD))
+    cases = tuple(dict.fromkeys(row[CASE] for row in rows))
+    methods = tuple(sorted({row[METHOD] for row in rows}, key=_first))
     svg = _matrix(f"{KEY}-{kind}", rows, cases, methods)
     return Panel(svg, _words(rows, methods), label, wide=True)
 
 
 def _matrix(key: str, rows: Sequence[Mapping[str, Any]], cases: tuple[str, ...], methods: tuple[str, ...]) -> str:
-    size = (_LABELS + _COLUMN * len(methods), _HEAD + _ROW * len(cases))
+    columns = max(_COLUMNS, len(methods))
+    size = (_LABELS + _COLUMN * columns, _HEAD + _ROW * len(cases))
     with styled() as new_figure:
         drawing = new_figure(figsize=size)
         axes = drawing.add_axes((_LABELS / size[0], 0.02, 1.0 - _LABELS / size[0], (_ROW * len(cases)) / size[1]))
         for row in rows:
             _mark(axes, methods.index(row[METHOD]), cases.index(row[CASE]), row)
-        axes.set(xlim=(-0.5, len(methods) - 0.5), ylim=(len(cases) - 0.5, -0.5))
+        axes.set(xlim=(-0.5, columns - 0.5), ylim=(len(cases) - 0.5, -0.5))
         axes.set_yticks(range(len(cases)), [_short(case) for case in cases])
         axes.set_xticks(range(len(methods)), [method.replace(" ", "\n").replace("_", "\n") for method in methods])
         axes.tick_params(length=0, labeltop=True, labelbottom=False, top=False, bottom=False)
-        axes.grid(axis="x", visible=False)
+        axes.grid(visible=False)
+        axes.hlines(range(len(cases)), -0.5, len(methods) - 0.5, color=RULE, linewidth=0.6, zorder=1)
         for side in axes.spines.values():
             side.set_visible(False)
         return to_svg(drawing, key)
@@ -89,8 +93,14 @@ def _mark(axes: Any, x: int, y: int, row: Mapping[str, Any]) -> None:
     axes.text(x + 0.04, y, decade(value), fontsize=8.0, color=INK, ha="left", va="center")
 
 
+def _first(method: str) -> tuple[int, str]:
+    """Ours first, then the others in the order of their names."""
+    ours = ("factored", "factored, no clamp", "IAPB", "PB", "ideal")
+    return (ours.index(method) if method in ours else len(ours), method)
+
+
 def _short(name: str) -> str:
-    return name if len(name) <= _WRAPPED else name[: _WRAPPED - 1].rstrip() + "…"
+    return name if len(name) <= _LONGEST else name[: _LONGEST - 1].rstrip() + "…"
 
 
 def _words(rows: Sequence[Mapping[str, Any]], methods: tuple[str, ...]) -> str:

@@ -12,6 +12,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from verification.hard_cases.case import Floats, HardCase, Truth
 from verification.hard_cases.poisson import dot, fractions, solve
 
@@ -33,13 +35,9 @@ class FrictionalCase(HardCase):
 
         found = _Split(self)
         velocity = found.velocity(found.passive_share())
-        conditions = condition_number(self.mass_matrix), row_condition_number(self.mass_matrix, self._both())
+        both = np.vstack([self.contact_jacobian, self.tangent])  # friction is as sensitive as both rows together
+        conditions = condition_number(self.mass_matrix), row_condition_number(self.mass_matrix, both)
         return Truth(velocity, 1, *conditions)
-
-    def _both(self) -> list[list[Fraction]]:
-        """Normal and tangential row: friction's answer is as sensitive as both together."""
-        rows: list[list[Fraction]] = [*fractions(self.contact_jacobian), *fractions(self.tangent)]
-        return rows
 
     def newton_with_coulomb(self) -> tuple[Fraction, ...]:
         """v⁺ without the reduction: what Kane and Levinson's equations say."""
@@ -52,7 +50,7 @@ class _Split:
     def __init__(self, case: FrictionalCase) -> None:
         self.mass, self.v = fractions(case.mass_matrix), fractions(case.velocity)
         (n,), (t,) = fractions(case.contact_jacobian), fractions(case.tangent)
-        self.e, mu = Fraction(case.restitution), Fraction(case.friction)
+        self.e, mu = Fraction(float(case.restitution)), Fraction(case.friction)
         to_n, to_t = solve(self.mass, n), solve(self.mass, t)  # M⁻¹ nᵀ, M⁻¹ tᵀ
         self.w, self.gamma = dot(n, to_n), dot(n, self.v)
         across = dot(n, to_t) / self.w

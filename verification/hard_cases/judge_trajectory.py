@@ -36,11 +36,11 @@ def judge_trajectory(case: TrajectoryCase, world: str, simulate: Simulate = run_
         run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
     except IapbError as error:
         verdict = "refused" if isinstance(error, ValueError) else "failed"
-        return HardCaseVerdict(case.name, world, verdict, str(error), exact_rank=-1)
+        return HardCaseVerdict(case.name, world, verdict, str(error), exact_rank=None)
     found = case.measure(run)
     return HardCaseVerdict(
         case.name, world, _verdict(found), "", found.energy_gain, found.energy_bound, math.nan, found.error,
-        found.error_bound, int(run.impacts.rank.max(initial=0)), -1, float(run.impacts.clamp.min(initial=1.0)),
+        found.error_bound, int(run.impacts.rank.max(initial=0)), None, float(run.impacts.clamp.min(initial=1.0)),
         _seconds_per_step(run),
     )  # fmt: skip
 

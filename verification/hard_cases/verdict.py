@@ -21,7 +21,7 @@ class HardCaseVerdict:
     restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the fastest approach left, likewise.
     forward_error : |v⁺ − truth| / |v⁻| in the kinetic metric, or the case's own distance from its law.
     forward_bound : what the conditioning, or the law's own step and stiffness, excuses.
-    rank, exact_rank : as used, and of the meant Jacobian; trajectories: the largest rank of an impact, and -1.
+    rank, exact_rank : as used, and of the meant Jacobian; trajectories: the largest rank of an impact, and None.
     clamp : factor of the energy clamp.
     seconds : median time of one call, or of one step [s].
     """
@@ -36,7 +36,7 @@ class HardCaseVerdict:
     forward_error: float = _NONE
     forward_bound: float = _NONE
     rank: int = 0
-    exact_rank: int = 0
+    exact_rank: int | None = 0
     clamp: float = _NONE
     seconds: float = _NONE
 

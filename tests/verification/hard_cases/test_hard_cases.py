@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from verification.hard_cases import (
     judge_hard_case,
     judge_hard_cases,
 )
-from verification.hard_cases.bounded import TimedOut, bounded_impact
+from verification.hard_cases.bounded import OutOfMemory, TimedOut, bounded_impact
 from verification.hard_cases.case import AnyCase
 from verification.hard_cases.judge import methods_for
 from verification.hard_cases.judge_impact import NEWTON_COULOMB, WITHOUT_CLAMP
@@ -102,6 +103,28 @@ def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_cut() -> Non
     assert isinstance(case, HardCase)
     with pytest.raises(TimedOut, match=r"cut after 0\.05 s"):
         bounded_impact(case, "gram_pinv", limit=0.05)
+
+
+@pytest.mark.parametrize(("error", "word"), [(TimedOut("cut"), "timed out"), (OutOfMemory("big"), "out of memory")])
+def test_a_call_that_was_cut_is_a_verdict_and_no_number(
+    error: Exception, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cut(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("verification.hard_cases.judge_impact.bounded_impact", cut)
+    verdict = judge_hard_case(HARD_CASES["ten_thousand_contacts"](), "gram_pinv")
+    assert (verdict.verdict, verdict.note) == (word, str(error))
+    assert np.isnan(verdict.energy_gain) and np.isnan(verdict.seconds) and not verdict.is_stable
+
+
+def test_a_case_whose_files_are_absent_says_which_and_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("verification.hard_cases.shared_problems.FOLDER", tmp_path)
+    with pytest.raises(CaseAbsent, match="bowl.5"):
+        HARD_CASES["bowl_of_low_rank"]()
+    assert judge_hard_cases(cases=["bowl_of_low_rank", "two_balls_and_a_wall"]) == ()
 
 
 def test_a_bounded_call_gives_the_same_answer() -> None:
