@@ -14,8 +14,16 @@ def verify(
     = "iapb:resolve_impact",
     impacts: Annotated[int, typer.Option(min=1, help="Random impacts to try.")] = 1500,
     seed: Annotated[int, typer.Option(help="Seed of the draw.")] = 0,
+    simulator: Annotated[list[str] | None, typer.Option(
+        help="Instead, an engine on the fixed scenes: mujoco, drake, ... or all; may be repeated.")] = None,
+    scene: Annotated[list[str] | None, typer.Option(help="Only this fixed scene; may be repeated.")] = None,
 ) -> None:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
+    if simulator:
+        from reports.commands.verify_simulator import verify_simulators
+
+        verify_simulators(simulator, scene or ())
+        return
     from verification import check_passivity
 
     report = check_passivity(found(resolver), impacts=impacts, seed=seed)
