@@ -164,13 +164,13 @@ def solvers() -> Numbers:
     return Numbers(("solver", "method", "package", "takes"), rows, note=note)
 
 
-def worlds(runner: Runner) -> Numbers:
-    """A run of every world, as its own file states its contact law and coupling."""
+def worlds(runner: Runner, values: dict[str, Any] | None = None) -> Numbers:
+    """A run of every world, as its own file states its contact law and coupling; `values` change the scene."""
     from reference.worlds import WORLDS
 
     rows = []
     for world in WORLDS:
-        run = runner(shipped_scene(WORLD_SCENE), world, keep=False)
+        run = runner(shipped_scene(WORLD_SCENE, values), world, keep=False)
         rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
     return Numbers(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
                    f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip

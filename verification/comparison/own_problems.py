@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.errors import ArgumentError
 from verification.comparison.cases import ImpactCase, random_cases
 from verification.comparison.scene_cases import scene_impacts
 from verification.comparison.step_cost import patch, pile
@@ -42,10 +43,12 @@ def own_problems() -> tuple[StoredProblem, ...]:
 
 def _hard_cases() -> Iterator[ImpactProblem]:
     from reference.complementarity.problem import ImpactProblem
-    from verification.hard_cases import HARD_CASES
+    from verification.hard_cases import HARD_CASES, HardCase
 
     for name in HARD:
         case = HARD_CASES[name]()
+        if not isinstance(case, HardCase):
+            raise ArgumentError("HARD", name, "the name of a hard impact")
         yield ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution,
                                         name=f"hard case {name}")  # fmt: skip
 

@@ -6,6 +6,7 @@ doubles. One answer: a line of JSON {status, iterations, seconds}, then the impu
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import sys
@@ -19,8 +20,7 @@ def main() -> None:
     """Serve until standard input ends."""
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # Siconos prints to standard output, which carries our answers
-    import siconos.numerics as numerics
-
+    numerics = importlib.import_module("siconos.numerics")
     answers.write(b"ready\n")
     answers.flush()
     while line := requests.readline():
