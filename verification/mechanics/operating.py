@@ -127,6 +127,7 @@ class Led:
         self.work = self.exchanged = self.put_in = 0.0
         self.largest = self.excess = self.fastest = self.strongest = 0.0
         self.ratios: list[float] = []
+        self.here = self.place()
 
     def place(self) -> Floats:
         """Where the held point is (2,) [m]."""
@@ -137,13 +138,14 @@ class Led:
     def follow(self, path: Path, way: float, next_way: float) -> None:
         """One step with the hand on its path, from `way` to `next_way` [m]."""
         state, dt = self.simulation.state, self.simulation.system.dt
-        here, target, next_target = self.place(), path.place(way), path.place(next_way)
+        here, target, next_target = self.here, path.place(way), path.place(next_way)
         jacobian = self.mechanism.point_jacobian(state.q, self.grip.body, [*here, 0.0])[:2]
         spring = STIFFNESS * (target - here)
         force = spring + DAMPING * ((next_target - target) / dt - jacobian @ state.v)
         self.simulation.step(hand_force=[*force, 0.0])
-        self._account(force, self.place() - here, next_target - target, jacobian)
-        tension = float(np.linalg.norm(next_target - self.place()))
+        self.here = self.place()
+        self._account(force, self.here - here, next_target - target, jacobian)
+        tension = float(np.linalg.norm(next_target - self.here))
         stored = self.mechanism.kinetic_energy(state.q, state.v) + 0.5 * STIFFNESS * tension**2
         self.excess = max(self.excess, stored - self.put_in)
         self.largest = max(self.largest, stored)
