@@ -49,7 +49,8 @@ def hand_force(question: Question) -> Effect:
     if hand is None:
         reason = "the scene has no hand"
     elif active:
-        reason = f"the hand pushes {hand.body} with hand.force = {numbers(hand.force)} N, N, N m"
+        units = "N, N, N m" if len(hand.force) == 3 else "N, N, N, N m, N m, N m"
+        reason = f"the hand pushes {hand.body} with hand.force = {numbers(hand.force)} {units}"
     else:
         reason = "the hand holds still: hand.force is zero"
     return Effect("hand_force", active, reason, "the tool would not be pushed")

@@ -129,9 +129,3 @@ def written(path: Place) -> str:
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
     return text or "(file)"
-
-
-def scene_schema() -> dict[str, Any]:
-    """Return the JSON Schema of scene files, for editors; every default stands in its field's description."""
-    schema = Scene.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

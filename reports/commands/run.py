@@ -58,6 +58,9 @@ def parsed(assignments: list[str] | None) -> dict[str, Any]:
     return values
 
 
+SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
+
+
 def describe(run: Run, existed: bool) -> None:
     """Say in sentences what happened."""
     import numpy as np
@@ -76,8 +79,17 @@ def describe(run: Run, existed: bool) -> None:
         print("No collision was resolved by an impulse.")
     if len(run.contacts.gap):
         print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
-    end = ", ".join(f"{name} {value:.6g}" for name, value in zip(run.coordinate_names, run.q[-1], strict=True))
-    print(f"At the end: {end}.")
+    print(f"At the end: {_end_of(run)}.")
+
+
+def _end_of(run: Run) -> str:
+    """The last coordinates in words: the hand's tool where there are many, else the first of them."""
+    count = len(run.coordinate_names)
+    start, stop = run.tool_coordinates
+    shown = range(count) if count <= SHOWN_COORDINATES else range(start, stop) or range(SHOWN_COORDINATES)
+    words = ", ".join(f"{run.coordinate_names[i]} {run.q[-1, i]:.6g}" for i in shown)
+    more = count - len(shown)
+    return words + (f" (and {more} more coordinates in the run's file)" if more else "")
 
 
 def _duration(seconds: float) -> str:

@@ -218,7 +218,7 @@ def test_polygons_that_are_not_convex_are_refused(vertices: Any) -> None:
 
 def test_schema_describes_every_field_and_states_every_default() -> None:
     schema = scene_schema()
-    parts = [schema, *schema["$defs"].values()]
+    parts = list(schema["$defs"].values())
     fields = [(part["title"], name, field) for part in parts for name, field in part["properties"].items()]
     assert not [f"{part}.{name}" for part, name, field in fields if not field.get("description")]
     without = [
