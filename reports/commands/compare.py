@@ -21,6 +21,8 @@ def compare(
     only_problems: Annotated[bool, typer.Option(
         "--only-problems", help="Only the problem files, not the comparison on impacts.")] = False,
     full: Annotated[bool, typer.Option("--full", help="Ten times the impacts, more repeats.")] = False,
+    export: Annotated[Path | None, typer.Option(
+        help="Write our own problems to this folder as FCLIB files, and stop.")] = None,
 ) -> None:
     """Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem files."""
     from rich.console import Console
@@ -33,6 +35,9 @@ def compare(
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
     console = Console()
+    if export is not None:
+        console.print(f"{_export(export)} problems written to {export}", highlight=False)
+        return
     with stage_progress() as progress:
         if only_problems:
             studies = [study_problems(folder, progress=progress) for folder in problems or ()]
@@ -45,6 +50,22 @@ def compare(
         console.print(table)
     for text in found:
         console.print(f"• {text}", highlight=False)
+
+
+def _export(folder: Path) -> int:
+    """Write the problems that the study always has, one file each."""
+    import re
+
+    from reference.fclib import write_fclib
+    from verification.comparison.own_problems import own_problems
+
+    folder.mkdir(parents=True, exist_ok=True)
+    problems = [stored.problem for stored in own_problems()]
+    for problem in problems:
+        title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII
+        name = re.sub(r"[^a-z0-9.]+", "_", title.lower())
+        write_fclib(folder / f"{name}.hdf5", problem, title)
+    return len(problems)
 
 
 def _tables(study: ComparisonStudy) -> list[Table]:
