@@ -44,8 +44,14 @@ def _map(result: Any) -> Figure | None:
         return None
     units = {column.name: column.heading for column in result.table.columns}
     x, y = result.map_axes
-    panels = result.table.column(result.map_panels) if result.map_panels else None
+    panels = _panel_names(result, units) if result.map_panels else None
     return condition_map(
         f"map-{result.id}", f"Where {result.id} holds", f"Each mark is one simulated condition of {result.id}.",
         (units[x], result.table.column(x)), (units[y], result.table.column(y)), result.table.holds, panels,
     )  # fmt: skip
+
+
+def _panel_names(result: Any, headings: dict[str, str]) -> list[str]:
+    """The value by which maps are split; a number with the name of what it is."""
+    values = result.table.column(result.map_panels)
+    return [value if isinstance(value, str) else f"{headings[result.map_panels]}: {value:g}" for value in values]
