@@ -14,6 +14,7 @@ TOPICS: dict[str, str] = {
     "scene-ledger": "scenes",
     "stability": "stability",
     "complementarity": "complementarity",
+    "engines": "engines",
 }
 
 

@@ -7,6 +7,7 @@ from reports.figures import (
     coordinate_invariance,
     cost_of_contacts,
     energy_gains,
+    engine_errors,
     fig01_contact_forces,
     fig02_two_link_arm,
     fig03_energy_loss,
@@ -65,4 +66,5 @@ RECIPES: tuple[Recipe, ...] = (
     cost_of_contacts.RECIPE,
     performance_profile.RECIPE,
     rigid_convergence.RECIPE,
+    engine_errors.RECIPE,
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, Simulator, find_simulator, fixed_scene
 from verification.engines.measures import measured
 from verification.engines.record import EngineRecord
@@ -15,7 +15,7 @@ OWN, MATCHED = "own", "matched"
 SETTINGS = (OWN, MATCHED)
 MATCHED_STEP = 1e-3  # [s] the haptic rate
 # At depth "quick" a resting scene lasts so long [s]: a minute at 1 ms takes some engines a minute.
-QUICK_REST, QUICK_STACK = 2.0, 0.25
+QUICK_REST, QUICK_STACK = 1.0, 0.25
 
 Progress = Callable[[int, int], None]
 
@@ -87,5 +87,7 @@ def _outcome(simulator: Simulator, scene: Any, settings: Any, duration: float) -
     """Measures, or what stopped the run: an engine's own errors are of every kind, and each is a result."""
     try:
         return measured(scene, simulator.run(scene, settings, settings.step, duration))
+    except IapbError as error:
+        return {"failure": str(error)[:160]}
     except Exception as error:
         return {"failure": f"{type(error).__name__}: {' '.join(str(error).split())}"[:160]}

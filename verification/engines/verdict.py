@@ -51,7 +51,7 @@ def sentence(records: Sequence[EngineRecord]) -> str:
 def _worst(record: EngineRecord) -> str:
     """The number that misses, in words."""
     if record.failure:
-        return "failed: " + record.failure.split(":")[0]
+        return "failed: " + record.failure.rstrip(".")
     if record.rests:
         return f"moves by {record.drift:.2g} m"
     errors = {"energy": record.energy_error, "momentum": record.momentum_error, "velocity": record.velocity_error}

@@ -1,0 +1,105 @@
+"""Engines and scenes: energy error, momentum error and overlap as tables of coloured cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.style import AMBER, BLUE, INK, MUTED, RULE, SKY, VERMILION, LineStyle, styled
+from reports.figures.svg import to_svg
+
+KEY, TITLE = "engine-errors", "Energy, momentum and overlap, by engine"
+INPUT = "engines/errors"
+CAPTION = (
+    "A row for each engine and choice of settings, a column for each scene. First picture: by how much the energy at "
+    "the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at the end, as a "
+    "share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' size. "
+    "The numbers are powers of ten; 0 is below rounding. A cross is a run that failed, hatching an engine that "
+    "is not installed."
+)
+LEVELS = ((1e-6, BLUE, 0.75), (1e-2, SKY, 0.55), (1e-1, AMBER, 0.6), (float("inf"), VERMILION, 0.75))
+NAMES = ("to 10⁻⁶", "to 10⁻²", "to 10⁻¹", "above")
+ROUNDING = 1e-15
+ENGINE, SCENE, CHOICE, LAW = "engine", "scene", "settings", "law"
+PANELS = (("energy error", "energy error"), ("momentum error", "momentum error"), ("overlap / size", "overlap"))
+
+
+def draw(inputs: Mapping[str, Any]) -> Figure:
+    """Draw the three tables."""
+    numbers: Numbers = inputs[INPUT]
+    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    panels = tuple(Panel(_cells(rows, column, label), _words(rows, column), label) for column, label in PANELS)
+    legend = tuple((name, LineStyle(color, "s", (), 0.0)) for name, (_, color, _) in zip(NAMES, LEVELS, strict=True))
+    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
+
+
+def value_of(row: Mapping[str, Any], column: str) -> float | None:
+    """The size of the number of a cell; at rest an energy error is what the energy rose by."""
+    value = row[column]
+    if value is None and column == "energy error":
+        value = row["largest rise of energy"]
+    return None if value is None else abs(value)
+
+
+def _cells(rows: list[dict[str, Any]], column: str, label: str) -> str:
+    lines = list(dict.fromkeys((row[ENGINE], row[CHOICE]) for row in rows))
+    scenes = list(dict.fromkeys(row[SCENE] for row in rows))
+    with styled() as new_figure:
+        drawing = new_figure(figsize=(5.4, 0.25 * len(lines) + 1.75), layout="constrained")
+        axes = drawing.add_subplot()
+        for row in rows:
+            _cell(axes, scenes.index(row[SCENE]), lines.index((row[ENGINE], row[CHOICE])), row, column)
+        axes.set_xticks(range(len(scenes)), scenes, rotation=40, ha="left", rotation_mode="anchor")
+        axes.xaxis.tick_top()
+        axes.set_yticks(range(len(lines)), [f"{engine}, {_at(choice)}" for engine, choice in lines])
+        axes.set(xlim=(-0.5, len(scenes) - 0.5), ylim=(len(lines) - 0.5, -0.5))
+        axes.grid(False)
+        axes.tick_params(length=0)
+        for side in axes.spines.values():
+            side.set_visible(False)
+        return to_svg(drawing, f"{KEY}-{label.replace(' ', '-')}")
+
+
+def _cell(axes: Any, x: int, y: int, row: Mapping[str, Any], column: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    corner, look = (x - 0.46, y - 0.44), {"linewidth": 0}
+    value = value_of(row, column)
+    if row[LAW] == "not installed":
+        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor="none", edgecolor=MUTED, hatch="////", linewidth=0.4))
+    elif row[LAW] == "failed":
+        axes.plot(x, y, "X", color=VERMILION, markersize=7)
+    elif value is None:
+        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=RULE, alpha=0.35, **look))
+    else:
+        color, strength = next((color, strength) for most, color, strength in LEVELS if value <= most)
+        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=color, alpha=strength, **look))
+        axes.text(x, y, exponent(value), ha="center", va="center", fontsize=8, color=INK)
+
+
+def exponent(value: float) -> str:
+    """The power of ten nearest to a value, as text; 0 below rounding."""
+    from math import log10
+
+    return "0" if value < ROUNDING else f"{round(log10(value)):+d}".replace("-", "\N{MINUS SIGN}")
+
+
+def _at(choice: str) -> str:
+    return "own" if choice == "own" else "1 ms"
+
+
+def _words(rows: list[dict[str, Any]], column: str) -> str:
+    said = []
+    for engine in dict.fromkeys(row[ENGINE] for row in rows):
+        mine = [row for row in rows if row[ENGINE] == engine]
+        known = [(value, row) for row in mine if (value := value_of(row, column)) is not None]
+        if known:
+            worst, where = max(known, key=lambda pair: pair[0])
+            said.append(f"{engine} at most {worst:.1e}, in {where[SCENE]} ({_at(where[CHOICE])})")
+        else:
+            said.append(f"{engine}: none, {mine[0][LAW]}")
+    return f"{column.capitalize()}: " + "; ".join(said) + "."
+
+
+RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="engines")
