@@ -73,7 +73,7 @@ def _against_the_bound(rows: Sequence[Mapping[str, Any]]) -> str:
         axes.set(xscale="log", yscale="log", xlabel="bound C ε κ(M) κ(∂f/∂r)² / σ_min", ylabel="error of v⁺",
                  ylim=(0.3 * SMALLEST, 1e4))
         plain_powers(axes)
-        note(axes, (1.0, 1e3), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
+        note(axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
         return to_svg(drawing, f"{KEY}-bound")
 
 
