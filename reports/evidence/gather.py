@@ -6,13 +6,32 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.evidence import accuracy, claims, cross_checks, effects, hard_cases, proofs, properties, runs
+from reports.evidence import (
+    accuracy,
+    claims,
+    counterexamples,
+    cross_checks,
+    effects,
+    hard_cases,
+    proofs,
+    properties,
+    runs,
+)
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage
 from reports.evidence.topics import TOPICS, compute_topic
 from reports.evidence.verdicts import verdicts
 from reports.figures.figure import Numbers
-from reports.pages.records import Claim, CrossCheck, Evidence, HardCase, Property, SceneEffect, Topic
+from reports.pages.records import (
+    Claim,
+    Counterexample,
+    CrossCheck,
+    Evidence,
+    HardCase,
+    Property,
+    SceneEffect,
+    Topic,
+)
 from reports.provenance import collect_provenance
 from reports.runner import Runner
 
@@ -33,6 +52,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     ledger = kept.stage("claims", tuple[Claim, ...], lambda done: claims.compute(runner, depth, done))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
+    broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)
     bulk = kept.stage("bulk impacts", Numbers, lambda done: properties.bulk(depth, done))
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
     hard = kept.stage("hard cases", tuple[HardCase, ...], lambda done: hard_cases.compute(runner, done))
@@ -41,9 +61,9 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
     evidence = Evidence(
-        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, cross_checks=checks,
-        hard_cases=hard, effects=needed, topics=topics, provenance=collect_provenance(seeds=(properties.SEED,)),
-        manifest=manifest(runner, kept.paths, out), bulk=bulk,
+        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
+        cross_checks=checks, hard_cases=hard, effects=needed, topics=topics,
+        provenance=collect_provenance(seeds=(properties.SEED,)), manifest=manifest(runner, kept.paths, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)
 

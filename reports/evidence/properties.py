@@ -1,8 +1,8 @@
-"""Stage: the laws on random and nasty impacts, the planted faults, and the bulk study of energy gains."""
+"""Stages: the laws on random impacts, engine and trajectories, the planted faults; the bulk study of energy gains."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from reports.figures.figure import Numbers
@@ -10,33 +10,83 @@ from reports.pages.records import Property
 
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
 COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
+KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
+ENGINE_CASES, ROOMS, FAULT_CASES = 300, 20, 60
+TRAJECTORIES, TRAJECTORY_STEPS = 60, 300
 SEED = 20050601
 Progress = Callable[[int, int], None]
 
 
 def compute(progress: Progress) -> tuple[Property, ...]:
-    """Every law of the kit on our resolver, each with a planted fault that must break it."""
-    from iapb import resolve_impact
-    from verification.properties import LAWS, PLANTED_BUGS, check_passivity
+    """Every law on our resolver, on what else the engine does, and along trajectories; each with a planted fault."""
+    from verification.properties import LAWS
+    from verification.properties.engine_laws import ENGINE_LAWS
+    from verification.properties.trajectory_laws import TRAJECTORY_LAWS
 
-    report = check_passivity(resolve_impact, impacts=1500, search=0)
+    records: list[Property] = []
+    total = len(LAWS) + len(ENGINE_LAWS) + len(TRAJECTORY_LAWS)
+    for record in (*_impact_laws(), *_engine_laws(), *_trajectory_laws()):
+        records.append(record)
+        progress(len(records), total)
+    return tuple(records)
+
+
+def _impact_laws() -> Iterator[Property]:
+    """The kit on our resolver; a law that no planted bug names has none."""
+    from iapb import resolve_impact
+    from verification.properties import PLANTED_BUGS, check_passivity
+
     first: dict[str, tuple[str, Any]] = {}
     for name, bug in PLANTED_BUGS.items():
         first.setdefault(bug.caught_by, (name, bug))
-    records = []
-    for done, verdict in enumerate(report.verdicts):
-        progress(done, len(LAWS))
+    report = check_passivity(resolve_impact, impacts=KIT_IMPACTS, search=0)
+    for verdict in report.verdicts:
         fault, caught = "", None
         if verdict.law in first:
             fault, bug = first[verdict.law]
-            broken = check_passivity(bug.make(), impacts=400, search=0)
+            broken = check_passivity(bug.make(), impacts=FAULT_IMPACTS, search=0)
             caught = verdict.law in broken.broken_laws
-        worst = verdict.worst
-        records.append(Property(
-            verdict.statement, verdict.checked, f"{worst.value:.1e}" if worst else "does not apply",
-            f"{worst.tolerance:.1e}" if worst else "", verdict.passed, fault.replace("_", " "), caught))
-    progress(len(LAWS), len(LAWS))
-    return tuple(records)
+        yield _property(verdict.statement, verdict.checked, verdict.worst, verdict.passed, fault, caught)
+
+
+def _engine_laws() -> Iterator[Property]:
+    import numpy as np
+
+    from verification.properties.engine_laws import ENGINE_LAWS, judge_engine_law
+    from verification.properties.planted_engine import PLANTED_ENGINE_FAULTS
+
+    for name in ENGINE_LAWS:
+        cases = ROOMS if name == "group_splitting" else ENGINE_CASES
+        verdict, (fault, make) = judge_engine_law(name, cases=cases, seed=SEED), PLANTED_ENGINE_FAULTS[name]
+        with np.errstate(all="ignore"):  # the faults compute with what overflows
+            caught = not judge_engine_law(name, make(), cases=min(cases, FAULT_CASES), seed=SEED).passed
+        yield _property(verdict.statement, verdict.checked, verdict.worst, verdict.passed, fault, caught)
+
+
+def _trajectory_laws() -> Iterator[Property]:
+    import numpy as np
+
+    from verification.properties.planted_trajectory import PLANTED_TRAJECTORY_FAULTS, first_occasion
+    from verification.properties.scenes import draw_scene
+    from verification.properties.tally import residual_count
+    from verification.properties.trajectory_laws import TRAJECTORY_LAWS, Trajectory, judge_run
+
+    rng = np.random.default_rng(SEED)
+    scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
+    judged = [dict(judge_run(scene.simulate())) for scene in scenes]
+    for name, law in TRAJECTORY_LAWS.items():
+        found = residual_count(residuals[name] for residuals in judged if name in residuals)
+        run = first_occasion(name, scenes)
+        residual = law.check(Trajectory(run)) if run is not None else None
+        caught = residual is not None and not residual.passed
+        fault = PLANTED_TRAJECTORY_FAULTS[name].__name__
+        statement = f"along a trajectory: {law.statement}"
+        yield _property(statement, found.checked, found.worst, not found.failures, fault, caught)
+
+
+def _property(law: str, cases: int, worst: Any, holds: bool, fault: str, caught: bool | None) -> Property:
+    return Property(law, cases, f"{worst.value:.1e}" if worst else "does not apply",
+                    f"{worst.tolerance:.1e}" if worst else "", holds, fault.replace("_", " "), caught)
 
 
 def bulk(depth: str, progress: Progress) -> Numbers:

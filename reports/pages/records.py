@@ -62,6 +62,21 @@ class Property:
 
 
 @dataclass(frozen=True)
+class Counterexample:
+    """The smallest input found that breaks a law.
+
+    who : the resolver or strategy; law : in words; sentence : what happens, with its number
+    given : (name, value) of the input and of what came out; test : source to paste, empty where there is none
+    """
+
+    who: str
+    law: str
+    sentence: str
+    given: tuple[tuple[str, str], ...]
+    test: str = ""
+
+
+@dataclass(frozen=True)
 class CrossCheck:
     """A quantity of the engine against somebody else's."""
 
@@ -159,6 +174,7 @@ class Evidence:
     claims: tuple[Claim, ...] = ()
     proofs: tuple[ProofRecord, ...] = ()
     properties: tuple[Property, ...] = ()
+    counterexamples: tuple[Counterexample, ...] = ()
     cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
     bulk: Numbers | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from verification.properties.laws import LAWS as LAWS
     from verification.properties.laws import UNEQUAL_LAWS as UNEQUAL_LAWS
     from verification.properties.passivity_report import PassivityReport as PassivityReport
-    from verification.properties.planted import PLANTED_BUGS as PLANTED_BUGS
-    from verification.properties.planted import sound_resolver as sound_resolver
+    from verification.properties.planted_bugs import PLANTED_BUGS as PLANTED_BUGS
+    from verification.properties.sound import sound_resolver as sound_resolver
 
 _HOME = {
     "BulkImpacts": "bulk",
@@ -26,8 +26,8 @@ _HOME = {
     "check_passivity": "kit",
     "LAWS": "laws",
     "UNEQUAL_LAWS": "laws",
-    "PLANTED_BUGS": "planted",
-    "sound_resolver": "planted",
+    "PLANTED_BUGS": "planted_bugs",
+    "sound_resolver": "sound",
 }
 
 __all__ = sorted(_HOME)

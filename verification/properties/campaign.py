@@ -20,7 +20,7 @@ from verification.properties.engine_laws import ENGINE_LAWS
 from verification.properties.families import draw_case, with_unequal_restitution
 from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.scenes import draw_scene
-from verification.properties.tally import residual_of
+from verification.properties.tally import LawCount, added, one_count, residual_of
 from verification.properties.trajectory_laws import judge_run
 from verification.threads import one_thread
 
@@ -51,16 +51,6 @@ class Batch:
     part: str
     first: int
     count: int
-
-
-@dataclass(frozen=True)
-class LawCount:
-    """One law over one batch; `worst` is the residual nearest to its tolerance, or furthest above it."""
-
-    law: str
-    checked: int
-    failures: int
-    worst: LawResidual
 
 
 @dataclass(frozen=True)
@@ -132,29 +122,10 @@ def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | N
             case = drawn(batch.part, index, subject)
             results, run = residuals(batch.part, case, subject)
             for law, residual in results.items():
-                counts[law] = _counted(counts.get(law), law, residual)
+                one = one_count(law, residual)
+                counts[law] = added(counts[law], one) if law in counts else one
                 if not residual.passed and sum(one.law == law for one in found) < STORED_PER_LAW:
                     found.append(Found(law, batch.part, index, residual, case, run))
             if progress is not None:
                 progress(index + 1 - batch.first)
     return BatchOutcome(tuple(counts.values()), tuple(found), time.perf_counter() - started)
-
-
-def _counted(so_far: LawCount | None, law: str, residual: LawResidual) -> LawCount:
-    if so_far is None:
-        return LawCount(law, 1, int(not residual.passed), residual)
-    worst = residual if residual.ratio > so_far.worst.ratio else so_far.worst
-    return LawCount(law, so_far.checked + 1, so_far.failures + (not residual.passed), worst)
-
-
-def merged(counts: Iterator[LawCount]) -> dict[str, LawCount]:
-    """Return the counts of many batches, law by law."""
-    totals: dict[str, LawCount] = {}
-    for one in counts:
-        known = totals.get(one.law)
-        if known is None:
-            totals[one.law] = one
-            continue
-        worst = one.worst if one.worst.ratio > known.worst.ratio else known.worst
-        totals[one.law] = LawCount(one.law, known.checked + one.checked, known.failures + one.failures, worst)
-    return totals

@@ -13,8 +13,8 @@ from verification.properties.case import Floats
 from verification.properties.engine_laws import ENGINE_LAWS, EngineLaw, judge_engine_law
 from verification.properties.engine_laws.device_limits import saturated
 from verification.properties.engine_laws.hand_port import Wall
-from verification.properties.planted import sound_resolver
 from verification.properties.scenes import SceneCase
+from verification.properties.sound import sound_resolver
 
 __all__ = ["ENGINE_LAWS", "PLANTED_ENGINE_FAULTS", "EngineLaw", "judge_engine_law"]
 

@@ -1,7 +1,8 @@
-"""The verdict on one law in the making, impact by impact."""
+"""The verdict on one law in the making, impact by impact; and counts of many cases that can be added."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,3 +50,33 @@ def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) 
         return law.check(case, resolver, bounds), ""
     except ResolverFault as fault:
         return LawResidual("", np.inf, 0.0), str(fault)
+
+
+@dataclass(frozen=True)
+class LawCount:
+    """One law over some cases; `worst` is the residual nearest to its tolerance, or furthest above it."""
+
+    law: str
+    checked: int
+    failures: int
+    worst: LawResidual | None
+
+
+def one_count(law: str, residual: LawResidual) -> LawCount:
+    """Count a single case."""
+    return LawCount(law, 1, int(not residual.passed), residual)
+
+
+def added(one: LawCount, other: LawCount) -> LawCount:
+    """Add the counts of two sets of cases of one law."""
+    residuals = [count.worst for count in (one, other) if count.worst is not None]
+    worst = max(residuals, key=lambda residual: residual.ratio, default=None)
+    return LawCount(one.law, one.checked + other.checked, one.failures + other.failures, worst)
+
+
+def residual_count(residuals: Iterable[LawResidual]) -> LawCount:
+    """Count many cases of one law."""
+    total = LawCount("", 0, 0, None)
+    for residual in residuals:
+        total = added(total, one_count(residual.law, residual))
+    return total

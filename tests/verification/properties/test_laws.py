@@ -12,7 +12,7 @@ from iapb import resolve_impact
 from verification.properties.bounds import FACTORED, KIT
 from verification.properties.case import ImpactCase, LawResidual
 from verification.properties.laws import LAWS
-from verification.properties.planted import sound_resolver
+from verification.properties.sound import sound_resolver
 from verification.properties.strategies import impact_cases
 
 
