@@ -177,7 +177,8 @@ def test_effects_lists_each_with_its_reason(iapb):
 
 def test_schema_prints_a_json_schema(iapb):
     status, out, _ = iapb("schema")
-    assert status == 0 and "bodies" in json.loads(out)["properties"]
+    parts = json.loads(out)["$defs"]
+    assert status == 0 and all("bodies" in parts[kind]["properties"] for kind in ("Scene", "SpatialScene"))
 
 
 def test_prove_prints_one_proof(iapb):

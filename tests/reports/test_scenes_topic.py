@@ -1,0 +1,104 @@
+"""The topic of the scenes and its figures: sentences from records, strips, outlines in space as the engine has them."""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iapb import find_scene, load_scene
+from iapb.run import Run
+from iapb.scene_mechanism import mechanism_of
+from iapb.simulation import simulate
+from reports.evidence import scenes
+from reports.evidence.runs import FIGURE_RUNS
+from reports.figures import scenes_ledger, scenes_space
+from reports.figures.spatial import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
+from reports.pages.records import LIMITED, REFUTED, REPRODUCED, Topic
+from verification.studies.open_books import OpenBooks
+from verification.studies.scene_measures import SceneMeasure, measure
+
+SPACE = ("peg_hole_space", "arm_obstacles", "tumbling_body")
+NAMES = ("peg_corner", *SPACE)
+
+
+@pytest.fixture(scope="module")
+def runs() -> tuple[Run, ...]:
+    return tuple(simulate(load_scene(find_scene(name)), world="IAPB") for name in NAMES)
+
+
+@pytest.fixture(scope="module")
+def measures(runs: tuple[Run, ...]) -> tuple[SceneMeasure, ...]:
+    return tuple(measure(run) for run in runs)
+
+
+BOOKS = tuple(OpenBooks(name, (1, 2, 4), (0.04, 0.02, 0.01), 1, 1.0) for name in NAMES)
+
+
+@pytest.fixture(scope="module")
+def topic(runs: tuple[Run, ...], measures: tuple[SceneMeasure, ...]) -> Topic:
+    return scenes.topic_of(runs, measures, BOOKS)
+
+
+def test_sentences_say_the_numbers(topic: Topic, measures: tuple[SceneMeasure, ...]) -> None:
+    deepest = max(measures, key=lambda m: m.penetration)
+    assert f"{1e3 * deepest.penetration:.2f} mm ({deepest.scene})" in topic.findings[0].sentence
+    assert all(finding.sentence.endswith(".") for finding in topic.findings)
+    assert {finding.outcome for finding in topic.findings} <= {REPRODUCED, LIMITED}
+    assert "4 scenes, 3 of them in space" in topic.verdict
+
+
+def test_worse_records_are_judged_worse(runs: tuple[Run, ...], measures: tuple[SceneMeasure, ...]) -> None:
+    gaining = replace(runs[0], impacts=replace(runs[0].impacts, energy_lost=-runs[0].impacts.energy_lost))
+    stuck = tuple(replace(books, order=0.1) for books in BOOKS)
+    broken = (replace(measures[0], complete=False, ending="stopped: a fault"), *measures[1:])
+    outcomes = [f.outcome for f in scenes.topic_of((gaining, *runs[1:]), broken, stuck).findings]
+    assert outcomes[1] == REFUTED and outcomes[2] == LIMITED and outcomes[5] == REFUTED
+
+
+def test_strips_show_every_joule(topic: Topic, measures: tuple[SceneMeasure, ...]) -> None:
+    strips = scenes_ledger.strips(topic.tables["books over time"])
+    for strip, found in zip(strips, measures, strict=True):
+        gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
+        assert gap == pytest.approx(found.book.unexplained, abs=1e-9 * found.book.turned_over)
+        assert strip.struck.any() == (found.impacts > 0)
+
+
+def test_figures_are_drawn_and_can_stand_in_a_page(topic: Topic, runs: tuple[Run, ...]) -> None:
+    inputs = {f"scene-ledger/{name}": table for name, table in topic.tables.items()}
+    inputs |= {name: runs[NAMES.index(FIGURE_RUNS[name][0])] for name in scenes_space.RECIPE.needs}
+    for recipe in (scenes_ledger.RECIPE, scenes_space.RECIPE):
+        figure = recipe.draw(inputs)
+        for panel in figure.panels:
+            ElementTree.fromstring(panel.svg)
+            assert panel.alt and not re.search("nan", panel.svg)
+
+
+@pytest.mark.parametrize("name", SPACE)
+def test_outlines_stand_where_the_engine_has_the_bodies(runs: tuple[Run, ...], name: str) -> None:
+    run = runs[NAMES.index(name)]
+    mechanism = mechanism_of(load_scene(find_scene(name)))
+    for q in (run.q[0], run.q[run.steps // 2], run.q[-1]):
+        rotation, origin = mechanism.placements(q)
+        for body, place in body_placements(run.scene_resolved, q).items():
+            index = mechanism.index(body)
+            assert np.abs(place.rotation - rotation[index]).max() < 1e-14
+            assert np.abs(place.origin - origin[index]).max() < 1e-14
+
+
+def test_half_of_a_box_is_seen() -> None:
+    faces = cuboid_faces(placement((1, 2, 3), (0.3, -0.2, 0.9)), (1, 2, 3))
+    assert sum(view(0.7, 0.4).faces_reader(ring) for ring in faces) == 3
+
+
+def test_the_box_of_an_inertia_has_that_inertia() -> None:
+    body = {"mass": 0.3, "inertia": [1e-3, 2e-3, 2.8e-3]}
+    a, b, c = cuboid_of_inertia(body)
+    assert [0.3 / 12 * (b * b + c * c), 0.3 / 12 * (c * c + a * a), 0.3 / 12 * (a * a + b * b)] == pytest.approx(
+        body["inertia"]
+    )
+    assert math.isfinite(a * b * c)
