@@ -20,7 +20,8 @@ COLUMNS = (
 _NOTES = {
     "impact": "Gain exact, (KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric; median time of a call.",
     "motion": "Gain: the most energy ever made, as a share of what was there or was fed in; error: distance from the "
-              "law, in the case's own unit; median time of a step.",
+              "law, in the case's own unit; restitution of its collisions, weighted by the impulses; median time of "
+              "a step.",
 }  # fmt: skip
 
 

@@ -83,12 +83,13 @@ class HardCase:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a trajectory case asks of a run; a NaN error is not judged.
+    """What a trajectory case asks of a run.
 
     Attributes
     ----------
     energy_gain, energy_bound : see `verification.hard_cases.energy.largest_gain`.
-    error, error_bound : distance from the law, and what the world's own step and stiffness excuse.
+    error, error_bound : distance from the law, and what the world's own step and stiffness excuse; a bound of NaN
+        shows the distance and does not judge it.
     """
 
     energy_gain: float

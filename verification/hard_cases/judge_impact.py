@@ -14,12 +14,11 @@ from iapb.errors import IapbError
 from verification.hard_cases.bounded import Answer, OutOfMemory, TimedOut, bounded_impact
 from verification.hard_cases.case import EPS, Floats, HardCase
 from verification.hard_cases.frictional import FrictionalCase
-from verification.hard_cases.verdict import HardCaseVerdict
+from verification.hard_cases.verdict import RESTITUTION_TOLERANCE, HardCaseVerdict
 
 WITHOUT_CLAMP = "factored, no clamp"
 NEWTON_COULOMB = "Newton with Coulomb"  # friction at an impact as Kane and Levinson found it
 METHODS = ("factored", WITHOUT_CLAMP, "gram_pinv", "gram_cholesky", "damped", "svd")
-RESTITUTION_TOLERANCE = 1e-8  # as the kit asks of anybody's resolver
 _MARGIN = 100.0  # constant before d ε √κ(M) (√κ(M) + κ(A)), the first-order error of whitening and of the basis
 _REPEATS = 5  # their median is reported; the first call, which fills caches, is not among them
 _SLOW = 0.2  # a call of more seconds is not repeated

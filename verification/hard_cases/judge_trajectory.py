@@ -11,7 +11,8 @@ from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.hard_cases.case import Measured, TrajectoryCase
-from verification.hard_cases.verdict import HardCaseVerdict
+from verification.hard_cases.restitution import restitution_residual
+from verification.hard_cases.verdict import RESTITUTION_TOLERANCE, HardCaseVerdict
 
 Simulate = Callable[[Scene, str], Run]
 
@@ -37,17 +38,19 @@ def judge_trajectory(case: TrajectoryCase, world: str, simulate: Simulate = run_
     except IapbError as error:
         verdict = "refused" if isinstance(error, ValueError) else "failed"
         return HardCaseVerdict(case.name, world, verdict, str(error), exact_rank=None)
-    found = case.measure(run)
+    found, residual = case.measure(run), restitution_residual(run)
     return HardCaseVerdict(
-        case.name, world, _verdict(found), "", found.energy_gain, found.energy_bound, math.nan, found.error,
-        found.error_bound, int(run.impacts.rank.max(initial=0)), None, float(run.impacts.clamp.min(initial=1.0)),
-        _seconds_per_step(run),
+        case.name, world, _verdict(found, residual), "", found.energy_gain, found.energy_bound, residual,
+        found.error, found.error_bound, int(run.impacts.rank.max(initial=0)), None,
+        float(run.impacts.clamp.min(initial=1.0)), _seconds_per_step(run),
     )  # fmt: skip
 
 
-def _verdict(found: Measured) -> str:
+def _verdict(found: Measured, residual: float) -> str:
     if not found.energy_gain <= found.energy_bound:
         return "gains energy"
+    if residual > RESTITUTION_TOLERANCE:  # NaN: no collision to judge
+        return "restitution unmet"
     if not (math.isnan(found.error_bound) or found.error <= found.error_bound):
         return "wrong motion"
     return "stable"

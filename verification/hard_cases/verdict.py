@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+RESTITUTION_TOLERANCE = 1e-8  # as the kit asks of anybody's resolver
 _NONE = float("nan")
 
 
@@ -18,7 +19,8 @@ class HardCaseVerdict:
     note : the error's words where there is no answer.
     energy_gain : impacts (KE⁺ − KE⁻)/KE⁻ exactly, trajectories the largest gain at any instant, as a share of what
         the motion started with or was fed.  energy_bound : what rounding (10 d ε √κ(M)) or the step excuses.
-    restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the fastest approach left, likewise.
+    restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the fastest approach left,
+        likewise; trajectories: see `verification.hard_cases.restitution`.
     forward_error : |v⁺ − truth| / |v⁻| in the kinetic metric, or the case's own distance from its law.
     forward_bound : what the conditioning, or the law's own step and stiffness, excuses.
     rank, exact_rank : as used, and of the meant Jacobian; trajectories: the largest rank of an impact, and None.

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from verification.hard_cases import HARD_CASES, HardCase
+from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge_hard_case
 from verification.hard_cases.chatter import exact_height
 from verification.hard_cases.frictional import FrictionalCase
 from verification.hard_cases.poisson import exact_poisson
@@ -77,3 +77,22 @@ def test_the_chattering_ball_reaches_a_quarter_of_the_height_each_time(bounce: i
     top = starts + fall * 0.5 ** (bounce + 1)
     heights = exact_height(np.array([0.0, starts, top]))
     assert heights == pytest.approx([0.1, 0.0, 0.1 * 0.25 ** (bounce + 1)], abs=1e-12)
+
+
+def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
+    """The engine's collisions meet e exactly; a planted fault, the impulse a tenth too large, does not."""
+    from dataclasses import replace
+
+    from verification.hard_cases.judge_trajectory import run_in_world
+    from verification.hard_cases.restitution import restitution_residual
+
+    case = HARD_CASES["chatter"]()
+    assert isinstance(case, TrajectoryCase)
+    run = run_in_world(case.scene, "IAPB")
+    assert restitution_residual(run) < 1e-12
+    found = run.impacts
+    stronger = replace(found, v_plus=found.v_plus + 0.1 * (found.v_plus - found.v_minus))
+    faulty = replace(run, impacts=stronger)
+    assert restitution_residual(faulty) == pytest.approx(0.1 / 1.1)
+    assert judge_hard_case(case, "IAPB", lambda scene, world: faulty).verdict == "restitution unmet"
+    assert np.isnan(restitution_residual(run_in_world(case.scene, "PB")))
