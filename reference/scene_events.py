@@ -4,7 +4,8 @@ Between events M a = f − B − G + Jᵀλ with the closed contacts held (J a +
 or a λ that ends. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling the
 device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one
 on the device at the same instant. This is what the "ideal" world's steps must converge to, for scenes whose
-coordinates may be added and whose impacts do not accumulate within the duration asked for.
+impacts do not accumulate within the duration asked for. Configurations with quaternions or (cos, sin) move by their
+rate dq/dt, and are brought back to length one wherever they are looked at.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from iapb.scene import Scene
 from iapb.system import System
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
+from reference.configurations import configuration_rate, of_length_one
 from reference.contact_rows import find_rows, identities
 from reference.rigid_step import nearest_velocity
 
@@ -40,9 +42,11 @@ class SceneTruth:
     """The motion: v and q by time, and the instants of its events.
 
     segments : (start, stop, solution) with solution(t) -> (q, v, device q, device v)
+    coordinates, velocities : lengths of q and v
     """
 
     coordinates: int
+    velocities: int
     segments: tuple[tuple[float, float, Callable[[float], Floats]], ...]
     events: tuple[float, ...]
 
@@ -57,8 +61,8 @@ class SceneTruth:
         found = np.array([
             self.segments[max(0, int(np.searchsorted(starts, t, side="right")) - 1)][2](float(t)) for t in time
         ])  # fmt: skip
-        d = self.coordinates
-        return found[:, :d], found[:, d : 2 * d]
+        nq = self.coordinates
+        return found[:, :nq], found[:, nq : nq + self.velocities]
 
 
 @dataclass
@@ -73,18 +77,20 @@ class _Motion:
     def __post_init__(self) -> None:
         self.system = System(self.scene)
         mechanism = self.system.mechanism
-        if mechanism.nq != mechanism.nv:
-            raise ArgumentError("scene", self.scene.name, "a scene whose coordinates may be added")
-        self.d = mechanism.nv
+        if self.coupled and mechanism.nq != mechanism.nv:
+            raise ArgumentError("scene", self.scene.name, "with a coupling, a scene whose coordinates may be added")
+        self.d, self.nq = mechanism.nv, mechanism.nq
         self.tool = slice(*self.system.tool_dofs)
         self.device = self.system.device_mechanism() if self.coupled else None
         settings = self.scene.device
         self.drag = np.asarray(settings.damping if settings is not None and settings.damping else 0.0)
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """q, v, device q, device v of a state."""
-        d, t = self.d, self.tool.stop - self.tool.start if self.coupled else 0
-        return state[:d], state[d : 2 * d], state[2 * d : 2 * d + t], state[2 * d + t :]
+        """q, v, device q, device v of a state; q of length one where it turns."""
+        nq, t = self.nq, self.tool.stop - self.tool.start if self.coupled else 0
+        both = nq + self.d
+        q = of_length_one(self.system.mechanism, state[:nq])
+        return q, state[nq:both], state[both : both + t], state[both + t :]
 
     def rows(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
         """Gap and row (d,) of every candidate contact."""
@@ -108,10 +114,11 @@ class _Motion:
             return np.zeros(size)
         body = mechanism.index(hand.body)
         rotations, origins = mechanism.placements(q)
-        point = origins[body] + rotations[body] @ np.array([*hand.point, 0.0])
-        wrench = np.array([hand.force[0], hand.force[1], 0.0])
-        turning = mechanism.frame_jacobian(q, body)[5] * hand.force[2]
-        return np.asarray(mechanism.point_jacobian(q, body, point).T @ wrench + turning, np.float64)
+        point = origins[body] + rotations[body] @ np.array([*hand.point, 0.0])[:3]
+        wrench = np.zeros(6)
+        wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
+        turning = mechanism.frame_jacobian(q, body)[3:].T @ wrench[3:]
+        return np.asarray(mechanism.point_jacobian(q, body, point).T @ wrench[:3] + turning, np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:
         gains = self.scene.couplings.four_channel
@@ -134,7 +141,7 @@ class _Motion:
     def _held_rows(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Rows (k, d) of the held contacts and J̇v (k,), by central difference along the motion."""
         here = self.rows(q, v)
-        ahead, behind = (self.rows(q + s * _DIFFERENCE * v, v) for s in (1.0, -1.0))
+        ahead, behind = (self.rows(self.system.mechanism.integrate(q, v, s * _DIFFERENCE), v) for s in (1.0, -1.0))
         rows = np.array([here[name][1] for name in self.held])
         turn = [(ahead[n][1] - behind[n][1]) @ v / (2.0 * _DIFFERENCE) for n in self.held]
         return rows, np.array(turn)
@@ -144,7 +151,7 @@ class _Motion:
         q, v, device_q, device_v = self.split(state)
         acceleration, push = self.acceleration(state)
         if self.device is None:
-            return np.concatenate([v, acceleration])
+            return np.concatenate([configuration_rate(self.system.mechanism, q, v), acceleration])
         contact = (np.array([self.rows(q, v)[n][1] for n in self.held]).T @ push) if self.held else np.zeros(self.d)
         force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
@@ -188,7 +195,7 @@ def scene_truth(scene: Scene, duration: float, coupled: bool = False, most_event
     Raises
     ------
     ArgumentError
-        A scene whose coordinates may not be added, or without the gains of the coupling.
+        A coupling in a scene whose coordinates may not be added, or without the gains of the coupling.
     SolverError
         More events than `most_events`: they accumulate, or chatter.
     """
@@ -204,7 +211,7 @@ def scene_truth(scene: Scene, duration: float, coupled: bool = False, most_event
         segments.append((now, float(solution.t[-1]), solution.sol))
         now, state = float(solution.t[-1]), solution.y[:, -1]
         if now >= duration:
-            return SceneTruth(motion.d, tuple(segments), tuple(events))
+            return SceneTruth(motion.nq, motion.d, tuple(segments), tuple(events))
         events.append(now)
     raise SolverError(f"{scene.name}: more than {most_events} events before {now:.4g} s: they accumulate")
 

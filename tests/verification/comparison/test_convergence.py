@@ -10,9 +10,13 @@ import pytest
 from iapb.scene_files import scene_names
 from reference.time_stepping import RigidConstraints
 from verification.comparison.convergence import CASES, WITHOUT_TRUTH, TruthCase, converge
+from verification.comparison.truth_scenes import TRUTH_SCENES
 
 BY_SCENE = {case.scene: case for case in CASES}
-QUICK = ("two_link_arm_a", "peg_corner", "peg_hole", "bernoulli_balls", "arm_pushing")
+QUICK = (
+    "two_link_arm_a", "peg_corner", "peg_hole", "bernoulli_balls", "arm_pushing", "ball_dropped_in_space",
+    "box_dropped_in_space", "cradle_in_space", "arm_meets_a_wall_in_space",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("scene", QUICK)
@@ -36,6 +40,7 @@ def test_a_wrong_law_does_not_converge() -> None:
     assert not converge(TruthCase("peg_corner", 0.36, True, ""), law=_Halved()).first_order
 
 
-def test_the_scenes_with_and_without_a_truth_are_the_projects() -> None:
-    assert (set(BY_SCENE) | set(WITHOUT_TRUTH)) <= set(scene_names())
+def test_every_scene_of_the_project_has_a_truth_or_a_reason() -> None:
+    assert (set(BY_SCENE) | set(WITHOUT_TRUTH)) - set(TRUTH_SCENES) == set(scene_names())
+    assert set(TRUTH_SCENES) <= set(BY_SCENE)
     assert not set(BY_SCENE) & set(WITHOUT_TRUTH)
