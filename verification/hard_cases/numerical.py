@@ -66,7 +66,7 @@ def nearly_parallel_normals() -> HardCase:
     """Two normals 1e-6 apart, elastic: the energy gain of the printed formula."""
     return HardCase(
         "Nearly parallel normals, 1e-6 apart",
-        "a corner of two almost coplanar faces; erratum 6",
+        "a corner of two almost coplanar faces; normal equations: Higham (2002), chapter 20; erratum 6",
         "forming J M⁻¹ Jᵀ squares the condition number to 1e12",
         "rank 2, elastic, no gain",
         np.diag([1.0, 2.0, 3.0]),
@@ -86,7 +86,7 @@ def printed_formula_gains() -> HardCase:
     rows = np.vstack([base, base + 1e-4 * rng.normal(size=(2, d)), base + 1e-4 * rng.normal(size=(2, d))])
     return HardCase(
         "Rows 1e-4 apart on κ(M) = 1e6, elastic",
-        "erratum 6",
+        "erratum 6 of the paper; normal equations: Higham, Accuracy and Stability (2002)",
         "W has condition 1e8 from the rows and 1e6 from M: its small singular values are noise",
         "no gain; the printed formula inverts noise",
         0.5 * (mass + mass.T),
