@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
-from reports.figures.style import CYCLE, STYLES, line_arguments, series_legend, styled
+from reports.figures.style import CYCLE, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
 
 KEY, TITLE = "rigid-convergence", "The rigid world converges to event-driven truth"
@@ -30,8 +31,13 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     scenes = tuple(dict.fromkeys(row[SCENE] for row in rows))
     panels = tuple(Panel(_curves(rows, scenes, column), f"Errors of {label} against the step.", label)
                    for label, column in ERRORS.items())  # fmt: skip
-    legend = (*series_legend(scenes), ("first order", STYLES["bound"]))
+    legend = (*((scene, look(number)) for number, scene in enumerate(scenes)), ("first order", STYLES["bound"]))
     return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
+
+
+def look(number: int) -> LineStyle:
+    """A style for each scene; from the second round on with empty markers."""
+    return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE))
 
 
 def _curves(rows: list[dict[str, Any]], scenes: tuple[str, ...], column: str) -> str:
@@ -42,7 +48,7 @@ def _curves(rows: list[dict[str, Any]], scenes: tuple[str, ...], column: str) ->
         for number, scene in enumerate(scenes):
             curve = sorted((row[STEP], row[column]) for row in rows if row[SCENE] == scene and row[column] > _ROUNDING)
             if curve:
-                axes.plot(*zip(*curve, strict=True), **line_arguments(CYCLE[number % len(CYCLE)]))
+                axes.plot(*zip(*curve, strict=True), **line_arguments(look(number)))
                 drawn += curve
         if drawn:
             _slope(axes, drawn)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from verification.comparison.agreement_map import MapCell
-from verification.comparison.convergence import WITHOUT_TRUTH
+from verification.comparison.convergence import CASES, WITHOUT_TRUTH
 from verification.comparison.problem_study import ProblemStudy
 from verification.comparison.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
 from verification.comparison.study import ComparisonStudy
@@ -135,9 +135,10 @@ def ideal_world(study: ComparisonStudy) -> str:
         return ""
     apart = [row.scene for row in rows if not row.first_order]
     place = f"not on {', '.join(apart)}" if apart else "on all"
+    more = f" ({len(CASES) - len(rows)} more with --full)" if len(rows) < len(CASES) else ""
     orders = [order for row in rows for order in (row.position_order, row.velocity_order) if np.isfinite(order)]
-    return (f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes (positions in the "
-            f"sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
+    return (f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes{more} (positions "
+            f"in the sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
             f"{np.median(orders):.2f}); without a truth: {', '.join(WITHOUT_TRUTH)}.")
 
 

@@ -49,7 +49,8 @@ class Depth:
     truths: tuple[str, ...] | None
 
 
-QUICK_TRUTHS = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing")
+QUICK_TRUTHS = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing",
+                "ball_dropped_in_space")
 DEPTHS = {
     "quick": Depth(25, 40, 100, CONTACTS, 3, 0.4, QUICK_TRUTHS),
     "full": Depth(250, 300, 1000, CONTACTS, 7, 60.0, None),
