@@ -78,7 +78,7 @@ def _strip(name: str, numbers: Numbers) -> Strip:
     rows = [row[1:] for row in numbers.rows if row[0] == name]
     column = dict(zip(numbers.columns[1:], np.array(rows, dtype=float).T, strict=True))
     stored = column["potential [J]"] + column["springs [J]"]
-    at_rest = np.ptp(column["given [J]"]) + np.ptp(column["kinetic [J]"]) <= _STILL * np.abs(stored).max()
+    at_rest = np.ptp(column["given [J]"]) + column["kinetic [J]"].max() <= _STILL * np.abs(stored).max()
     lowest = stored.min()  # heights count from the lowest: only changes of a potential mean anything
     layers = np.array([sum(column[heading] for heading in headings) for headings, _, _ in LAYERS])
     layers[1] -= lowest

@@ -66,6 +66,7 @@ def test_strips_show_every_joule(topic: Topic, measures: tuple[SceneMeasure, ...
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
         assert gap == pytest.approx(found.book.unexplained, abs=1e-9 * found.book.turned_over)
         assert strip.struck.any() == (found.impacts > 0)
+        assert not strip.at_rest
 
 
 def test_figures_are_drawn_and_can_stand_in_a_page(topic: Topic, runs: tuple[Run, ...]) -> None:
