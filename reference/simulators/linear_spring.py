@@ -8,6 +8,10 @@ from __future__ import annotations
 
 from math import atan2, exp, log, pi, sqrt
 
+from iapb.errors import ArgumentError
+
+LOWEST = 0.14  # e of a spring that hardly swings; below, it creeps back and has no half period
+
 
 def spring_restitution(damping_ratio: float) -> float:
     """e of a spring and damper that do not pull; damping_ratio = b/(2 √k) in [0, 1)."""
@@ -17,7 +21,9 @@ def spring_restitution(damping_ratio: float) -> float:
 
 
 def damping_for(restitution: float, stiffness: float) -> float:
-    """b [1/s] for e in (0, 1] and k [1/s2] per unit of mass, by bisection."""
+    """b [1/s] for e in [LOWEST, 1] and k [1/s2] per unit of mass, by bisection."""
+    if restitution < LOWEST:
+        raise ArgumentError("restitution", restitution, f"at least {LOWEST}: a spring that swings")
     if restitution >= 1.0:
         return 0.0
     low, high = 0.0, 0.999

@@ -56,8 +56,8 @@ def verdict_of(records: Sequence[EngineRecord]) -> str:
     matched = [record for record in present if record.choice == "matched"]
     met = [sum(verdict(record) == "met" for record in group) for group in (own, matched)]
     scenes = len({record.scene for record in present})
-    return (f"{len(engines)} engines on {scenes} scenes of known outcome: the law is met in {met[0]} of {len(own)} runs "
-            f"at their own settings and in {met[1]} of {len(matched)} at 1 ms.")  # fmt: skip
+    return (f"{len(engines)} engines on {scenes} scenes of known outcome: the law is met in {met[0]} of {len(own)} "
+            f"runs at their own settings and in {met[1]} of {len(matched)} at 1 ms.")  # fmt: skip
 
 
 def errors_table(records: Sequence[EngineRecord]) -> Numbers:
@@ -74,7 +74,7 @@ def errors_table(records: Sequence[EngineRecord]) -> Numbers:
             record.creep, record.duration or None, record.failure,
         ))  # fmt: skip
     note = ("Errors are shares of the start's kinetic energy, of the sum of m |v| and of the largest speed; at rest "
-            "the rise is a share of m g times the bodies' size. A law is met within 1 %, at rest within 1 mm.")  # fmt: skip
+            "the rise is a share of m g times the bodies' size. A law is met within 1 %, at rest within 1 mm.")
     return Numbers(COLUMNS, tuple(rows), 2, note)
 
 

@@ -13,9 +13,9 @@ KEY, TITLE = "engine-errors", "Energy, momentum and overlap, by engine"
 INPUT = "engines/errors"
 CAPTION = (
     "A row for each engine and choice of settings, a column for each scene. First picture: by how much the energy at "
-    "the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at the end, as a "
-    "share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' size. "
-    "The numbers are powers of ten; 0 is below rounding. A cross is a run that failed, hatching an engine that "
+    "the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at the end, as "
+    "a share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' size. "
+    "The numbers are powers of ten; ε is rounding or nothing. A cross is a run that failed, hatching an engine that "
     "is not installed."
 )
 LEVELS = ((1e-6, BLUE, 0.75), (1e-2, SKY, 0.55), (1e-1, AMBER, 0.6), (float("inf"), VERMILION, 0.75))
@@ -79,10 +79,10 @@ def _cell(axes: Any, x: int, y: int, row: Mapping[str, Any], column: str) -> Non
 
 
 def exponent(value: float) -> str:
-    """The power of ten nearest to a value, as text; 0 below rounding."""
+    """The power of ten nearest to a value, as text; ε below rounding."""
     from math import log10
 
-    return "0" if value < ROUNDING else f"{round(log10(value)):+d}".replace("-", "\N{MINUS SIGN}")
+    return "ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", "\N{MINUS SIGN}")
 
 
 def _at(choice: str) -> str:

@@ -1,0 +1,73 @@
+"""Records of engines: measures see planted faults, verdicts and sentences follow from the records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError, MissingDependencyError
+from reference.simulators import find_simulator, fixed_scene
+from verification.engines import compare_engines, sentence, study, verdict
+from verification.engines.measures import measured
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    scene = fixed_scene("redundant_wedge")
+    rigid = find_simulator("rigid")
+    settings = rigid.settings(scene)
+    return scene, rigid.run(scene, settings, settings.step, scene.duration)
+
+
+def test_our_engine_meets_the_law_of_the_wedge():
+    records = compare_engines(["iapb", "rigid"], ["redundant_wedge"])
+    assert [verdict(record) for record in records] == ["met"] * 4
+    assert max(abs(record.energy_error) for record in records) < 1e-12
+    assert {record.choice for record in records} == {"own", "matched"}
+    assert all("step 1 ms" in record.settings for record in records)
+
+
+def test_a_faster_end_is_an_energy_gain_and_a_miss(wedge):
+    scene, motion = wedge
+    velocity = motion.velocity.copy()
+    velocity[-1] *= 1.1
+    fault = measured(scene, replace(motion, velocity=velocity))
+    assert measured(scene, motion)["energy_error"] == pytest.approx(0.0, abs=1e-12)
+    assert fault["energy_error"] == pytest.approx(0.21, rel=1e-9)
+    assert fault["energy_gain"] == pytest.approx(0.21, rel=1e-9)
+    assert fault["momentum_error"] == pytest.approx(0.1, rel=1e-9)
+
+
+def test_a_motion_that_is_no_number_is_a_failure(wedge):
+    scene, motion = wedge
+    velocity = motion.velocity.copy()
+    velocity[20:] = np.nan
+    assert "not a number from" in measured(scene, replace(motion, velocity=velocity))["failure"]
+
+
+def test_an_engine_that_is_absent_is_named_and_not_left_out(monkeypatch):
+    class Absent:
+        title = "Absent"
+
+        def version(self):
+            raise MissingDependencyError("absent", "The adapter", "pip install absent")
+
+    monkeypatch.setattr(study, "find_simulator", lambda name: Absent())
+    records = compare_engines(["mujoco"], ["resting_box"])
+    assert [verdict(record) for record in records] == ["not installed"] * 2
+    assert "pip install absent" in sentence(records)
+
+
+def test_an_engine_that_stops_is_a_result(monkeypatch):
+    rigid = find_simulator("rigid")
+    monkeypatch.setattr(type(rigid), "run", lambda *_: (_ for _ in ()).throw(RuntimeError("it broke")))
+    records = compare_engines(["rigid"], ["bernoulli"])
+    assert verdict(records[0]) == "failed"
+    assert "it broke" in sentence([records[0]])
+
+
+def test_depth_is_checked():
+    with pytest.raises(ArgumentError, match="quick or full"):
+        compare_engines(depth="deep")
