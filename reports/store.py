@@ -84,7 +84,10 @@ class RunStore:
     def __init__(self, folder: Path | str, code: str | None = None) -> None:
         self.folder = Path(folder)
         self.code = code
-        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
         remove_abandoned(self.folder)
 
     def key(self, inputs: Mapping[str, Any]) -> str:

@@ -20,14 +20,29 @@ _COMPRESSION_LEVEL = 4
 
 @contextmanager
 def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
-    """Give an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` in one step."""
+    """Give an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` in one step.
+
+    It is filled in memory, so that a disk that fails meets our write, not one somewhere inside the HDF5 library.
+
+    Raises
+    ------
+    RunFileError
+        If the disk or the folder does not take it; then nothing at `path` was changed.
+    """
     import h5py
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with written_aside(path, replace=replace) as aside:
-        with h5py.File(aside, "w") as file:
-            yield file
-        seal(aside)
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with written_aside(path, replace=replace) as aside:
+            aside.write_bytes(image)
+            seal(aside)
+    except OSError as error:
+        why = error.strerror or error
+        raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
 
 
 def write_text(group: Any, name: str, text: str) -> None:

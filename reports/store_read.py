@@ -50,7 +50,10 @@ def _check_format(file: Any, path: Path, expected: str) -> None:
         raise RunFileError(f"{path}: format is {found!r}: expected {expected!r}")
     version = int(file.attrs.get("format_version", 0))
     if version > FORMAT_VERSION:
-        raise RunFileError(f"{path}: format version is {version}: expected at most {FORMAT_VERSION}")
+        raise RunFileError(f"{path}: format version is {version}, of a later iapb: this one reads {FORMAT_VERSION}")
+    if version < FORMAT_VERSION:
+        raise RunFileError(f"{path}: format version is {version}, of an earlier iapb: this one reads {FORMAT_VERSION}; "
+                           "simulate the run again, it will be stored beside this file")
 
 
 def read_run(path: Path | str) -> Run:

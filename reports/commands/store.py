@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from reports.store_care import FileState
 
 
-class Action(str, Enum):
+class Action(StrEnum):
     """What to do with a folder of results."""
 
     check = "check"
@@ -22,8 +22,8 @@ class Action(str, Enum):
     again = "again"
 
 
-_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: remove what "
-           "nothing needs. again: simulate runs again and compare bit for bit.")
+_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: remove "
+           "what nothing needs. again: simulate runs again and compare bit for bit.")
 
 
 def store(
@@ -67,7 +67,8 @@ def _tell(states: Sequence[FileState]) -> None:
         if state.state != WHOLE:
             print(f"{state.path}: {state.state}: {state.why}")
     count = Counter(state.state for state in states)
-    print(f"{len(states)} files: " + (", ".join(f"{number} {state}" for state, number in count.most_common()) or "none"))
+    parts = ", ".join(f"{number} {state}" for state, number in count.most_common())
+    print(f"{len(states)} files: {parts or 'none'}")
 
 
 def _gc(where: Path, dry_run: bool) -> None:

@@ -47,6 +47,7 @@ SECTIONS: tuple[Section, ...] = (
     _topic("engines", "Other engines"),
     _topic("haptic-rate", "The haptic rate"),
     Section("effects", "Effects", lambda evidence: bool(evidence.effects)),
+    _topic("survival", "Runs that survive"),
     Section("provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
     Section("manifest", "Manifest", lambda evidence: bool(evidence.manifest)),
 )

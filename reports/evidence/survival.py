@@ -1,0 +1,65 @@
+"""Topic: what is left of the results after crashes, full disks and damaged files; and runs that come out the same."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+from reports.figures.figure import Numbers
+from reports.pages.records import REFUTED, REPRODUCED, Finding, Topic
+from reports.runner import Runner
+
+LEAD = (
+    "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
+    "store of runs; a fault is survived if every run that was finished is there and whole, and what is not whole says so."
+)
+TIMES = {"quick": 12, "full": 120}
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+    """Do every fault, and simulate the runs of the figures again from their files."""
+    from reports.faults import try_faults
+
+    with tempfile.TemporaryDirectory() as folder:
+        faults = try_faults(Path(folder), TIMES[depth], progress)
+    repeated = tuple(_repeated(runner))
+    tables = {"faults": _fault_table(faults), "simulated again": _repeated_table(repeated)}
+    findings = (_faults(faults), _repetitions(repeated))
+    verdict = f"{findings[0].sentence} {findings[1].sentence}"
+    return Topic("survival", "Runs that survive", LEAD, findings, tables, verdict)
+
+
+def _repeated(runner: Runner) -> Any:
+    from reports.resimulate import repeat_run
+
+    for name, (scene, values, world, rendering) in FIGURE_RUNS.items():
+        source = shipped_scene(scene, values)
+        runner(source, world, rendering)
+        path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
+        yield name, repeat_run(path)
+
+
+def _faults(faults: Any) -> Finding:
+    tried, survived, lost = (sum(getattr(fault, name) for fault in faults) for name in ("tried", "survived", "lost"))
+    return Finding(
+        f"Of {tried} faults of {len(faults)} kinds, {survived} were survived; {lost} finished results were lost.",
+        REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
+
+
+def _repetitions(repeated: Any) -> Finding:
+    same = sum(repetition.same for _, repetition in repeated)
+    return Finding(f"{same} of {len(repeated)} runs of the figures, simulated again from nothing but their own files, "
+                   "came out the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
+
+
+def _fault_table(faults: Any) -> Numbers:
+    rows = tuple((fault.fault, fault.tried, fault.survived, fault.lost, fault.said) for fault in faults)
+    return Numbers(("fault", "tried", "survived", "lost", "what one reads"), rows)
+
+
+def _repeated_table(repeated: Any) -> Numbers:
+    rows = tuple((name, one.stored[:16], one.again[:16], ", ".join(one.differs) or "nothing") for name, one in repeated)
+    return Numbers(("run", "content hash stored", "simulated again", "differs in"), rows)

@@ -1,0 +1,50 @@
+"""What may happen to a store, done to it: nothing finished is lost; and a careless writer would be caught."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.faults import FAULTS, try_faults
+from reports.faults.killed import killed_writer
+
+
+def test_nothing_finished_is_lost(tmp_path: Path) -> None:
+    records = try_faults(tmp_path, times=2)
+    assert [record.fault for record in records] == list(FAULTS)
+    for record in records:
+        assert (record.survived, record.lost) == (record.tried, 0), record
+
+
+def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The planted fault: straight into the target, unsynced and unsealed, said to be finished beforehand."""
+    import time
+
+    import reports.faults.killed as killed
+    from reports.faults.sample import inputs_of, open_store
+
+    def careless(folder: Path) -> None:
+        store = open_store(folder)
+        with store.path_of(inputs_of(0), "sample").open("wb") as file:
+            (folder / "finished").write_text("0\n")
+            while True:
+                file.write(b"\x89HDF\r\n\x1a\n" * 100)
+                file.flush()
+                time.sleep(1e-3)
+
+    monkeypatch.setattr(killed, "_write_for_ever", careless)
+    monkeypatch.setattr(killed, "whole", lambda store, number: _readable(store.path_of(inputs_of(number))))
+    tried, survived, lost, _ = killed_writer(tmp_path, 3)
+    assert (tried, survived) == (3, 0) or lost > 0
+
+
+def _readable(path: Path) -> bool:
+    from iapb.errors import RunFileError
+    from reports.store_read import read_run
+
+    try:
+        read_run(path)
+    except RunFileError:
+        return False
+    return True
