@@ -14,7 +14,8 @@ from reports.runner import Runner
 
 LEAD = (
     "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
-    "store of runs; a fault is survived if every run that was finished is there and whole, and what is not whole says so."
+    "store of runs; a fault is survived if every run that was finished is there and whole, and what is not whole says "
+    "so."
 )
 TIMES = {"quick": 12, "full": 120}
 
