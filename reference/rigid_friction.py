@@ -3,7 +3,8 @@
 The step's contacts as blocks (normal, one tangent in the plane or two in space): K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w
 is J v⁺ − b on the normals (b of `reference.rigid_step`) and the tangential velocity after the step; `relaxed` drops
 mu |w_T| (Anitescu). Contacts that the others' impulses do not make close are left out: solve for those that close,
-see which of the rest the answer closes, and solve again with them. The last answer solves the whole problem.
+see which of the rest the answer closes, and solve again with them. The last answer solves the whole problem. Contacts
+that no common body ties together (zero blocks of W) are problems of their own: islands.
 Source: Stewart and Trinkle (1996); Anitescu and Tasora, Comput. Optim. Appl. 47 (2010).
 """
 
@@ -59,12 +60,26 @@ def friction_step(
         offset = rows @ v_free
         offset[::size] -= bound[taken]
         response = np.linalg.solve(mass_matrix, rows.T)
-        problem = ImpactProblem.from_delassus(
-            rows @ response, offset, 0.0, friction, contact_size=size, relaxed=relaxed
-        )
-        impulse[taken] = _solve(problem).reshape(-1, size)
+        impulse[taken] = _by_islands(rows @ response, offset.reshape(-1, size), friction, relaxed)
         velocity = v_free + response @ impulse[taken].ravel()
     return velocity, impulse[:, 0], impulse[:, 1:]
+
+
+def _by_islands(w: Floats, offset: Floats, friction: float, relaxed: bool) -> Floats:
+    """Return p (k, size) for W (k size, k size) and offset (k, size) [m/s], island by island."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, size = offset.shape
+    blocks = w.reshape(count, size, count, size)
+    islands, island = connected_components((blocks != 0.0).any(axis=(1, 3)), directed=False)
+    impulse = np.zeros_like(offset)
+    for mine in (np.flatnonzero(island == k) for k in range(islands)):
+        part = blocks[np.ix_(mine, range(size), mine, range(size))].reshape(len(mine) * size, -1)
+        problem = ImpactProblem.from_delassus(
+            part, offset[mine].ravel(), 0.0, friction, contact_size=size, relaxed=relaxed
+        )
+        impulse[mine] = _solve(problem).reshape(-1, size)
+    return impulse
 
 
 def _solve(problem: ImpactProblem) -> Floats:

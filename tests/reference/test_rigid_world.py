@@ -100,6 +100,18 @@ def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int)
         assert v - v_free == pytest.approx(change, abs=1e-9)
 
 
+def test_contacts_without_a_common_body_are_solved_apart() -> None:
+    rng = np.random.default_rng(5)
+    one, other = rng.normal(size=(2, 3, 3, 6))
+    rows, v_free, bound = np.zeros((6, 3, 12)), rng.normal(size=12), np.zeros(6)
+    rows[::2, :, :6], rows[1::2, :, 6:] = one, other
+    v, normal, _ = friction_step(np.eye(12), v_free, rows[:, 0], rows[:, 1:], bound, 0.3)
+    for part, at in ((one, slice(0, 6)), (other, slice(6, 12))):
+        alone, _, _ = friction_step(np.eye(6), v_free[at], part[:, 0], part[:, 1:], np.zeros(3), 0.3)
+        assert v[at] == pytest.approx(alone, abs=1e-9)
+    assert (normal > 0.0).any()
+
+
 def test_a_step_without_solution_says_how_many_contacts_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rigid_friction, "FRICTION_TOLERANCE", -1.0)
     monkeypatch.setattr(rigid_friction, "CONVERGED", -1.0)
