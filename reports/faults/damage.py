@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -39,12 +40,14 @@ def foreign_file(folder: Path, times: int) -> tuple[int, int, int, str]:
 
 
 def _foreign(content: bytes) -> Iterator[Callable[[Path], None]]:
-    yield lambda path: path.write_bytes(b"") and None
-    yield lambda path: path.write_text("time,x\n0,1\n") and None
-    yield lambda path: path.write_bytes(content[: len(content) // 2]) and None
-    yield lambda path: path.write_bytes(content[:8]) and None
-    yield lambda path: path.write_bytes(content + b"tail") and None
+    """Nothing, a table, half of a run, its first bytes, a run with a tail, somebody else's HDF5."""
+    for wrong in (b"", b"time,x\n0,1\n", content[: len(content) // 2], content[:8], content + b"tail"):
+        yield partial(_put, wrong)
     yield _somebody_elses
+
+
+def _put(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
 
 
 def _somebody_elses(path: Path) -> None:
@@ -59,14 +62,10 @@ def other_version(folder: Path, times: int) -> tuple[int, int, int, str]:
     """Files of older and of newer format versions."""
     path, content = _stored(folder)
     versions = [v for v in range(1, 2 + FORMAT_VERSION) if v != FORMAT_VERSION]
-
-    def of_version(version: int) -> Callable[[Path], None]:
-        return lambda path: _with_version(path, content, version)
-
-    return _refused(path, [of_version(versions[k % len(versions)]) for k in range(times)])
+    return _refused(path, [partial(_with_version, content, versions[k % len(versions)]) for k in range(times)])
 
 
-def _with_version(path: Path, content: bytes, version: int) -> None:
+def _with_version(content: bytes, version: int, path: Path) -> None:
     import h5py
 
     path.write_bytes(content)
