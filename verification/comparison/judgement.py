@@ -74,9 +74,8 @@ def _energy(study: ComparisonStudy) -> str:
 
 
 def _scenes(study: ComparisonStudy) -> str:
-    """Agreement, impact by impact."""
-    cases = sum(c.cases for c in study.scenes)
-    return _by_share(sum(c.agree * c.cases for c in study.scenes) / cases)
+    """Whether all agree; where they differ is what the map shows, and refutes nothing."""
+    return REPRODUCED if all(c.agree == 1.0 for c in study.scenes) else LIMITED
 
 
 def _touching(study: ComparisonStudy) -> str:
