@@ -4,23 +4,29 @@ Moreau-Jean steps with theta; contacts by Siconos' own use of Bullet's detection
 impact law solved by nonsmooth Gauss-Seidel. Siconos prints to standard output: the answer goes to the file named last.
 """
 
+from __future__ import annotations
+
 import json
 import sys
+from typing import Any
 
 import numpy as np
-import siconos.kernel as sk
-import siconos.numerics as sn
-from siconos.mechanics.collision import (
+import siconos.kernel as sk  # type: ignore[import-not-found]
+import siconos.numerics as sn  # type: ignore[import-not-found]
+from siconos.mechanics.collision import (  # type: ignore[import-not-found]
     RigidBodyDS,
     SiconosBox,
     SiconosContactor,
     SiconosContactorSet,
     SiconosSphere,
 )
-from siconos.mechanics.collision.bullet import SiconosBulletCollisionManager, SiconosBulletOptions
+from siconos.mechanics.collision.bullet import (  # type: ignore[import-not-found]
+    SiconosBulletCollisionManager,
+    SiconosBulletOptions,
+)
 
 
-def shape_of(given):
+def shape_of(given: Any) -> Any:
     """A ball or a box without margins."""
     shape = SiconosSphere(given["radius"]) if "radius" in given else SiconosBox(*given["size"])
     shape.setInsideMargin(0.0)
@@ -28,7 +34,7 @@ def shape_of(given):
     return shape
 
 
-def contactors(shapes, kept):
+def contactors(shapes: Any, kept: list[Any]) -> Any:
     """Return the contactor set of shapes at their centres; `kept` holds what Siconos only refers to."""
     made = SiconosContactorSet()
     for given in shapes:
@@ -40,13 +46,13 @@ def contactors(shapes, kept):
     return made
 
 
-def pose(position, orientation):
+def pose(position: Any, orientation: Any) -> list[float]:
     """Return x, y, z, w, x, y, z."""
     x, y, z, w = orientation
     return [*position, w, x, y, z]
 
 
-def body_of(given, gravity, kept):
+def body_of(given: Any, gravity: Any, kept: list[Any]) -> Any:
     """A rigid body under gravity; the spin is given in body axes."""
     made = RigidBodyDS(pose(given["position"], given["orientation"]), [*given["velocity"], *given["local_spin"]],
                        given["mass"], np.diag(given["inertia"]))
@@ -57,7 +63,7 @@ def body_of(given, gravity, kept):
     return made
 
 
-def simulation_of(task, model, kept):
+def simulation_of(task: Any, model: Any, kept: list[Any]) -> Any:
     """The time-stepping with integrator, solver and collision manager."""
     options = SiconosBulletOptions()
     options.contactBreakingThreshold = task["contactBreakingThreshold"]
@@ -81,17 +87,18 @@ def simulation_of(task, model, kept):
     return simulation, solver
 
 
-def simulate(task):
+def simulate(task: Any) -> dict[str, Any]:
     """Return the samples [time, contacts, [[q, twist] per body]] and the largest residual of the solver."""
-    kept = []
+    kept: list[Any] = []
     model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
     bodies = [body_of(given, task["gravity"], kept) for given in task["bodies"]]
     for body in bodies:
         model.insertDynamicalSystem(body)
     simulation, solver = simulation_of(task, model, kept)
-    samples, worst, steps, last = [], 0.0, 0, round(task["duration"] / task["step"])
+    samples: list[Any] = []
+    worst, steps, last = 0.0, 0, round(task["duration"] / task["step"])
 
-    def sample(contacts):
+    def sample(contacts: int) -> None:
         states = [[body.q().tolist(), body.twist().tolist()] for body in bodies]
         samples.append([steps * task["step"], contacts, states])
 

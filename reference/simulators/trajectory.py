@@ -57,7 +57,8 @@ class Recorder:
     def add(self, time: float, position: Floats, orientation: Floats, velocity: Floats, spin: Floats,
             contacts: int) -> None:  # fmt: skip
         """Keep copies of one instant's (b, 3), (b, 4), (b, 3), (b, 3)."""
-        self._rows.append((time, *(np.array(part) for part in (position, orientation, velocity, spin)), contacts))
+        row = (time, np.array(position), np.array(orientation), np.array(velocity), np.array(spin), contacts)
+        self._rows.append(row)
 
     def trajectory(self) -> Trajectory:
         """All instants."""

@@ -64,17 +64,17 @@ def _cells(rows: list[dict[str, Any]], column: str, label: str) -> str:
 def _cell(axes: Any, x: int, y: int, row: Mapping[str, Any], column: str) -> None:
     from matplotlib.patches import Rectangle
 
-    corner, look = (x - 0.46, y - 0.44), {"linewidth": 0}
+    corner = (x - 0.46, y - 0.44)
     value = value_of(row, column)
     if row[LAW] == "not installed":
         axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor="none", edgecolor=MUTED, hatch="////", linewidth=0.4))
     elif row[LAW] == "failed":
         axes.plot(x, y, "X", color=VERMILION, markersize=7)
     elif value is None:
-        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=RULE, alpha=0.35, **look))
+        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=RULE, alpha=0.35, linewidth=0))
     else:
         color, strength = next((color, strength) for most, color, strength in LEVELS if value <= most)
-        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=color, alpha=strength, **look))
+        axes.add_patch(Rectangle(corner, 0.92, 0.88, facecolor=color, alpha=strength, linewidth=0))
         axes.text(x, y, exponent(value), ha="center", va="center", fontsize=8, color=INK)
 
 
