@@ -74,7 +74,7 @@ def _by_islands(w: Floats, offset: Floats, friction: float, relaxed: bool) -> Fl
     islands, island = connected_components((blocks != 0.0).any(axis=(1, 3)), directed=False)
     impulse = np.zeros_like(offset)
     for mine in (np.flatnonzero(island == k) for k in range(islands)):
-        part = blocks[np.ix_(mine, range(size), mine, range(size))].reshape(len(mine) * size, -1)
+        part = blocks[mine][:, :, mine].reshape(len(mine) * size, -1)
         problem = ImpactProblem.from_delassus(
             part, offset[mine].ravel(), 0.0, friction, contact_size=size, relaxed=relaxed
         )
