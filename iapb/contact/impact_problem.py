@@ -130,9 +130,12 @@ def _exponents(array: Floats) -> NDArray[np.int64]:
 
 
 def _ldexp(array: Floats, exponent: Any) -> Floats:
-    """array · 2^exponent, for any size of the exponent; overflow becomes infinity for the caller to refuse."""
+    """array · 2^exponent; overflow becomes infinity for the caller to refuse.
+
+    Exponents are sums of a few of doubles, far inside int32; the marks of zeros, some -1e5 each, are too.
+    """
     with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(array, np.clip(exponent, -5000, 5000).astype(np.int32))
+        return np.ldexp(array, exponent.astype(np.int32))
 
 
 def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -> ImpactInput:
