@@ -43,6 +43,10 @@ test: lint types imports pytest ## everything that must pass: ruff, mypy, import
 reproduce: setup ## regenerate every figure, table and claim into out/report.html
 	@$(BIN)/iapb reproduce
 
+.PHONY: verify
+verify: setup ## every law at 1,000,000 impacts and 5,000 trajectories; hours, and can be stopped and gone on with
+	@$(BIN)/iapb verify --full --workers $(PYTEST_WORKERS)
+
 .PHONY: lint
 lint: setup ## ruff
 	@$(BIN)/ruff check .

@@ -49,6 +49,8 @@ def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
 
 
 def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
+    if case.translations is not None:
+        yield replace(case, translations=None)
     for i in range(case.contacts):
         e = None if case.unequal is None else np.delete(case.unequal, i)
         yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=e)

@@ -18,7 +18,7 @@ from verification.properties.laws.free_motion import free_motion_is_kept
 from verification.properties.laws.groups import groups_do_not_interact
 from verification.properties.laws.impulse_range import impulse_comes_from_the_contacts
 from verification.properties.laws.kinetic_energy import kinetic_energy_never_rises
-from verification.properties.laws.momentum import momentum_is_conserved
+from verification.properties.laws.momentum import momentum_is_conserved, momentum_is_conserved_unequal
 from verification.properties.laws.no_impulse import minus_one_is_no_impulse
 from verification.properties.laws.redundancy import redundant_equals_reduced
 from verification.properties.laws.repeatability import same_input_same_output
@@ -61,3 +61,4 @@ UNEQUAL_LAWS: dict[str, Law] = {
     f"unequal_{name}": Law(f"{LAWS[name].statement}, unequal e", LAWS[name].check)
     for name in ("kinetic_energy", "impulse_range", "momentum", "repeatability", "arguments")
 }
+UNEQUAL_LAWS["unequal_momentum"] = UNEQUAL_LAWS["unequal_momentum"]._replace(check=momentum_is_conserved_unequal)

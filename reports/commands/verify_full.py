@@ -1,0 +1,55 @@
+"""`iapb verify --full` and `--recheck`: run the campaign and print what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from reports.campaign import Campaign, CampaignRequest
+
+ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
+_SHOWN = 20  # counterexamples listed; all are in their folder
+
+
+def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path) -> bool:
+    """Do what is missing, print a line per law; return whether all are kept. Another's resolver: impacts only."""
+    from reports.commands.progress import stage_progress
+    from reports.commands.verify import ENGINE
+    from verification.properties.campaign import IMPACTS, PARTS, plan
+
+    ours = resolver == ENGINE
+    bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
+    request = CampaignRequest(resolver, bounds, condition, impacts, trajectories, seed, workers)
+    request.subject()  # a name that cannot be imported is told here, not by a worker
+    batches, campaign = plan(impacts, trajectories, PARTS if ours else (IMPACTS,)), Campaign(out, request)
+    there = sum(campaign.path_of(batch).is_file() for batch in batches)
+    print(f"{len(batches)} batches in {campaign.folder}, {there} of them done before.", flush=True)
+    with stage_progress() as progress:
+        campaign.run(batches, progress)
+    kept = _print_counts(campaign, batches)
+    print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
+    for path in campaign.counterexamples()[:_SHOWN]:
+        print(f"again: iapb verify --recheck {path}")
+    return kept
+
+
+def _print_counts(campaign: Campaign, batches: tuple[object, ...]) -> bool:
+    kept = True
+    for part, laws in campaign.counts(batches).items():  # type: ignore[arg-type]
+        print(f"{part}:")
+        for count in laws.values():
+            mark = "BROKEN" if count.failures else "kept  "
+            worst = f"worst {count.worst.value:.2e} of {count.worst.tolerance:.2e}" if count.worst else "-"
+            print(f"  {mark} {count.law}: {count.failures} of {count.checked:,}, {worst}")
+            kept = kept and not count.failures
+    return kept
+
+
+def print_recheck(path: Path) -> bool:
+    """Print every residual of a stored counterexample; return whether all laws are kept now."""
+    from reports.campaign_counterexamples import recheck
+
+    kept = True
+    for law, residual in recheck(path):
+        print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")
+        kept = kept and residual.passed
+    return kept

@@ -1,0 +1,131 @@
+"""The long verification: done batches are not redone, also after a kill; what breaks a law can be rechecked."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iapb.errors import RunFileError
+from reports.campaign import Campaign, CampaignRequest
+from reports.campaign_counterexamples import keep_counterexample, recheck
+from reports.cli import main
+from reports.store_tables import read_table
+from verification.properties.campaign import (
+    IMPACTS,
+    TRAJECTORIES,
+    UNEQUAL,
+    Batch,
+    Found,
+    drawn,
+    plan,
+    residuals,
+)
+from verification.properties.case import LawResidual
+from verification.properties.planted_trajectory import doubled_impulse
+
+SOUND = CampaignRequest("verification.properties:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
+BROKEN = replace(SOUND, resolver="verification.properties.planted:wrong_sign")
+BATCHES = tuple(Batch(IMPACTS, first, 5) for first in range(0, 20, 5))
+
+
+def _silent(part: str, done: int, total: int) -> None:
+    """No progress."""
+
+
+def test_a_second_run_computes_nothing_and_a_longer_one_only_what_is_missing(tmp_path: Path) -> None:
+    campaign, seen = Campaign(tmp_path, SOUND), list[tuple[str, int, int]]()
+    campaign.run(BATCHES[:2], _silent)
+    written = {batch: campaign.path_of(batch).stat().st_mtime_ns for batch in BATCHES[:2]}
+    campaign.run(BATCHES, lambda *told: seen.append(told))
+    assert seen[0] == (IMPACTS, 10, 20) and seen[-1] == (IMPACTS, 20, 20)
+    assert {batch: campaign.path_of(batch).stat().st_mtime_ns for batch in written} == written
+    counts = campaign.counts(BATCHES)[IMPACTS]
+    assert counts["kinetic_energy"].checked == 20 and not any(count.failures for count in counts.values())
+    assert campaign.counterexamples() == []
+
+
+def test_batches_do_not_depend_on_how_they_are_cut(tmp_path: Path) -> None:
+    whole, cut = Campaign(tmp_path / "a", SOUND), Campaign(tmp_path / "b", SOUND)
+    whole.run([Batch(IMPACTS, 0, 20)], _silent)
+    cut.run(BATCHES, _silent)
+    assert whole.counts([Batch(IMPACTS, 0, 20)]) == cut.counts(BATCHES)
+
+
+def test_another_resolver_or_tolerance_has_another_folder() -> None:
+    keys = {request.key() for request in (SOUND, BROKEN, replace(SOUND, bounds="FACTORED"), replace(SOUND, seed=1))}
+    assert len(keys) == 4
+    assert replace(SOUND, workers=2, impacts=7).key() == SOUND.key()
+
+
+def test_a_broken_law_leaves_files_that_still_show_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    campaign = Campaign(tmp_path, BROKEN)
+    campaign.run(BATCHES[:1], _silent)
+    kept = [path for path in campaign.counterexamples() if "kinetic_energy" in path.name]
+    assert kept and any(path.with_suffix(".hdf5").is_file() for path in kept)
+    [(law, residual)] = recheck(kept[0])
+    assert law == "kinetic_energy" and not residual.passed
+    assert main(["verify", "--recheck", str(kept[0])]) == 1
+    assert "BROKEN kinetic_energy" in capsys.readouterr().out
+
+
+def test_a_trajectory_is_kept_as_its_run(tmp_path: Path) -> None:
+    subject = SOUND.subject()
+    run = next(run for index in range(20) if (run := doubled_impulse(drawn(TRAJECTORIES, index, subject))) is not None)
+    found = Found("impulse_momentum", TRAJECTORIES, 0, LawResidual("", 1.0, 0.0), None, run)
+    path = keep_counterexample(tmp_path, found, SOUND)
+    judged = dict(recheck(path))
+    assert not judged["as recorded: impulse_momentum"].passed
+    assert judged["simulated again: impulse_momentum"].passed
+
+
+def test_a_case_that_is_no_impact_is_drawn_again(tmp_path: Path) -> None:
+    case = drawn("hand_port", 3, SOUND.subject())
+    residual = residuals("hand_port", case, SOUND.subject())[0]["hand_port"]
+    path = keep_counterexample(tmp_path, Found("hand_port", "hand_port", 3, residual, case), SOUND)
+    assert list(recheck(path)) == [("hand_port", residual)]
+
+
+def test_the_plan_covers_every_part_once() -> None:
+    batches = plan(1_000_000, 5000)
+    impacts = sorted((batch.first, batch.count) for batch in batches if batch.part == IMPACTS)
+    assert sum(count for _, count in impacts) == 1_000_000
+    assert all(first + count == following for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False))
+    assert sum(batch.count for batch in batches if batch.part == TRAJECTORIES) == 5000
+    assert any(batch.part == UNEQUAL for batch in batches)
+
+
+_ENDLESS = """
+import sys
+from pathlib import Path
+from reports.campaign import Campaign, CampaignRequest
+from verification.properties.campaign import IMPACTS, Batch
+request = CampaignRequest("verification.properties:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
+Campaign(Path(sys.argv[1]), request).run([Batch(IMPACTS, first, 5) for first in range(0, 10**5, 5)], lambda *told: None)
+"""
+
+
+def test_a_killed_process_leaves_whole_batches_that_are_not_done_again(tmp_path: Path) -> None:
+    process = subprocess.Popen([sys.executable, "-c", _ENDLESS, str(tmp_path)], cwd=Path(__file__).parents[2])
+    try:
+        while len(list(tmp_path.glob("*/impacts-*.h5"))) < 2:
+            assert process.poll() is None
+            time.sleep(0.05)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    paths = sorted(tmp_path.glob("*/impacts-*.h5"))
+    assert all(read_table(path)["checked"].sum() > 0 for path in paths)
+    times = {path: path.stat().st_mtime_ns for path in paths}
+    Campaign(tmp_path, SOUND).run([Batch(IMPACTS, 5 * k, 5) for k in range(len(paths))], _silent)
+    assert {path: path.stat().st_mtime_ns for path in paths} == times
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RunFileError, match="no such file"):
+        list(recheck(tmp_path / "absent.h5"))
