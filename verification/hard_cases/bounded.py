@@ -6,6 +6,7 @@ the process has compiled; what exceeds the limit is killed and reported as timed
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -38,21 +39,26 @@ class Answer(NamedTuple):
     seconds: float
 
 
-def bounded_impact(case: HardCase, method: str, limit: float = LIMIT_SECONDS) -> Answer:
+def bounded_impact(
+    case: HardCase, method: str, limit: float = LIMIT_SECONDS, most_bytes: int = LIMIT_BYTES
+) -> Answer:
     """Resolve one hard case by one method in a process of its own.
 
     Raises
     ------
     TimedOut, OutOfMemory
-        Beyond `limit` [s] or `LIMIT_BYTES`.
+        Beyond `limit` [s] or `most_bytes` of address space (POSIX systems only).
     IapbError
         What the resolver itself raised.
     """
-    with subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the packages that we run from
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
+    command = [sys.executable, "-m", __name__]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **paths, **threads}) as process:
         if process.stdout is None or process.stdout.readline() != _READY:
             raise IapbError("the process for a bounded call did not start")
         try:
-            out, _ = process.communicate(pickle.dumps((case, method)), timeout=limit)
+            out, _ = process.communicate(pickle.dumps((case, method, most_bytes)), timeout=limit)
         except subprocess.TimeoutExpired:
             process.kill()
             raise TimedOut(f"cut after {limit:g} s") from None
@@ -67,30 +73,31 @@ def bounded_impact(case: HardCase, method: str, limit: float = LIMIT_SECONDS) ->
 
 def _serve() -> None:
     """Warm up, say so, then read one call and write its answer."""
+    from verification.hard_cases import bounded  # by its name: what __main__ pickles is not found again
     from verification.hard_cases.judge_impact import resolve_once, warm_up
     from verification.threads import one_thread
 
     with one_thread():
         warm_up()
-        _limit_memory()
         sys.stdout.buffer.write(_READY)
         sys.stdout.buffer.flush()
-        case, method = pickle.loads(sys.stdin.buffer.read())
+        case, method, most_bytes = pickle.loads(sys.stdin.buffer.read())
+        _limit_memory(most_bytes)
         try:
             found: Any = resolve_once(case, method)
         except MemoryError:
-            found = OutOfMemory(f"needs more than {LIMIT_BYTES >> 30} GiB")
+            found = bounded.OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
         except IapbError as error:
             found = IapbError(str(error))
     sys.stdout.buffer.write(pickle.dumps(found))
 
 
-def _limit_memory() -> None:
+def _limit_memory(most_bytes: int) -> None:
     try:
         import resource
     except ImportError:  # not a POSIX system: time alone limits the call
         return
-    resource.setrlimit(resource.RLIMIT_AS, (LIMIT_BYTES, LIMIT_BYTES))
+    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -103,6 +104,14 @@ def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_cut() -> Non
     assert isinstance(case, HardCase)
     with pytest.raises(TimedOut, match=r"cut after 0\.05 s"):
         bounded_impact(case, "gram_pinv", limit=0.05)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is limited on POSIX systems only")
+def test_a_call_that_needs_more_memory_than_its_limit_says_so() -> None:
+    case = HARD_CASES["ten_thousand_contacts"]()
+    assert isinstance(case, HardCase)
+    with pytest.raises(OutOfMemory, match="more than 1 GiB"):
+        bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
 
 
 @pytest.mark.parametrize(("error", "word"), [(TimedOut("cut"), "timed out"), (OutOfMemory("big"), "out of memory")])
