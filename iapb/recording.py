@@ -48,6 +48,9 @@ class Record(NamedTuple):
     impact_scale: np.ndarray
     impact_clamp: np.ndarray
     impact_energy: np.ndarray
+    impact_friction_share: np.ndarray
+    impact_approaching: np.ndarray
+    impact_solved: np.ndarray
     impact_v_minus: np.ndarray  # (n t, d)
     impact_v_plus: np.ndarray
     impact_impulse: np.ndarray
@@ -70,16 +73,17 @@ def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: in
         "device_force": (steps, tool_d),
         **dict.fromkeys(("point", "normal", "contact_friction"), (m, 3)),
         **dict.fromkeys(("gap", "normal_velocity", "normal_force", "contact_impulse"), (m,)),
-        **dict.fromkeys(("impact_scale", "impact_clamp", "impact_energy"), (k,)),
+        **dict.fromkeys(("impact_scale", "impact_clamp", "impact_energy", "impact_friction_share"), (k,)),
         **dict.fromkeys(("impact_v_minus", "impact_v_plus", "impact_impulse"), (k, d)),
     }  # fmt: skip
     integers = {
         **dict.fromkeys(("body_a", "body_b"), (m,)), "contact_count": (steps,), "used": (2,),
-        **dict.fromkeys(("impact_step", "impact_group", "impact_rows", "impact_rank"), (k,)),
+        **dict.fromkeys(("impact_step", "impact_group", "impact_rows", "impact_rank", "impact_approaching"), (k,)),
     }  # fmt: skip
     arrays: dict[str, Any] = {name: np.zeros(shape) for name, shape in floats.items()}
     arrays |= {name: np.zeros(shape, np.int64) for name, shape in integers.items()}
-    arrays |= {"state": np.zeros(steps, np.int8), "is_new": np.zeros(m, np.bool_)}
+    arrays |= {"state": np.zeros(steps, np.int8), "is_new": np.zeros(m, np.bool_),
+               "impact_solved": np.zeros(k, np.bool_)}
     return block(Record(**arrays))
 
 
@@ -126,7 +130,8 @@ def _write_impacts(record, step, state):
         record.impact_step[m], record.impact_group[m] = step, log.group[i]
         record.impact_rows[m], record.impact_rank[m] = log.rows[i], log.rank[i]
         record.impact_scale[m], record.impact_clamp[m] = log.scale[i], log.clamp[i]
-        record.impact_energy[m] = log.energy_lost[i]
+        record.impact_energy[m], record.impact_friction_share[m] = log.energy_lost[i], log.friction_share[i]
+        record.impact_approaching[m], record.impact_solved[m] = log.approaching[i], log.solved[i]
         copy_into(record.impact_v_minus[m], log.v_minus[i])
         copy_into(record.impact_v_plus[m], log.v_plus[i])
         copy_into(record.impact_impulse[m], log.impulse[i])
@@ -154,5 +159,6 @@ def impact_table(records: Sequence[Record], steps: Sequence[int]) -> ImpactTable
     """The table of all impacts."""
     names = {"step": "impact_step", "group": "impact_group", "rows": "impact_rows", "rank": "impact_rank",
              "scale": "impact_scale", "clamp": "impact_clamp", "energy_lost": "impact_energy",
+             "friction_share": "impact_friction_share", "approaching": "impact_approaching", "solved": "impact_solved",
              "v_minus": "impact_v_minus", "v_plus": "impact_v_plus", "impulse": "impact_impulse"}  # fmt: skip
     return ImpactTable(**{field: joined(records, steps, name, used=1) for field, name in names.items()})

@@ -38,10 +38,13 @@ class ContactTable:
 
 @dataclass(frozen=True)
 class ImpactTable:
-    """Collisions resolved, one row per colliding group and step (paper section V)."""
+    """Collisions resolved, one row per step and island of a colliding group (paper section V).
+
+    An island are the trees that contacts of the collision link: what only touches them is not in it.
+    """
 
     step: Integers  # (k,) the step in which it happened
-    group: Integers  # (k,) first tree of the group
+    group: Integers  # (k,) first tree of the island
     v_minus: Floats  # (k, d) [m/s, rad/s] generalized velocity before
     v_plus: Floats  # (k, d) after
     impulse: Floats  # (k, d) generalized impulse J^T p [N s, N m s]
@@ -50,6 +53,9 @@ class ImpactTable:
     energy_lost: Floats  # (k,) [J] kinetic energy before minus after
     scale: Floats  # (k,) factor by which the device limit scaled the impulse, 1 = not at all
     clamp: Floats  # (k,) factor of the final energy clamp, 1 = not active
+    friction_share: Floats  # (k,) factor by which friction was reduced so that no energy is gained, 1 = Coulomb's law
+    approaching: Integers  # (k,) rows that approach still afterwards, -1 = the law does not say
+    solved: NDArray[np.bool_]  # (k,) False: an iteration of the law ended early; the impact is passive all the same
 
 
 @dataclass(frozen=True)

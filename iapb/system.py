@@ -13,13 +13,16 @@ from iapb.contact.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
+from iapb.contact.kernels.impact_friction import make_friction_work
+from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Mechanism
-from iapb.scene import Scene
+from iapb.restitution import restitution_by_pair, restitution_by_shape
+from iapb.scene import Scene, SpatialScene
 from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 
 Floats = NDArray[np.float64]
@@ -35,6 +38,7 @@ class System:
     tool_tree : int, tree that the hand holds; −1 without a hand
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
     dt : float [s]
+    restitutions : (r,) the different values of e among the pairs of shapes that can touch, ascending
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -43,6 +47,7 @@ class System:
         self.shapes = shapes_of(scene)
         self.pairs = pairs_of(scene, self.shapes)
         self.capacity = contact_capacity(self.shapes, self.pairs)
+        self.restitutions = np.unique(restitution_by_pair(scene, self.pairs))
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
@@ -70,7 +75,7 @@ class System:
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""
-        key = (law.impulses, law.integrator, law.rendering)
+        key = (law.impulses, law.integrator, law.rendering, law.friction_in_impacts)
         if key not in self._worlds:
             self._worlds[key] = make_world(self, law)
         return self._worlds[key]
@@ -112,7 +117,9 @@ def make_world(system: System, law: Any) -> World:
         gravity=bool(np.any(system.gravity)),
         varying_inertia=not mechanism.has_constant_mass_matrix,
         velocity_terms=mechanism.has_velocity_terms,
-        impulses=bool(law.impulses) and contact.restitution > -1.0,
+        impulses=bool(law.impulses) and bool(np.any(system.restitutions > -1.0)),
+        unequal_restitution=law.impulses and len(system.restitutions) > 1,
+        impact_friction=law.impulses and law.friction_in_impacts and slides_in_impacts(scene),
         clustering=contact.cluster_distance > 0.0,
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
@@ -129,7 +136,8 @@ def make_world(system: System, law: Any) -> World:
         switches=switches, dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
         friction=float(contact.friction), friction_velocity=float(contact.friction_velocity),
-        restitution=float(contact.restitution), approach_velocity=float(contact.approach_velocity),
+        restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
+        own_restitution=restitution_by_shape(scene), approach_velocity=float(contact.approach_velocity),
         cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
         per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
         stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
@@ -139,6 +147,11 @@ def make_world(system: System, law: Any) -> World:
 
 def _force_limit(scene: Scene) -> tuple[float, ...] | None:
     return scene.device.force_limit if scene.device is not None else None
+
+
+def slides_in_impacts(scene: Scene) -> bool:
+    """Whether a law with friction in impacts has any here; rows (13)-(14) of one body alone have no slip to stop."""
+    return scene.contact.friction > 0.0 and scene.contact.self_collision_rows == "relative"
 
 
 def make_state(system: System) -> State:
@@ -152,8 +165,8 @@ def make_state(system: System) -> State:
     lower = np.zeros((d, d))
     if cholesky(mass, lower):
         raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
-    log = ImpactLog(np.zeros(1, np.int64), *(np.zeros(trees, np.int64) for _ in range(3)),
-                    *(np.zeros(trees) for _ in range(3)), *(np.zeros((trees, d)) for _ in range(3)))
+    sliding, tangents = slides_in_impacts(system.scene), 2 if isinstance(system.scene, SpatialScene) else 1
+    pushing = sliding or len(system.restitutions) > 1
     vectors = {name: np.zeros(d) for name in (
         "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
         "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
@@ -163,10 +176,25 @@ def make_state(system: System) -> State:
         contacts=make_contact_buffer(capacity), previous=make_contact_buffer(capacity),
         stage_contacts=make_contact_buffer(capacity), contact_count=np.zeros(2, np.int64),
         group_of_tree=np.arange(trees, dtype=np.int64), state_of_tree=np.zeros(trees, np.int8),
+        island_of_tree=np.arange(trees, dtype=np.int64), collides_of_tree=np.zeros(trees, np.bool_),
         spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq), contact_impulse=np.zeros(rows),
         rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64), row_impulse=np.zeros(rows),
-        work=make_impact_work(d, rows), impacts=log, **vectors, **squares,
+        row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
+        push_work=make_push_work(d * pushing, rows * pushing),
+        friction_work=make_friction_work(d * sliding, rows * sliding, tangents), impacts=_make_log(trees, d),
+        **vectors, **squares,
     ))  # fmt: skip
+
+
+def _make_log(trees: int, d: int) -> ImpactLog:
+    """An empty log; what a law written in Python says nothing of stays as it is here."""
+    counts = {name: np.zeros(trees, np.int64) for name in ("group", "rows", "rank")}
+    numbers = {name: np.ones(trees) for name in ("scale", "clamp", "friction_share")}
+    vectors = {name: np.zeros((trees, d)) for name in ("v_minus", "v_plus", "impulse")}
+    return ImpactLog(
+        logged=np.zeros(1, np.int64), energy_lost=np.zeros(trees), approaching=np.full(trees, -1, np.int64),
+        solved=np.ones(trees, np.bool_), **counts, **numbers, **vectors,
+    )  # fmt: skip
 
 
 def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Port:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
+from iapb.restitution import one_restitution
 from iapb.scene import Scene
 from iapb.system import System
 from reference.complementarity.laws import newton_lcp
@@ -72,6 +73,7 @@ class _Motion:
     scene: Scene
     coupled: bool
     system: System = field(init=False)
+    restitution: float = field(init=False)
     held: list[Contact] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -80,6 +82,7 @@ class _Motion:
         if self.coupled and mechanism.nq != mechanism.nv:
             raise ArgumentError("scene", self.scene.name, "with a coupling, a scene whose coordinates may be added")
         self.d, self.nq = mechanism.nv, mechanism.nq
+        self.restitution = one_restitution(self.scene, self.system.pairs)
         self.tool = slice(*self.system.tool_dofs)
         self.device = self.system.device_mechanism() if self.coupled else None
         settings = self.scene.device
@@ -166,7 +169,7 @@ class _Motion:
         names, rows = list(closed), np.array(list(closed.values())).reshape(len(closed), self.d)
         mass = self.system.mechanism.mass_matrix(q)
         if (rows @ v < -_AT_REST).any():
-            outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.scene.contact.restitution))
+            outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.restitution))
             v = outcome.velocity
             if self.device is not None:
                 impulse = (rows.T @ outcome.impulse)[self.tool]

@@ -1,4 +1,4 @@
-"""The paper's four worlds (section VI): a contact law and a coupling under one name.
+"""The paper's four worlds (section VI), and what it leaves to the future: a contact law and a coupling by name.
 
 | world | contact law | coupling |
 |---|---|---|
@@ -6,6 +6,9 @@
 | IAPB | impulses and penalties | four-channel |
 | PB | penalties | four-channel |
 | CBuc | rigid constraints | unilateral coupler |
+| IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
+
+Restitution that differs between bodies needs no world of its own: IAPB does as the scene says.
 """
 
 from __future__ import annotations
@@ -49,6 +52,9 @@ WORLDS: dict[str, Callable[[str], World]] = {
     "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
     "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
     "CBuc": lambda rendering: World("CBuc", _named("reference.time_stepping", "RigidConstraints"), "unilateral"),
+    "IAPB-friction": lambda rendering: World(
+        "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
+    ),
 }
 
 

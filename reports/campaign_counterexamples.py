@@ -87,7 +87,9 @@ def _recheck_impact(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]
 def _impact_case(values: dict[str, Any]) -> ImpactCase:
     from verification.properties.case import ImpactCase
 
-    arrays = {name: np.array(x, dtype=float) if isinstance(x, list) else x for name, x in values.items()}
+    arrays: dict[str, Any] = dict(values)
+    for name in ("mass_matrix", "contact_jacobian", "velocity", "translations", "unequal"):
+        arrays[name] = None if values[name] is None else np.array(values[name], dtype=float)
     d = len(arrays["velocity"])
     arrays["contact_jacobian"] = arrays["contact_jacobian"].reshape(-1, d)
     return ImpactCase(**arrays)

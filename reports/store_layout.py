@@ -81,7 +81,7 @@ CONTACTS = (
 
 IMPACTS = (
     Quantity("step", ("impact",), "1", "step in which it happened"),
-    Quantity("group", ("impact",), "1", "first tree of the colliding group"),
+    Quantity("group", ("impact",), "1", "first tree of those resolved together"),
     Quantity("v_minus", ("impact", "velocity"), VELOCITY, "generalized velocity before"),
     Quantity("v_plus", ("impact", "velocity"), VELOCITY, "generalized velocity after"),
     Quantity("impulse", ("impact", "velocity"), IMPULSE, "generalized impulse"),
@@ -90,6 +90,9 @@ IMPACTS = (
     Quantity("energy_lost", ("impact",), "J", "kinetic energy before minus after"),
     Quantity("scale", ("impact",), "1", "factor by which the device limit scaled the impulse"),
     Quantity("clamp", ("impact",), "1", "factor of the final energy clamp"),
+    Quantity("friction_share", ("impact",), "1", "factor by which friction was reduced so that no energy is gained"),
+    Quantity("approaching", ("impact",), "1", "rows that approach still afterwards, -1 = the law does not say"),
+    Quantity("solved", ("impact",), "1", "0 where an iteration of the law ended early; passive all the same"),
 )
 
 TIMINGS = (

@@ -28,7 +28,7 @@ from iapb.contact.kernels.compensated import kinetic_energies
 from iapb.contact.kernels.friction import friction_sweeps
 from iapb.contact.kernels.impact import apply_change, make_impact_work, rank_tolerance
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
-from iapb.contact.kernels.unilateral import push_only
+from iapb.contact.kernels.unilateral import make_push_work, push_only
 from iapb.errors import RangeError
 
 Floats = NDArray[np.float64]
@@ -145,11 +145,10 @@ def _whitened(lower: Floats, rows: Floats) -> Floats:
 def _coulomb(split: _Split, friction: Floats, size: int) -> tuple[Floats, bool]:
     """Tangential impulses (c, m) of Coulomb's law, their limits updated until they stay; whether they did."""
     count = len(friction)
-    coupling = split.free @ split.free.T
-    blocks = coupling.reshape(count, size, count, size)[np.arange(count), :, np.arange(count)]
-    inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2)) if count else np.zeros(0)
+    of_contact = split.free.reshape(count, size, len(split.u))
+    inertia = np.linalg.norm(of_contact @ of_contact.transpose(0, 2, 1), ord=2, axis=(1, 2)) if count else np.zeros(0)
     slip = split.tangent @ (split.u + split.change)
-    p, scratch = np.zeros(count * size), np.zeros(size)
+    p, moved, scratch = np.zeros(count * size), np.zeros(len(split.u)), np.zeros(size)
     still = _STILL * float(np.abs(slip).max(initial=0.0))
     sliding = np.where(_normal_impulses(split, p) > 0.0, friction, 0.0)  # what pulls without friction carries none
     radius = np.zeros(count)
@@ -157,7 +156,7 @@ def _coulomb(split: _Split, friction: Floats, size: int) -> tuple[Floats, bool]:
         wanted = sliding * np.maximum(_normal_impulses(split, p), 0.0)
         change = (1.0 if done < _UNDAMPED else 0.5) * (wanted - radius)
         radius = radius + change
-        swept = friction_sweeps(coupling, slip, radius, inertia, p, scratch, _SWEEPS, still)
+        swept = friction_sweeps(split.free, slip, radius, inertia, p, moved, scratch, _SWEEPS, still)
         if swept >= 0 and np.all(inertia * np.abs(change) <= still):
             return p.reshape(count, size), True
     return p.reshape(count, size), not slip.any()
@@ -171,10 +170,9 @@ def _normal_impulses(split: _Split, p_t: Floats) -> Floats:
         return np.zeros(count)
     length = np.linalg.norm(split.normal, axis=1)
     unit = split.normal / np.where(length > 0.0, length, 1.0)[:, None]
-    pushes, left = np.zeros(count), np.zeros(len(wanted))
-    if push_only(np.ascontiguousarray(unit.T), count, -wanted / size, pushes, left) and (
-        np.linalg.norm(left) <= _PUSHES
-    ):
+    pushes, left, scratch = np.zeros(count), np.zeros(len(wanted)), make_push_work(len(wanted), count)
+    found = push_only(np.ascontiguousarray(unit.T), count, -wanted / size, pushes, left, scratch)
+    if found and np.linalg.norm(left) <= _PUSHES:
         return size * pushes / np.where(length > 0.0, length, 1.0)
     return np.asarray(np.linalg.lstsq(split.normal.T, wanted)[0], np.float64)
 

@@ -18,9 +18,10 @@ from iapb.contact.kernels.impact import (
     make_impact_work,
     rank_tolerance,
 )
+from iapb.contact.kernels.impact_unequal import poisson_impact
 from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
 from iapb.contact.kernels.projector import unit_columns
-from iapb.contact.kernels.unilateral import poisson_impulses
+from iapb.contact.kernels.unilateral import make_push_work
 from iapb.errors import ArgumentError, SolverError
 
 Floats = NDArray[np.float64]
@@ -180,11 +181,9 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
 def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
     """Poisson's law for unequal restitution, by two LCPs (compression, restitution)."""
     work, d, c = _prepared(problem), problem.coordinates, problem.contacts
-    _whitened_rows(problem, work)
-    v_plus, momentum, scaled_impulses = np.empty(d), np.empty(d), np.zeros(c)
-    if not poisson_impulses(work.rows, c, work.u, problem.unequal, scaled_impulses, work.change):
+    v_plus, momentum, impulses = np.empty(d), np.empty(d), np.zeros(c)
+    rank, clamp = poisson_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.unequal, c, clamped,
+                                 work, make_push_work(d, c), impulses, v_plus, momentum)
+    if rank < 0:
         raise SolverError(f"Poisson's law: the active-set method did not converge on {c} contacts")
-    clamp = apply_change(problem.mass_matrix, problem.lower, problem.velocity, clamped, work, v_plus, momentum)
-    length = work.length[:c]
-    impulses = clamp * np.divide(scaled_impulses, length, out=np.zeros(c), where=length > 0.0)
-    return Whitened(v_plus, momentum, impulses, int(np.sum(impulses > 0.0)), clamp)
+    return Whitened(v_plus, momentum, impulses, rank, clamp)

@@ -19,6 +19,8 @@ from iapb.mechanics.integrators import INTEGRATORS
 
 Floats = NDArray[np.float64]
 
+IMPULSE_AUGMENTED = "impulse-augmented penalty"
+WITH_IMPACT_FRICTION = "impulse-augmented penalty with impact friction"
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 
@@ -97,21 +99,31 @@ class ImpulseAugmented(_EngineLaw):
     rendering : how impulses meet the device's force limits (paper section VI): ``full`` ignores them,
         ``saturate`` clips at the device, ``scale`` scales tool and device alike, ``spread`` scales and stays in
         collision until the rest is rendered. Without limits in the scene all four are the same.
+    friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and never with a gain
+        of energy (`iapb.resolve_frictional_impact`). Default: no, as in the paper, which leaves it to the future.
     """
 
     rendering: str = "full"
-    name = "impulse-augmented penalty"
+    friction_in_impacts: bool = False
     impulses = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rendering not in RENDERINGS:
             raise ArgumentError("rendering", self.rendering, "one of " + ", ".join(RENDERINGS))
+        if not isinstance(self.friction_in_impacts, bool):
+            raise ArgumentError("friction_in_impacts", self.friction_in_impacts, "True or False")
+
+    @property
+    def name(self) -> str:
+        """The law, and whether friction acts in its impacts."""
+        return WITH_IMPACT_FRICTION if self.friction_in_impacts else IMPULSE_AUGMENTED
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Integrator and rendering."""
-        return {"integrator": self.integrator, "rendering": self.rendering}
+        """Integrator, rendering, and whether friction acts in impacts."""
+        return {"integrator": self.integrator, "rendering": self.rendering,
+                "friction_in_impacts": self.friction_in_impacts}
 
 
 @dataclass(frozen=True)
@@ -120,6 +132,7 @@ class Penalty(_EngineLaw):
 
     name = "penalty"
     impulses = False
+    friction_in_impacts = False
     rendering = "full"
 
     @property

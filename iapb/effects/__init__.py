@@ -23,6 +23,8 @@ EFFECTS: tuple[Callable[[Question], Effect], ...] = (
     contact.body_contacts,
     contact.self_collisions,
     contact.impulses,
+    contact.unequal_restitution,
+    contact.impact_friction,
     contact.penalty_stiffness,
     contact.contact_damping,
     contact.friction,

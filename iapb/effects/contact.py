@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from iapb.effects.question import CLUSTERS, FRICTION, IMPULSES, NEWNESS, PENALTY, Effect, Question, number
+from iapb.effects.question import (
+    CLUSTERS,
+    FRICTION,
+    IMPACT_FRICTION,
+    IMPULSES,
+    NEWNESS,
+    PENALTY,
+    Effect,
+    Question,
+    number,
+)
 
 
 def wall_contacts(question: Question) -> Effect:
@@ -38,11 +48,37 @@ def self_collisions(question: Question) -> Effect:
 def impulses(question: Question) -> Effect:
     """Impulses (20)-(21) when a contact is new."""
     unused = question.unused(IMPULSES)
-    e = question.scene.contact.restitution
-    reason = unused or f"new contacts collide: contact.restitution = {number(e)}"
+    reason = unused or f"new contacts collide: {_restitution(question)}"
     return Effect(
         "impulses", unused is None, reason, "bodies would be stopped by springs alone and sink in further"
     )
+
+
+def _restitution(question: Question) -> str:
+    """Say the restitution of the pairs that can touch."""
+    smallest, largest = question.restitutions[0], question.restitutions[-1]
+    if smallest < largest:
+        return f"restitution {number(smallest)} to {number(largest)}, the smaller that body or wall of a pair gives"
+    own = smallest != question.scene.contact.restitution
+    return f"{'all pairs have restitution' if own else 'contact.restitution ='} {number(smallest)}"
+
+
+def unequal_restitution(question: Question) -> Effect:
+    """Poisson's law where contacts of one impact differ in restitution: a future extension in the paper."""
+    unused = question.unused(IMPULSES)
+    if unused is None and len(question.restitutions) == 1:
+        unused = f"alike everywhere: {_restitution(question)}"
+    reason = unused or f"pairs that can touch differ: {_restitution(question)}"
+    return Effect("unequal_restitution", unused is None, reason, "all contacts of a collision would bounce alike")
+
+
+def impact_friction(question: Question) -> Effect:
+    """Coulomb friction in the impacts themselves: a future extension in the paper."""
+    contact = question.scene.contact
+    active, reason = _valued(question, IMPACT_FRICTION, "friction", contact.friction, "")
+    if active and contact.self_collision_rows == "per_body":
+        active, reason = False, "contact.self_collision_rows = per_body: rows of one body alone have no slip"
+    return Effect("impact_friction", active, reason, "bodies would bounce without losing tangential speed")
 
 
 def penalty_stiffness(question: Question) -> Effect:

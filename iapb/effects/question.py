@@ -5,13 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from iapb.mechanics.mechanism import Mechanism
+from iapb.restitution import restitution_by_pair
 from iapb.scene import Scene
 from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 
 # What each law makes of a scene's contact section; a law that is not listed is taken to use all of it.
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
+IMPACT_FRICTION = "impact friction"
 LAW_USES = {
+    "impulse-augmented penalty with impact friction": frozenset(
+        {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION}
+    ),
     "impulse-augmented penalty": frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS}),
     "penalty": frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS}),  # new contacts are marked in the record
     "rigid constraints": frozenset[str](),
@@ -41,6 +48,7 @@ class Question:
     wall_pairs: int  # candidate pairs of a moving shape and a static one
     body_pairs: int  # of shapes of two trees
     tree_pairs: int  # of shapes of one tree
+    restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
     law: str | None
     coupling: str | None
     rendering: str | None
@@ -50,11 +58,13 @@ class Question:
         """Build the mechanism and count the pairs that can touch."""
         mechanism, shapes = mechanism_of(scene), shapes_of(scene)
         counts = {"wall": 0, "body": 0, "tree": 0}
-        for a, b in pairs_of(scene, shapes):
+        pairs = pairs_of(scene, shapes)
+        values = tuple(float(e) for e in np.unique(restitution_by_pair(scene, pairs)))
+        for a, b in pairs:
             tree_a, body_b = mechanism.tree_of_body[shapes.body[a]], shapes.body[b]
             same = body_b >= 0 and mechanism.tree_of_body[body_b] == tree_a
             counts["wall" if body_b < 0 else "tree" if same else "body"] += 1
-        return cls(scene, mechanism, counts["wall"], counts["body"], counts["tree"], law, coupling, rendering)
+        return cls(scene, mechanism, counts["wall"], counts["body"], counts["tree"], values, law, coupling, rendering)
 
     @property
     def pairs(self) -> int:

@@ -6,7 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from iapb.scene.parts import SMALLEST_POSITIVE, Name, NonNegative, Number, Part, Vector2, expectation
+from iapb.scene.parts import (
+    SMALLEST_POSITIVE,
+    Name,
+    NonNegative,
+    Number,
+    OwnRestitution,
+    Part,
+    Vector2,
+    expectation,
+)
 from iapb.scene.shapes import Shape, checked_direction
 
 JOINT_COORDINATES = {"fixed": 0, "revolute": 1, "prismatic": 1, "planar": 3}
@@ -42,6 +51,8 @@ class Body(Part):
     velocity: tuple[Number, ...] = Field(
         (), description="joint velocities at the start [m/s, rad/s]; default: zeros"
     )
+
+    restitution: OwnRestitution = None
 
     @field_validator("axis")
     @classmethod

@@ -18,6 +18,12 @@ Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE
 Positive = Annotated[float, Field(ge=SMALLEST_POSITIVE, le=LARGEST_NUMBER, **_FINITE)]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST_NUMBER, **_FINITE)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, **_FINITE)]
+OwnRestitution = Annotated[
+    Fraction | None,
+    Field(
+        description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's"
+    ),
+]
 Vector2 = tuple[Number, Number]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
 Text = Annotated[str, Field(max_length=2000, strict=True)]

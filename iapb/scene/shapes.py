@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from iapb.scene.parts import Name, Number, Part, Positive, Vector2, expectation
+from iapb.scene.parts import Name, Number, OwnRestitution, Part, Positive, Vector2, expectation
 
 MAX_VERTICES = 256  # a polygon with more is a circle
 _STRAIGHT = 1e-9  # sine of the smallest turn that counts as a corner: below it, rounding decides convexity
@@ -66,6 +66,7 @@ class HalfPlaneWall(Part):
     """A straight wall without end; solid on the side that the normal points away from."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
     kind: Literal["half_plane"] = Field(description="everything behind a straight line")
     point: Vector2 = Field(description="a point of the surface [m], world axes")
     normal: Vector2 = Field(description="direction out of the wall, any length but zero, world axes")
@@ -87,18 +88,21 @@ class BoxWall(Box):
     """A static rectangle."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
 
 
 class CircleWall(Circle):
     """A static disc."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
 
 
 class PolygonWall(Polygon):
     """A static convex polygon."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
 
 
 Shape = Annotated[Box | Circle | Polygon, Field(discriminator="kind")]

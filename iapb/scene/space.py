@@ -13,7 +13,16 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from iapb.scene.bodies import MAX_SHAPES_OF_BODY, WORLD
 from iapb.scene.model import MAX_BODIES, MAX_WALLS, Scene
-from iapb.scene.parts import SMALLEST_POSITIVE, Name, NonNegative, Number, Part, Positive, expectation
+from iapb.scene.parts import (
+    SMALLEST_POSITIVE,
+    Name,
+    NonNegative,
+    Number,
+    OwnRestitution,
+    Part,
+    Positive,
+    expectation,
+)
 from iapb.scene.sections import Hand
 
 Vector3 = tuple[Number, Number, Number]
@@ -54,6 +63,7 @@ class HalfSpaceWall(Part):
     """A flat wall without end; solid on the side that the normal points away from."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
     kind: Literal["half_space"] = Field(description="everything behind a plane")
     point: Vector3 = Field(description="a point of the surface [m], world axes")
     normal: Vector3 = Field(description="direction out of the wall, any length but zero, world axes")
@@ -68,12 +78,14 @@ class CuboidWall(Cuboid):
     """A static box."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
 
 
 class BallWall(Ball):
     """A static sphere."""
 
     name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
 
 
 SpatialShape = Annotated[Cuboid | Ball, Field(discriminator="kind")]
@@ -112,6 +124,8 @@ class SpatialBody(Part):
     velocity: tuple[Number, ...] = Field(
         (), description="joint velocities [m/s, rad/s]; free_flyer: linear, angular, body axes; default: zeros"
     )
+
+    restitution: OwnRestitution = None
 
     @field_validator("axis")
     @classmethod

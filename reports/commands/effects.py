@@ -10,7 +10,8 @@ import typer
 def effects(
     scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
     world: Annotated[str | None, typer.Option(
-        help="Decide for one world (ideal, IAPB, PB, CBuc); else an effect is on if some world needs it.")] = None,
+        help="Decide for one world (ideal, IAPB, PB, CBuc, IAPB-friction); else an effect is on if some world needs "
+             "it.")] = None,
     rendering: Annotated[str, typer.Option(help="full, saturate, scale or spread.")] = "full",
 ) -> None:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""

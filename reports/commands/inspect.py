@@ -40,9 +40,10 @@ def _list_impacts(run: object, count: int) -> None:
 
     table = run.impacts  # type: ignore[attr-defined]
     shown = Table(title=f"The first {min(count, len(table.step))} of {len(table.step)} impacts")
-    for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp"):
+    for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp", "approaching"):
         shown.add_column(heading, justify="right")
     for i in range(min(count, len(table.step))):
         shown.add_row(f"{run.time[table.step[i]]:.5f}", str(table.rows[i]), str(table.rank[i]),  # type: ignore[attr-defined]
-                      f"{table.energy_lost[i]:.4e}", f"{table.scale[i]:.4f}", f"{table.clamp[i]:.6f}")
+                      f"{table.energy_lost[i]:.4e}", f"{table.scale[i]:.4f}", f"{table.clamp[i]:.6f}",
+                      str(table.approaching[i]))
     Console().print(shown)

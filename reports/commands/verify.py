@@ -81,4 +81,4 @@ def found(name: str) -> Callable[..., Any]:
         raise ArgumentError("--resolver", name, f"a function that can be imported ({error})") from error
     if not callable(function):
         raise ArgumentError("--resolver", name, "something that can be called")
-    return function  # type: ignore[no-any-return]
+    return function

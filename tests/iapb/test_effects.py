@@ -35,6 +35,9 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
     "body_contacts": (DISCS, {}, {"bodies.striker.shapes": []}, "1 pair"),
     "self_collisions": (PEG, CHAIN, {**CHAIN, "contact.self_collisions": False}, "1 pair"),
     "impulses": (PEG, {"contact.restitution": 0.25}, NO_SHAPES, "0.25"),
+    "unequal_restitution": (PEG, {f"walls.{PEG.walls[0].name}.restitution": 0.75}, {"bodies.peg.restitution": 0.75},
+                            "to 0.75"),
+    "impact_friction": (PEG, {"contact.friction": 0.3}, {"contact.friction": 0}, "contact.friction = 0.3"),
     "penalty_stiffness": (PEG, {"contact.stiffness": 1234}, {"contact.stiffness": 0}, "1234 N/m"),
     "contact_damping": (PEG, {"contact.damping": 56}, {"contact.damping": 0}, "56 N s/m"),
     "friction": (PEG, {"contact.friction": 0.3}, {"contact.friction": 0}, "contact.friction = 0.3"),
@@ -80,6 +83,16 @@ def test_rigid_constraints_use_no_penalty_and_no_friction() -> None:
     for name in ("penalty_stiffness", "contact_damping", "friction"):
         assert effect(rough, name, "penalty").active
         assert not effect(rough, name, "rigid constraints").active
+
+
+def test_friction_in_impacts_is_on_where_the_law_asks_and_a_contact_can_slip() -> None:
+    rough = PEG.with_values({"contact.friction": 0.3})
+    asking = "impulse-augmented penalty with impact friction"
+    assert effect(rough, "impact_friction", asking).active
+    assert not effect(rough, "impact_friction", "impulse-augmented penalty").active
+    per_body = rough.with_values({"contact.self_collision_rows": "per_body"})
+    assert "per_body" in effect(per_body, "impact_friction", asking).reason
+    assert not effect(per_body, "impact_friction", asking).active
 
 
 def test_a_law_of_the_callers_own_is_taken_to_use_all() -> None:
@@ -135,5 +148,6 @@ def test_the_laws_that_are_known_go_by_their_own_names() -> None:
     from iapb.haptics.coupling import FourChannel, UnilateralCoupler
     from reference.time_stepping import RigidConstraints
 
-    assert {law.name for law in (ImpulseAugmented, Penalty, RigidConstraints)} == set(LAW_USES)
+    laws = (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty(), RigidConstraints())
+    assert {law.name for law in laws} == set(LAW_USES)
     assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)

@@ -60,6 +60,7 @@ FULL = {
     "device.force_limit": [300, 300, 300], "contact.cluster_distance": 1e-4, "contact.coherence_distance": 1e-2,
 }  # fmt: skip
 IAPB, SPREAD, PENALTY = ("impulses", {}), ("impulses", {"rendering": "spread"}), ("penalty", {})
+RUBBING = ("impulses", {"friction_in_impacts": True})
 
 
 def peg(law=SPREAD, coupling="four-channel", **values):
@@ -79,6 +80,11 @@ CASES = {
     "no impulses": peg(law=PENALTY),
     "limits ignored": peg(law=IAPB),
     "no device": peg(coupling="none"),
+    "own restitution, alike": peg(law=IAPB, bodies__peg__restitution=0.5),
+    "own restitution": ("bar_on_posts", {}, IAPB, "none"),
+    "own restitution, no impulses": ("bar_on_posts", {}, PENALTY, "none"),
+    "impact friction": peg(law=RUBBING),
+    "impact friction, smooth": peg(law=RUBBING, contact__friction=0),
     "exact sensors": peg(device__position_resolution=None),
     "sensors of resolution 0": peg(device__position_resolution=[0, 0, 0]),
     "no device damping": peg(device__damping=None),
@@ -99,8 +105,13 @@ ONLY = {
     "coherence": (["def same_surface(", "def squared_distance("], "tilted", ["no filter", "no walls"]),
     "wall_contacts": (["def find_contacts(", "def detect(", "def contact_velocities(", "def resting_force("],
                       "everything", ["no walls"]),
-    "impulses": (["def resolve_collisions(", "def resolve_group(", "def factored_impact("], "everything",
-                 ["no impulses", "no walls"]),
+    "impulses": (["def resolve_collisions(", "def find_islands(", "def resolve_island(", "def factored_impact("],
+                 "everything", ["no impulses", "no walls"]),
+    "unequal_restitution": (["def gather_restitution(", "def resolve_unequal(", "def poisson_impact(",
+                             "def pair_restitution("], "own restitution",
+                            ["own restitution, alike", "own restitution, no impulses", "everything"]),
+    "impact_friction": (["def add_friction_to_impact(", "def gather_tangents(", "def add_impact_friction("],
+                        "impact friction", ["impact friction, smooth", "everything", "own restitution"]),
     "device_limits": (["def largest_share(", "force = min(max(force, -port.force_limit[i]), port.force_limit[i])"],
                       "everything", ["limits ignored", "no impulses"]),
     "coupling": (["def measure(", "def coordinate(", "def command("], "everything", ["no device"]),

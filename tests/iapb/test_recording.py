@@ -48,7 +48,8 @@ def test_the_record_holds_what_each_step_did(name, coupling):
             assert np.array_equal(getattr(run, field)[k], getattr(port, field)), field
         for i in range(state.impacts.logged[0]):
             assert run.impacts.step[impact] == k
-            for field in ("group", "rows", "rank", "scale", "clamp", "energy_lost", "v_minus", "v_plus", "impulse"):
+            for field in ("group", "rows", "rank", "scale", "clamp", "energy_lost", "v_minus", "v_plus", "impulse",
+                          "friction_share", "approaching", "solved"):
                 assert np.array_equal(getattr(run.impacts, field)[impact], getattr(state.impacts, field)[i]), field
             impact += 1
     assert impact == len(run.impacts.step)

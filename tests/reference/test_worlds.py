@@ -17,8 +17,10 @@ from reference.worlds import WORLDS, find_world, require_complete, run_world
 PEG = load_scene(find_scene("peg_corner"))
 STEPS = 60
 
-COUPLINGS = {"ideal": "four-channel", "IAPB": "four-channel", "PB": "four-channel", "CBuc": "unilateral"}
-LAWS = {"ideal": "rigid constraints", "IAPB": "impulse-augmented penalty", "PB": "penalty", "CBuc": "rigid constraints"}
+COUPLINGS = {"ideal": "four-channel", "IAPB": "four-channel", "PB": "four-channel", "CBuc": "unilateral",
+             "IAPB-friction": "four-channel"}
+LAWS = {"ideal": "rigid constraints", "IAPB": "impulse-augmented penalty", "PB": "penalty", "CBuc": "rigid constraints",
+        "IAPB-friction": "impulse-augmented penalty with impact friction"}
 
 
 @pytest.mark.parametrize("name", WORLDS)

@@ -40,6 +40,9 @@ def _impacts(rng: np.random.Generator, count: int, d: int) -> ImpactTable:
         energy_lost=rng.random(count),
         scale=np.ones(count),
         clamp=np.ones(count),
+        friction_share=np.ones(count),
+        approaching=np.zeros(count, np.int64),
+        solved=np.ones(count, np.bool_),
     )
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
+from iapb.restitution import restitution_by_pair
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.scene_mechanism import mechanism_of
+from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 from verification.comparison.cases import ImpactCase
 
 Floats = NDArray[np.float64]
@@ -25,7 +26,11 @@ _REBUILT = 1e-9
 
 
 class SceneImpacts(NamedTuple):
-    """The cases of one run; `left_out` counts impacts under other rows (per body) or cut by a device limit."""
+    """The cases of one run, one for each step and contact group that collides in it.
+
+    `left_out` counts those under other rows (per body) or another law (unequal restitution, friction in the impact),
+    or cut by a device limit.
+    """
 
     cases: tuple[ImpactCase, ...]
     left_out: int
@@ -40,22 +45,49 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
         A rebuilt impact does not give the velocity that the run recorded: the run and the scene do not belong together.
     """
     mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
+    values = restitution_by_pair(scene, pairs_of(scene, shapes_of(scene)))
+    rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.contact.friction > 0.0
+    other_law = scene.contact.self_collision_rows == "per_body" or len(np.unique(values)) != 1 or rubbing
     cases, left_out = [], 0
-    for k, step in enumerate(run.impacts.step):
-        per_body = scene.contact.self_collision_rows == "per_body"
-        if per_body or run.impacts.scale[k] != 1.0:
+    for blow in _group_impacts(run, mechanism):
+        if other_law or blow.scaled:
             left_out += 1
             continue
-        rows = _rows_of_step(run, mechanism, int(step), int(run.impacts.group[k]))
-        v = run.impacts.v_minus[k]
+        rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
         closing = rows @ v < -approach
-        e = float(scene.contact.restitution)
         case = ImpactCase(
-            f"scene {run.scene_name}", mechanism.mass_matrix(run.q[step]), rows[closing], v, e, rows[~closing]
-        )
-        _check(case, run, k)
+            f"scene {run.scene_name}", mechanism.mass_matrix(run.q[blow.step]), rows[closing], v, float(values[0]),
+            rows[~closing],
+        )  # fmt: skip
+        _check(case, run, blow)
         cases.append(case)
     return SceneImpacts(tuple(cases), left_out)
+
+
+class _GroupImpact(NamedTuple):
+    """All that one contact group underwent in one step: the engine resolves its islands one by one."""
+
+    step: int
+    trees: frozenset[int]
+    v_minus: Floats
+    v_plus: Floats  # (d,) of the group's coordinates; the others as in v_minus
+    scaled: bool
+
+
+def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
+    """Put the islands of a group together again: rows that touch and do not approach are its too."""
+    found, table = [], run.impacts
+    for step in np.unique(table.step):
+        of_step = np.flatnonzero(table.step == step)
+        before, after = table.v_minus[of_step[0]], table.v_plus[of_step[-1]]
+        groups = {k: _trees_of_group(run, mechanism, int(step), int(table.group[k])) for k in of_step}
+        for trees in dict.fromkeys(groups.values()):
+            own = np.zeros(mechanism.nv, bool)
+            for tree in trees:
+                own[slice(*mechanism.tree_dofs[tree])] = True
+            scaled = any(table.scale[k] != 1.0 for k in of_step if groups[k] == trees)
+            found.append(_GroupImpact(int(step), trees, before, np.where(own, after, before), scaled))
+    return found
 
 
 def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
@@ -70,12 +102,12 @@ def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = No
     return impacts_of_run(run_world(scene, world), scene)
 
 
-def _rows_of_step(run: Run, mechanism: Mechanism, step: int, group: int) -> Floats:
+def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
     """nᵀ(J_a − J_b) (k, d) of the step's contacts that belong to the impact's contact group."""
-    table, q = run.contacts, run.q[step]
+    table, q = run.contacts, run.q[blow.step]
     chosen = [
-        m for m in range(int(table.offsets[step]), int(table.offsets[step + 1]))
-        if mechanism.tree_of_body[table.body_a[m]] in _trees_of_group(run, mechanism, step, group)
+        m for m in range(int(table.offsets[blow.step]), int(table.offsets[blow.step + 1]))
+        if mechanism.tree_of_body[table.body_a[m]] in blow.trees
     ]  # fmt: skip
     rows = np.zeros((len(chosen), mechanism.nv))
     for i, m in enumerate(chosen):
@@ -85,7 +117,7 @@ def _rows_of_step(run: Run, mechanism: Mechanism, step: int, group: int) -> Floa
     return rows
 
 
-def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> set[int]:
+def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> frozenset[int]:
     """Trees that a chain of contacts between moving bodies links to tree `group` (paper, section III)."""
     table, trees = run.contacts, {group}
     links = [
@@ -95,13 +127,14 @@ def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> se
     ]
     while any(link & trees and not link <= trees for link in links):
         trees |= set().union(*(link for link in links if link & trees))
-    return trees
+    return frozenset(trees)
 
 
-def _check(case: ImpactCase, run: Run, k: int) -> None:
+def _check(case: ImpactCase, run: Run, blow: _GroupImpact) -> None:
     from iapb import resolve_impact
 
     impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     scale = float(np.abs(case.velocity).max()) or 1.0
-    if np.abs(impact.velocity - run.impacts.v_plus[k]).max() > _REBUILT * scale:
-        raise IapbError(f"impact {k} of {run.scene_name} cannot be rebuilt from its run: velocities differ")
+    if np.abs(impact.velocity - blow.v_plus).max() > _REBUILT * scale:
+        where = f"the impact in step {blow.step} of {run.scene_name}"
+        raise IapbError(f"{where} cannot be rebuilt from its run: velocities differ")

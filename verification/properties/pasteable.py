@@ -56,7 +56,9 @@ def name_of(resolver: Any, word: str = "") -> str:
 
 def _can_be_imported(resolver: Any) -> bool:
     module, name = getattr(resolver, "__module__", None), getattr(resolver, "__qualname__", "")
-    return bool(module) and module != "__main__" and getattr(sys.modules.get(module), name, None) is resolver
+    if not isinstance(module, str) or module == "__main__":
+        return False
+    return getattr(sys.modules.get(module), name, None) is resolver
 
 
 def _import_of(resolver: Any, name: str) -> str:

@@ -52,8 +52,8 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
     if case.translations is not None:
         yield replace(case, translations=None)
     for i in range(case.contacts):
-        e = None if case.unequal is None else np.delete(case.unequal, i)
-        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=e)
+        unequal = None if case.unequal is None else np.delete(case.unequal, i)
+        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=unequal)
     if case.coordinates > 1 and case.translations is None:
         for k in range(case.coordinates):
             yield _without_coordinate(case, k)

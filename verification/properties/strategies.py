@@ -78,9 +78,9 @@ def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
     count, linked = draw(st.integers(1, 2)), draw(st.booleans())
     bodies = [draw(_discs(k)) for k in range(count)]
     if linked:
-        angle, rate = draw(st.integers(-3, 3)), draw(st.integers(-9, 9))
+        angle, spin = draw(st.integers(-3, 3)), draw(st.integers(-9, 9))
         bodies.append({"name": "link", "joint": "revolute", "mass": 1.0, "inertia": 1e-3,
-                       "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(rate)],
+                       "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(spin)],
                        "shapes": [{"kind": "box", "size": [0.1, 0.02], "center": [0.05, 0.0]}]})  # fmt: skip
     contact = {
         "stiffness": 10.0 ** draw(st.integers(1, 4)), "damping": float(draw(st.sampled_from([0, 1, 10]))),

@@ -1,62 +1,22 @@
-"""Collisions of one step, group by group: paper section V on the state of a world."""
+"""Collisions of one step, island by island: paper section V on the state of a world."""
 
 from __future__ import annotations
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.device_limit import largest_share
-from iapb.contact.kernels.impact import factored_impact, rank_tolerance
+from iapb.contact.kernels.gather import (
+    gather_dofs,
+    gather_group,
+    gather_restitution,
+    gather_rows,
+    gather_tangents,
+)
+from iapb.contact.kernels.impact import factored_impact, project_impact, rank_tolerance
+from iapb.contact.kernels.impact_friction import add_impact_friction
+from iapb.contact.kernels.impact_unequal import poisson_impact
+from iapb.contact.kernels.islands import find_islands
 from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
-from iapb.contact.kernels.rows import body_row, contact_row
-from iapb.run import COLLIDING
-
-
-@kernel
-def gather_dofs(world, state, group):
-    """List the coordinates of a contact group (2)-(3); return how many."""
-    size = 0
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] == group:
-            for k in range(world.tree_start[t], world.tree_stop[t]):
-                state.dofs[size] = k
-                size += 1
-    return size
-
-
-@kernel
-def gather_group(world, state, size):
-    """Copy the group's blocks of M, L and v: M is block diagonal, so its factor is too."""
-    for i in range(size):
-        state.group_v[i] = state.v[state.dofs[i]]
-        for j in range(size):
-            state.group_mass[i, j] = state.mass_matrix[state.dofs[i], state.dofs[j]]
-            state.group_lower[i, j] = state.lower[state.dofs[i], state.dofs[j]]
-
-
-@kernel
-def _store_row(state, size, contact, count):
-    for k in range(size):
-        state.work.columns[k, count] = state.row[state.dofs[k]]
-    state.rows[count] = contact
-
-
-@kernel
-def gather_rows(world, state, group, size):
-    """Rows of J_c: (11) against the static world; (12), or the two of (13)-(14), at a self-collision."""
-    contacts = state.contacts
-    count = 0
-    for i in range(state.contact_count[0]):
-        if not contacts.collides[i] or state.group_of_tree[world.tree_of_body[contacts.body_a[i]]] != group:
-            continue
-        if world.per_body_rows and contacts.body_b[i] >= 0:
-            for body in (contacts.body_a[i], contacts.body_b[i]):
-                body_row(world.mechanism, state.body, body, contacts.point[i], contacts.normal[i], state.row)
-                _store_row(state, size, i, count)
-                count += 1
-        else:
-            contact_row(world.mechanism, state.body, contacts, i, state.row)
-            _store_row(state, size, i, count)
-            count += 1
-    return count
+from iapb.contact.kernels.projector import orthonormal_basis
 
 
 @kernel
@@ -77,12 +37,25 @@ def apply_group(world, state, size, share):
 
 
 @kernel
-def log_impact(state, group, rows, rank, share, clamp, lost, size):
+def count_approaching(world, work, size, count, share):
+    """Rows of the impact that approach still after it: what a clamp, a scale or a lost rank leaves."""
+    approaching = 0
+    for i in range(count):
+        gamma = 0.0
+        for k in range(size):
+            gamma += work.rows[k, i] * (work.u[k] + share * work.change[k])
+        approaching += work.length[i] * gamma < -world.approach_velocity
+    return approaching
+
+
+@kernel
+def log_impact(state, island, rows, rank, share, clamp, friction_share, solved, approaching, lost, size):
     """Append one line to the step's impacts."""
     log = state.impacts
     n = log.logged[0]
-    log.group[n], log.rows[n], log.rank[n] = group, rows, rank
+    log.group[n], log.rows[n], log.rank[n] = island, rows, rank
     log.scale[n], log.clamp[n], log.energy_lost[n] = share, clamp, lost
+    log.friction_share[n], log.solved[n], log.approaching[n] = friction_share, solved, approaching
     for k in range(state.v.shape[0]):
         log.v_minus[n, k] = state.v[k]
         log.v_plus[n, k] = state.v[k]
@@ -95,35 +68,81 @@ def log_impact(state, group, rows, rank, share, clamp, lost, size):
 
 
 @kernel
-def resolve_group(world, state, group):
-    """Equations (20)-(21) for one colliding group, scaled to the device where the scene has limits."""
-    size = gather_dofs(world, state, group)
+def resolve_unequal(world, state, size, count, smallest):
+    """Poisson's law for rows that differ in e; where it fails the scalar rule with the smallest e, passive for all."""
+    mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
+    v_plus, impulse, work = state.group_v_plus[:size], state.group_impulse[:size], state.work
+    rank, clamp = poisson_impact(mass, lower, v, state.row_restitution, count, True, work, state.push_work,
+                                 state.row_impulse, v_plus, impulse)
+    if rank >= 0:
+        return rank, clamp, True
+    rank, clamp = project_impact(mass, lower, v, smallest, count, rank_tolerance(lower), size, True, work, v_plus,
+                                 impulse)
+    return rank, clamp, False
+
+
+@kernel
+def add_friction_to_impact(world, state, size, count, rank):
+    """Friction on top of the normal impact; return (α, clamp, whether Coulomb's law was met)."""
+    gather_tangents(world, state, size, count)
+    return add_impact_friction(
+        state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, world.friction,
+        rank, state.work, state.push_work, state.friction_work, state.row_impulse, state.group_v_plus[:size],
+        state.group_impulse[:size])
+
+
+@kernel
+def resolve_rows(world, state, size, count):
+    """(20)-(21), or what the scene and the law ask for beyond; return (rank, clamp, α of friction, solved)."""
+    mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
+    work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
+    if world.switches.unequal_restitution:
+        e, unequal = gather_restitution(world, state, count)
+    if unequal:
+        rank, clamp, solved = resolve_unequal(world, state, size, count, e)
+    else:
+        rank, clamp = factored_impact(mass, lower, v, e, count, rank_tolerance(lower), size, True, work,
+                                      state.group_v_plus[:size], state.group_impulse[:size])
+    if world.switches.impact_friction:
+        span = rank
+        if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
+            span = orthonormal_basis(work.columns[:size], count, work.u[:size], rank_tolerance(lower), size,
+                                     work.basis, work.closing, work.size, work.overlap)
+        friction_share, factor, met = add_friction_to_impact(world, state, size, count, span)
+        return rank, clamp * factor, friction_share, solved and met
+    if not (unequal and solved):
+        minimum_norm_impulses(work.rows, work.length, count, work.basis, rank, work.change[:size],
+                              state.row_impulse, work.columns, state.triangle, state.target)
+    return rank, clamp, friction_share, solved
+
+
+@kernel
+def resolve_island(world, state, island):
+    """One simultaneous impact, scaled to the device where the scene has limits."""
+    size = gather_dofs(world, state, island)
     gather_group(world, state, size)
-    count = gather_rows(world, state, group, size)
-    mass, lower = state.group_mass[:size, :size], state.group_lower[:size, :size]
-    v, v_plus, impulse = state.group_v[:size], state.group_v_plus[:size], state.group_impulse[:size]
-    work = state.work
-    rank, clamp = factored_impact(mass, lower, v, world.restitution, count, rank_tolerance(lower), size, True,
-                                  work, v_plus, impulse)
+    count = gather_rows(world, state, island, size)
+    rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
     share = 1.0
     if world.switches.impulse_limit:
         share = largest_share(state.group_impulse, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
         for t in range(world.tree_start.shape[0]):
-            if state.group_of_tree[t] == group:
+            if state.island_of_tree[t] == island:
                 state.spreading[t] = share < 1.0
     lost = apply_group(world, state, size, share)
-    minimum_norm_impulses(work.rows, work.length, count, work.basis, rank, work.change[:size], state.row_impulse,
-                          work.columns, state.triangle, state.target)
+    approaching = count_approaching(world, state.work, size, count, share)
     for r in range(count):
         if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
             state.contact_impulse[state.rows[r]] = share * state.row_impulse[r]
-    log_impact(state, group, count, rank, share, clamp, lost, size)
+    log_impact(state, island, count, rank, share, clamp, friction_share, solved, approaching, lost, size)
 
 
 @kernel
 def resolve_collisions(world, state):
-    """Give every colliding group its impulse; velocities change, configurations do not."""
+    """Give every colliding group its impulse, island by island; velocities change, configurations do not."""
+    if not find_islands(world, state):
+        return
     for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] == t and state.state_of_tree[t] == COLLIDING:
-            resolve_group(world, state, t)
+        if state.collides_of_tree[t]:
+            resolve_island(world, state, t)

@@ -125,6 +125,16 @@ def moving_tree(body, tree_of_body, tree_start, tree_stop):
 
 
 @kernel
+def join(group_of_tree, a, b):
+    """Make one group of those of two trees; a root is the smallest tree of its group."""
+    while group_of_tree[a] != a:
+        a = group_of_tree[a]
+    while group_of_tree[b] != b:
+        b = group_of_tree[b]
+    group_of_tree[max(a, b)] = min(a, b)
+
+
+@kernel
 def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree):
     """Write group_of_tree: the first tree of the group that contacts between moving trees link it to."""
     for t in range(group_of_tree.shape[0]):
@@ -132,13 +142,8 @@ def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_t
     for i in range(count):
         a = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
         b = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
-        if contacts.gap[i] > 0.0 or a < 0 or b < 0:
-            continue
-        while group_of_tree[a] != a:
-            a = group_of_tree[a]
-        while group_of_tree[b] != b:
-            b = group_of_tree[b]
-        group_of_tree[max(a, b)] = min(a, b)  # a root is the smallest tree of its group
+        if contacts.gap[i] <= 0.0 and a >= 0 and b >= 0:
+            join(group_of_tree, a, b)
     for t in range(group_of_tree.shape[0]):
         group_of_tree[t] = group_of_tree[group_of_tree[t]]  # smaller trees are settled already
 

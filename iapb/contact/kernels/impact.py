@@ -70,6 +70,19 @@ def energy_clamp(mass_matrix, v, change):
 
 
 @kernel
+def whiten_impact(lower, v, count, work):
+    """From rows of J in `work.columns` and v to unit rows of A (kept in `work.rows` too), their lengths, and u."""
+    d = v.shape[0]
+    columns = work.columns[:d]
+    to_whitened(lower, v, work.u[:d])
+    whiten_columns(lower, columns, count)
+    unit_columns(columns, count, work.length)
+    for k in range(d):
+        for i in range(count):
+            work.rows[k, i] = columns[k, i]
+
+
+@kernel
 def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
     """Resolve `count` rows, given as columns of `work.columns`, by (21) in factored form.
 
@@ -77,14 +90,15 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
     Every row is an equality J v⁺ = −e J v⁻, whatever its sign; choosing the rows is the caller's.
     A group smaller than its scratch uses the first d coordinates of it; what lies beyond is another group's.
     """
+    whiten_impact(lower, v, count, work)
+    return project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum)
+
+
+@kernel
+def project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
+    """`factored_impact` from where `whiten_impact` ends."""
     d = v.shape[0]
     columns, u, change = work.columns[:d], work.u[:d], work.change[:d]
-    to_whitened(lower, v, u)
-    whiten_columns(lower, columns, count)
-    unit_columns(columns, count, work.length)
-    for k in range(d):
-        for i in range(count):
-            work.rows[k, i] = columns[k, i]
     rank = orthonormal_basis(columns, count, u, tolerance, budget, work.basis, work.closing, work.size,
                              work.overlap)
     projected_change(work.basis, rank, u, 1.0 + restitution, change)

@@ -5,9 +5,11 @@ A row maps generalized velocity to normal velocity [m/s]; positive separates.
 
 from __future__ import annotations
 
+import math
+
 from iapb.compiled import kernel
 from iapb.mechanics.kernels.jacobians import motion_at
-from iapb.mechanics.kernels.vectors import add, dot, load, scale, subtract
+from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at and below this
 # share of what it was computed from. Kinematics round by about 2e-16 a joint, so that n and j are known to
@@ -59,10 +61,32 @@ def body_row(m, w, body, point, normal, out):
 @kernel
 def contact_row(m, w, contacts, i, out):
     """(11), (12): nᵀ(J_a − J_b) of contact i; out (d,)."""
+    direction_row(m, w, contacts, i, load(contacts.normal, i), out)
+
+
+@kernel
+def direction_row(m, w, contacts, i, direction, out):
+    """Row of the relative velocity at contact i along a unit direction; out (d,)."""
     out[:] = 0.0
-    x, n = load(contacts.point, i), load(contacts.normal, i)
-    add_body_row(m, w, contacts.body_a[i], x, n, 1.0, out)
-    add_body_row(m, w, contacts.body_b[i], x, n, -1.0, out)
+    x = load(contacts.point, i)
+    add_body_row(m, w, contacts.body_a[i], x, direction, 1.0, out)
+    add_body_row(m, w, contacts.body_b[i], x, direction, -1.0, out)
+
+
+@kernel
+def tangent_of(n, which, tangents):
+    """Unit tangent number `which` of a unit normal: the one in the plane z = 0 where there is one only, else of two."""
+    if tangents == 1:
+        return (-n[1], n[0], 0.0)
+    ax, ay, az = abs(n[0]), abs(n[1]), abs(n[2])
+    if ax <= ay and ax <= az:  # x × n, of the axis that is farthest from n
+        first = (0.0, -n[2], n[1])
+    elif ay <= az:
+        first = (n[2], 0.0, -n[0])
+    else:
+        first = (-n[1], n[0], 0.0)
+    first = scale(1.0 / math.sqrt(dot(first, first)), first)
+    return first if which == 0 else cross(n, first)
 
 
 @kernel

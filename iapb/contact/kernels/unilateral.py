@@ -7,15 +7,38 @@ The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. Activ
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from iapb.compiled import kernel
 
 # A row counts as still closing when it does so faster than this share of |b|: rounding of a d-term sum of unit rows.
 _CLOSING = 1e-13
 
 
-@njit(cache=True)
+class PushWork(NamedTuple):
+    """Scratch of impulses that push only: d coordinates, up to c contacts."""
+
+    q: np.ndarray  # (d + 1, d) orthonormal directions of the passive rows
+    triangle: np.ndarray  # (d + 1, d + 1)
+    solution: np.ndarray  # (d + 1,)
+    passive: np.ndarray  # (d + 1,) int64: rows that push
+    held: np.ndarray  # (c,) bool: is it one of them
+    banned: np.ndarray  # (c,) bool: dependent on them to rounding
+    compressed: np.ndarray  # (d,) whitened velocity after compression
+    final: np.ndarray  # (d,) after restitution
+    more: np.ndarray  # (c,) impulses of the restitution phase beyond E p_c
+
+
+def make_push_work(coordinates: int, contacts: int) -> PushWork:
+    """Allocate the scratch for up to `contacts` rows on `coordinates` generalized velocities."""
+    d, c = coordinates, contacts
+    return PushWork(np.zeros((d + 1, d)), np.zeros((d + 1, d + 1)), np.zeros(d + 1), np.zeros(d + 1, np.int64),
+                    np.zeros(c, np.bool_), np.zeros(c, np.bool_), np.zeros(d), np.zeros(d), np.zeros(c))
+
+
+@kernel
 def _solve_passive(rows, b, passive, size, q, triangle, solution):
     """Least squares on the passive rows: solution[j] for passive[j]; False if they are dependent."""
     d = b.shape[0]
@@ -50,12 +73,12 @@ def _solve_passive(rows, b, passive, size, q, triangle, solution):
     return True
 
 
-@njit(cache=True)
-def _most_closing(rows, count, residual, held):
+@kernel
+def _most_closing(rows, count, residual, work):
     """Free row with the most negative rᵢ·residual, and that speed."""
     best, speed = -1, 0.0
     for i in range(count):
-        if not held[i]:
+        if not (work.held[i] or work.banned[i]):
             closing = 0.0
             for k in range(residual.shape[0]):
                 closing += rows[k, i] * residual[k]
@@ -64,43 +87,43 @@ def _most_closing(rows, count, residual, held):
     return best, speed
 
 
-@njit(cache=True)
-def push_only(rows, count, b, p, residual):
+@kernel
+def push_only(rows, count, b, p, residual, work):
     """Solve `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`; write p and residual = b + Aᵀp. Return False if it did not converge.
 
-    rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,).
+    rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a `PushWork`.
     """
     d = b.shape[0]
-    q, triangle, solution = np.zeros((d + 1, d)), np.zeros((d + 1, d + 1)), np.zeros(d + 1)
-    passive, held, banned = np.zeros(d + 1, np.int64), np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     norm, size = 0.0, 0
     for k in range(d):
         residual[k] = b[k]
         norm += b[k] * b[k]
     for i in range(count):
         p[i] = 0.0
+        work.held[i] = work.banned[i] = False
     threshold = _CLOSING * math.sqrt(norm) * max(1, d)
     for _ in range(10 * (count + d) + 10):
-        entering, speed = _most_closing(rows, count, residual, held | banned)
+        entering, speed = _most_closing(rows, count, residual, work)
         if entering < 0 or speed >= -threshold:
             return True
-        passive[size] = entering
+        work.passive[size] = entering
         size += 1
-        if size > d or not _solve_passive(rows, b, passive, size, q, triangle, solution):
-            banned[entering] = True  # dependent to rounding: it cannot close by itself
+        if size > d or not _solve_passive(rows, b, work.passive, size, work.q, work.triangle, work.solution):
+            work.banned[entering] = True  # dependent to rounding: it cannot close by itself
             size -= 1
             continue
-        held[entering] = True
-        size = _retreat(rows, b, passive, size, q, triangle, solution, held, p)
-        _set_residual(rows, b, passive, size, p, residual)
+        work.held[entering] = True
+        size = _retreat(rows, b, size, p, work)
+        _set_residual(rows, b, work.passive, size, p, residual)
         for i in range(count):
-            banned[i] = False
+            work.banned[i] = False
     return False
 
 
-@njit(cache=True)
-def _retreat(rows, b, passive, size, q, triangle, solution, held, p):
+@kernel
+def _retreat(rows, b, size, p, work):
     """Move p towards the passive solution, letting go of rows that would pull; return the passive size."""
+    passive, solution = work.passive, work.solution
     while True:
         step, blocking = 1.0, -1
         for j in range(size):
@@ -113,15 +136,15 @@ def _retreat(rows, b, passive, size, q, triangle, solution, held, p):
         if blocking < 0:
             return size
         p[passive[blocking]] = 0.0
-        held[passive[blocking]] = False
+        work.held[passive[blocking]] = False
         for j in range(blocking, size - 1):
             passive[j] = passive[j + 1]
         size -= 1
-        if not _solve_passive(rows, b, passive, size, q, triangle, solution):
+        if not _solve_passive(rows, b, passive, size, work.q, work.triangle, solution):
             return size
 
 
-@njit(cache=True)
+@kernel
 def _set_residual(rows, b, passive, size, p, residual):
     """residual = b + Aᵀp."""
     for k in range(b.shape[0]):
@@ -131,24 +154,23 @@ def _set_residual(rows, b, passive, size, p, residual):
         residual[k] = total
 
 
-@njit(cache=True)
-def poisson_impulses(rows, count, u, restitution, p, change):
+@kernel
+def poisson_impulses(rows, count, u, restitution, p, change, work):
     """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. False: no convergence.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
     p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
     """
     d = u.shape[0]
-    compressed, final = np.zeros(d), np.zeros(d)
-    more = np.zeros(count)
-    if not push_only(rows, count, u, p, compressed):
+    compressed, final, more = work.compressed[:d], work.final[:d], work.more
+    if not push_only(rows, count, u, p, compressed, work):
         return False
     for i in range(count):
         returned = restitution[i] * p[i]
         for k in range(d):
             compressed[k] += rows[k, i] * returned
         p[i] += returned
-    if not push_only(rows, count, compressed, more, final):
+    if not push_only(rows, count, compressed, more, final, work):
         return False
     for i in range(count):
         p[i] += more[i]

@@ -9,6 +9,8 @@ import numpy as np
 from iapb.contact.broadphase import BroadPhase
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.impact import ImpactWork
+from iapb.contact.kernels.impact_friction import FrictionWork
+from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels import MechanismArrays, Workspace
 
 
@@ -19,6 +21,8 @@ class Switches(NamedTuple):
     varying_inertia: bool
     velocity_terms: bool
     impulses: bool
+    unequal_restitution: bool
+    impact_friction: bool
     clustering: bool
     impulse_limit: bool
     spreading: bool
@@ -44,7 +48,8 @@ class World(NamedTuple):
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction: float  # μ (6)
     friction_velocity: float  # v_threshold [m/s] (6)
-    restitution: float  # e
+    restitution: float  # e of all contacts, or of those whose shapes give none
+    own_restitution: np.ndarray  # (shapes,) e that a shape's body or wall gives, above 1 = none
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
     coherence_distance: float  # [m]
@@ -69,6 +74,8 @@ class State(NamedTuple):
     contact_count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
     group_of_tree: np.ndarray  # (t,) int64: first tree of its contact group
     state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
+    island_of_tree: np.ndarray  # (t,) int64: first tree of those resolved with it in one impact
+    collides_of_tree: np.ndarray  # (t,) bool: the first tree of an island that collides
     spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
     penalty_force: np.ndarray  # (d,) [N, N m]
     friction_force: np.ndarray  # (d,)
@@ -90,15 +97,18 @@ class State(NamedTuple):
     group_v_plus: np.ndarray  # (d,)
     group_impulse: np.ndarray  # (d,)
     row_impulse: np.ndarray  # (rows,)
+    row_restitution: np.ndarray  # (rows,)
     triangle: np.ndarray  # (d, d)
     target: np.ndarray  # (d,)
     row: np.ndarray  # (d,) one contact row nᵀJ
     work: ImpactWork
+    push_work: PushWork
+    friction_work: FrictionWork
     impacts: ImpactLog
 
 
 class ImpactLog(NamedTuple):
-    """The impacts of one step, one row per colliding group."""
+    """The impacts of one step, one row per colliding island."""
 
     logged: np.ndarray  # (1,) int64: lines in use
     group: np.ndarray  # (t,) int64
@@ -106,7 +116,10 @@ class ImpactLog(NamedTuple):
     rank: np.ndarray  # (t,) int64
     scale: np.ndarray  # (t,)
     clamp: np.ndarray  # (t,)
+    friction_share: np.ndarray  # (t,)
     energy_lost: np.ndarray  # (t,) [J]
+    approaching: np.ndarray  # (t,) int64
+    solved: np.ndarray  # (t,) bool
     v_minus: np.ndarray  # (t, d)
     v_plus: np.ndarray  # (t, d)
     impulse: np.ndarray  # (t, d) [N s, N m s]

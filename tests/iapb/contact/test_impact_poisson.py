@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb import resolve_impact
-from iapb.contact.kernels.unilateral import poisson_impulses
+from iapb.contact.kernels.unilateral import make_push_work, poisson_impulses
 
 BAR_MASS = np.diag([1.0, 1.0 / 12.0])
 BAR_ROWS = np.array([[1.0, 0.5], [1.0, 0.4]])
@@ -67,7 +67,7 @@ def test_equal_restitution_reduces_to_the_scalar_rule(seed: int, e: float) -> No
     u = -rows.T @ rng.uniform(0.1, 1.0, size=3)  # then p = (1 + e) × those weights > 0
     columns = np.ascontiguousarray((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
     p, change = np.zeros(3), np.zeros(5)
-    assert poisson_impulses(columns, 3, u, np.full(3, e), p, change)
+    assert poisson_impulses(columns, 3, u, np.full(3, e), p, change, make_push_work(5, 3))
     scalar = resolve_impact(np.eye(5), rows, u, e)
     np.testing.assert_allclose(u + change, scalar.velocity, atol=1e-12)
     assert np.array_equal(resolve_impact(np.eye(5), rows, u, np.full(3, e)).velocity, scalar.velocity)
@@ -85,7 +85,7 @@ def test_returning_each_contacts_own_share_and_no_more_is_not_sound() -> None:
     v = np.array([-1.0, -2.0])
     columns = np.ascontiguousarray(rows.T)
     p, change = np.zeros(2), np.zeros(2)
-    assert poisson_impulses(columns, 2, v, np.zeros(2), p, change)
+    assert poisson_impulses(columns, 2, v, np.zeros(2), p, change, make_push_work(2, 2))
     naive = v + rows.T @ (p * (1.0 + np.array([1.0, 0.0])))
     assert (rows @ naive).min() < -0.1
     sound = resolve_impact(mass, rows, v, [1.0, 0.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,11 +29,15 @@ def ours(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Any:
     return resolve_impact(M, J, v, e, budget=budget)
 
 
+def _in_budget(subject: Budgeted, budget: int, M: Floats, J: Floats, v: Floats, e: float) -> Any:
+    return subject(M, J, v, e, budget)
+
+
 def every_budget_is_passive(case: ImpactCase, subject: Budgeted) -> LawResidual:
     """Largest relative gain over all budgets; infinite where a budget of none still gives an impulse."""
     worst = -np.inf
     for budget in range(min(case.contacts, case.coordinates) + 1):
-        v_plus = outcome(lambda M, J, v, e, rows=budget: subject(M, J, v, e, rows), case)
+        v_plus = outcome(partial(_in_budget, subject, budget), case)
         worst = max(worst, relative_gain(case, v_plus))
         if budget == 0 and not np.array_equal(v_plus, case.velocity):
             worst = np.inf

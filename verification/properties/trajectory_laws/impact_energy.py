@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from reference.energy_gain import bulk_energy_gain
@@ -31,7 +33,7 @@ def _ratio(trajectory: Trajectory, k: int) -> float:
     return float(gain[0]) / allowed if np.isfinite(bound[0]) else np.inf
 
 
-def struck_coordinates(trajectory: Trajectory, impulse: Floats) -> Floats:
+def struck_coordinates(trajectory: Trajectory, impulse: Floats) -> Any:
     """Coordinates of all trees with an impulse; all of them where there is none."""
     chosen = [np.arange(a, b) for a, b in trajectory.system.mechanism.tree_dofs if np.any(impulse[a:b])]
     return np.concatenate(chosen) if chosen else np.arange(len(impulse))

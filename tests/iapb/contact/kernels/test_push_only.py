@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.contact.kernels.unilateral import push_only
+from iapb.contact.kernels.unilateral import make_push_work, push_only
 
 
 def unit_columns_of(seed: int, d: int, c: int) -> np.ndarray:
@@ -25,7 +25,7 @@ def test_the_optimality_conditions_hold(seed: int, d: int, c: int) -> None:
     columns = unit_columns_of(seed, d, c)
     b = np.random.default_rng(seed + 1).normal(size=d)
     p, residual = np.zeros(c), np.zeros(d)
-    assert push_only(columns, c, b, p, residual)
+    assert push_only(columns, c, b, p, residual, make_push_work(d, c))
     np.testing.assert_allclose(residual, b + columns @ p, atol=1e-12 * (1 + np.abs(p).max()))
     speeds = columns.T @ residual
     size = np.linalg.norm(b)
@@ -51,12 +51,12 @@ def test_no_set_of_contacts_does_better(seed: int, d: int, c: int) -> None:
     columns = unit_columns_of(seed, d, c)
     b = np.random.default_rng(seed + 1).normal(size=d)
     p, residual = np.zeros(c), np.zeros(d)
-    assert push_only(columns, c, b, p, residual)
+    assert push_only(columns, c, b, p, residual, make_push_work(d, c))
     assert 0.5 * residual @ residual <= least_of_all_subsets(columns, b) + 1e-12
 
 
 def test_opposed_contacts_hold_a_body_still() -> None:
     columns = np.array([[1.0, -1.0], [0.0, 0.0]])
     p, residual = np.zeros(2), np.zeros(2)
-    assert push_only(columns, 2, np.array([-2.0, 3.0]), p, residual)
+    assert push_only(columns, 2, np.array([-2.0, 3.0]), p, residual, make_push_work(2, 2))
     assert np.array_equal(residual, [0.0, 3.0]) and np.array_equal(p, [2.0, 0.0])
