@@ -109,8 +109,8 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
         name: {quantity.name: read_values(file[name], quantity.name, place) for quantity in quantities}
         for name, (quantities, _, _) in GROUPS.items()
     }
-    contacts = group["contacts"]
-    contacts["is_new"] = contacts["is_new"].astype(np.bool_)
+    for name, quantity in (("contacts", "is_new"), ("impacts", "solved")):  # truth values are stored as numbers
+        group[name][quantity] = group[name][quantity].astype(np.bool_)
     return {
         "coordinate_names": read_values(file["mechanism"], "coordinate", place),
         "coordinate_units": read_values(file["mechanism"], "coordinate_unit", place),
@@ -118,7 +118,7 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
         "velocity_units": read_values(file["mechanism"], "velocity_unit", place),
         "body_names": read_values(file["mechanism"], "body", place),
         "time": read_values(file["trajectory"], "time", place),
-        "contacts": ContactTable(**contacts),
+        "contacts": ContactTable(**group["contacts"]),
         "impacts": ImpactTable(**group["impacts"]),
         "energy": _energy(file["energy"], place),
         "effects": _effects(file["effects"], place),

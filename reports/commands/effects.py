@@ -28,9 +28,9 @@ def effects(
     on = [effect for effect in found if effect.active]
     print(f"Effects of {source.name}" + (f" in {world}" if world else "") + ": what is on, and what it prevents")
     for effect in on:
-        print(f"  {effect.name:<18}{effect.reason}\n{'':<20}without it: {effect.left_out}")
+        print(f"  {effect.name:<20}{effect.reason}\n{'':<22}without it: {effect.left_out}")
     print("Off, because")
     for effect in found:
         if not effect.active:
-            print(f"  {effect.name:<18}{effect.reason}")
+            print(f"  {effect.name:<20}{effect.reason}")
     print(f"{len(on)} of {len(found)} effects are on; the others cost nothing.")

@@ -40,7 +40,7 @@ def _list_impacts(run: object, count: int) -> None:
 
     table = run.impacts  # type: ignore[attr-defined]
     shown = Table(title=f"The first {min(count, len(table.step))} of {len(table.step)} impacts")
-    for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp", "approaching"):
+    for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp", "closing"):
         shown.add_column(heading, justify="right")
     for i in range(min(count, len(table.step))):
         shown.add_row(f"{run.time[table.step[i]]:.5f}", str(table.rows[i]), str(table.rank[i]),  # type: ignore[attr-defined]
