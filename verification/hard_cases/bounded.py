@@ -53,8 +53,8 @@ def bounded_impact(
     """
     paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the packages that we run from
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
-    command = [sys.executable, "-m", __name__]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **paths, **threads}) as process:
+    command, environment = [sys.executable, "-m", __name__], {**os.environ, **paths, **threads}
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) as process:
         if process.stdout is None or process.stdout.readline() != _READY:
             raise IapbError("the process for a bounded call did not start")
         try:
