@@ -195,3 +195,17 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
     monkeypatch.setattr("iapb.scene.scene_schema", broken)
     with pytest.raises(ZeroDivisionError):
         cli.main(["schema"])
+
+
+@pytest.mark.parametrize(("arguments", "law", "effect"), [
+    (("bar_on_posts",), "impulse-augmented penalty", "unequal_restitution"),
+    (("sliding_box", "--world", "IAPB-friction"), "impulse-augmented penalty with impact friction", "impact_friction"),
+])  # fmt: skip
+def test_extensions_of_the_law_run_by_name_and_say_so_in_the_file(arguments, law, effect, iapb, tmp_path):
+    from reports.store_read import read_run
+
+    status, out, _ = iapb("run", *arguments, "--out", tmp_path, "--set", "duration=0.02")
+    assert status == 0 and f": {law}, coupling none." in out
+    run = read_run(next(tmp_path.glob("*.h5")))
+    assert run.law == law and run.law_settings["friction_in_impacts"] == (effect == "impact_friction")
+    assert effect in {row.name for row in run.effects if row.active}
