@@ -35,10 +35,12 @@ class Bounds:
     def comparison(self, case: ImpactCase) -> float:
         """Largest distance, relative to |u|, of two velocities that ought to be equal.
 
-        Whitening loses ε κ(M) (Cholesky's backward error); a direction of singular value σ carries ε √κ(M) / σ.
+        Whitening loses ε κ(M) (Cholesky's backward error); a direction of singular value σ carries ε √κ(M) / σ. Rows
+        dependent but for a noise below 1e-13 span directions that differ by the noise over σ, twice with 1 + e = 2.
         """
         root = np.sqrt(case.condition)
-        return 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / case.smallest_motion))
+        rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / case.smallest_motion))
+        return rounding + 4.0 * float(np.sqrt(max(case.contacts, 1))) * case.largest_noise / case.smallest_motion
 
 
 # Any sound resolver written with plain numpy (Cholesky, then an SVD of unit rows) keeps these.

@@ -120,6 +120,12 @@ class ImpactCase:
         values = self._svd[0]
         return float(np.min(values[values > RANK_CUT], initial=1.0))
 
+    @property
+    def largest_noise(self) -> float:
+        """Largest singular value of the unit rows that counts as rounding; 0 where there is none."""
+        values = self._svd[0]
+        return float(np.max(values[values <= ROUNDING_BELOW], initial=0.0))
+
     @cached_property
     def speed(self) -> float:
         """|u| = √(vᵀMv)."""

@@ -74,3 +74,12 @@ def test_impulse_range_sees_what_energy_and_restitution_do_not() -> None:
     assert LAWS["kinetic_energy"].check(case, reversed_velocity, KIT).passed
     assert LAWS["restitution"].check(case, reversed_velocity, KIT).passed
     assert not LAWS["impulse_range"].check(case, reversed_velocity, KIT).passed
+
+
+def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:
+    """Rows 6e-14 apart count as one; which of them stands for both turns the impulse by as much."""
+    rows = np.array([[1.0, 0.0], [1.0, 6e-14]])
+    case = ImpactCase(np.eye(2), rows, np.array([-1.0, 1.0]), 1.0)
+    assert case.is_separated and 0.0 < case.largest_noise < 1e-13
+    residual = LAWS["redundancy"].check(case, resolve_impact, FACTORED)
+    assert residual is not None and residual.passed and residual.tolerance < 1e-12
