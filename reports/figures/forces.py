@@ -14,7 +14,7 @@ from iapb.run import Run
 from reports.figures.figure import Numbers, Panel
 from reports.figures.measures import peak_force
 from reports.figures.style import PANEL, STYLES, line_arguments, styled
-from reports.figures.svg import to_svg
+from reports.figures.traces import curve_id, traced_svg
 from reports.figures.trajectories import marks
 
 _FORCES = ((0, "force along x", "Fx [N]", 1.5), (2, "torque", "τ [N m]", 0.03))
@@ -30,11 +30,11 @@ def force_panel(key: str, runs: Mapping[str, Run], coordinate: int, title: str, 
         for number, (curve, run) in enumerate(runs.items()):
             force = run.device_force[:, coordinate]
             axes.plot(run.time[:-1], force, **line_arguments(STYLES[curve]), drawstyle="steps-post",
-                      markevery=marks(len(force), number), zorder=3 + number / 10)
+                      gid=curve_id(curve), markevery=marks(len(force), number), zorder=3 + number / 10)
         axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
         if shown is not None:
             axes.set_ylim(-shown, shown)
-        svg = to_svg(drawing, f"{key}-{coordinate}{'m' if shown else ''}")
+        svg = traced_svg(drawing, f"{key}-{coordinate}{'m' if shown else ''}")
     magnified = f", magnified: cut at ±{shown:g} {label[label.index('[') + 1 : -1]}" if shown else ""
     return Panel(svg, f"{label} over time{magnified}, for {', '.join(runs)}.", title + magnified)
 

@@ -1,6 +1,6 @@
 """From a matplotlib figure to an SVG string that repeats byte for byte and can stand inside a page.
 
-No date, no metadata, salted identifiers that are unique in the page, coordinates to 0.01 pt, colours as the
+No date, no metadata, salted identifiers that are unique in the page, coordinates to 0.01 pt (or finer), colours as the
 page's variables (with the colour itself as fallback), text as text.
 """
 
@@ -16,11 +16,12 @@ LARGEST_ENLARGEMENT = 1.35  # beyond, the lettering would shout
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
+_TOLD = re.compile(r'\sid="(curve|axis|label)=([^"]*)"')  # what a gid tells the page's script, see traces.py
 _FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
 _HEX = re.compile("|".join(VARIABLES))
 
 
-def to_svg(drawing: Any, key: str) -> str:
+def to_svg(drawing: Any, key: str, decimals: int = 2) -> str:
     """Return the figure as one `<svg>` element; `key` makes its identifiers unique in the page."""
     buffer = io.StringIO()
     drawing.savefig(buffer, format="svg", bbox_inches=None,
@@ -30,12 +31,13 @@ def to_svg(drawing: Any, key: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.S)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.S)
     text = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", text, flags=re.S)  # would leak into the page
-    text = _TAG.sub(lambda match: _NUMBER.sub(_rounded, match.group()), text)
+    text = _TOLD.sub(r' data-\1="\2"', text)
+    text = _TAG.sub(lambda tag: _NUMBER.sub(lambda number: _rounded(number.group(), decimals), tag.group()), text)
     return _themed(_fitted(_own_identifiers(text, key))).strip()
 
 
-def _rounded(number: re.Match[str]) -> str:
-    return f"{float(number.group()):.2f}".rstrip("0").rstrip(".")
+def _rounded(number: str, decimals: int) -> str:
+    return f"{float(number):.{decimals}f}".rstrip("0").rstrip(".")
 
 
 def _fitted(text: str) -> str:

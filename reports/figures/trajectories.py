@@ -20,7 +20,7 @@ from reports.figures.measures import (
     widest_separation,
 )
 from reports.figures.style import PANEL, STYLES, line_arguments, styled
-from reports.figures.svg import to_svg
+from reports.figures.traces import PATH, curve_id, traced_svg
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
@@ -49,11 +49,12 @@ def path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
             x, y = MILLI * run.device_q[first:, :2].T
-            axes.plot(x, y, **line_arguments(STYLES[curve]), markevery=marks(len(x), number), zorder=3 + number / 10)
+            axes.plot(x, y, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                      markevery=marks(len(x), number), zorder=3 + number / 10)
         axes.set(xlabel="x [mm]", ylabel="y [mm]")
         axes.xaxis.set_inverted(True)
         axes.yaxis.set_inverted(True)
-        svg = to_svg(drawing, f"{key}-path")
+        svg = traced_svg(drawing, f"{key}-path", PATH)
     alt = f"Paths of the hand in the plane, in mm: {_ends(runs)}"
     return Panel(svg, alt, "path of the hand, from just before contact")
 
@@ -66,9 +67,9 @@ def time_panel(key: str, runs: Mapping[str, Run], coordinate: int) -> Panel:
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
             axes.plot(run.time, factor * run.device_q[:, coordinate], **line_arguments(STYLES[curve]),
-                      markevery=marks(len(run.time), number), zorder=3 + number / 10)
+                      gid=curve_id(curve), markevery=marks(len(run.time), number), zorder=3 + number / 10)
         axes.set(xlabel="t [s]", ylabel=f"{name} [{unit}]", xlim=(0, max(run.time[-1] for run in runs.values())))
-        svg = to_svg(drawing, f"{key}-{'xyz'[coordinate]}")
+        svg = traced_svg(drawing, f"{key}-{'xyz'[coordinate]}")
     return Panel(svg, f"{name} of the hand over time in {unit}, for {', '.join(runs)}.", f"{name} over time")
 
 
@@ -79,9 +80,10 @@ def separation_panel(key: str, runs: Mapping[str, Run]) -> Panel:
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
             apart = MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
-            axes.plot(run.time, apart, **line_arguments(STYLES[curve]), markevery=marks(len(apart), number))
+            axes.plot(run.time, apart, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                      markevery=marks(len(apart), number))
         axes.set(xlabel="t [s]", ylabel="distance [mm]", xlim=(0, max(run.time[-1] for run in runs.values())))
-        svg = to_svg(drawing, f"{key}-apart")
+        svg = traced_svg(drawing, f"{key}-apart")
     return Panel(svg, f"Distance between tool and device over time, for {', '.join(runs)}.",
                  "how far tool and device come apart")
 
@@ -93,9 +95,10 @@ def penetration_panel(key: str, runs: Mapping[str, Run]) -> Panel:
         axes = drawing.add_subplot()
         for number, (curve, run) in enumerate(runs.items()):
             depth = MILLI * penetration_over_time(run)
-            axes.plot(run.time[:-1], depth, **line_arguments(STYLES[curve]), markevery=marks(len(depth), number))
+            axes.plot(run.time[:-1], depth, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                      markevery=marks(len(depth), number))
         axes.set(xlabel="t [s]", ylabel="penetration [mm]", xlim=(0, max(run.time[-1] for run in runs.values())))
-        svg = to_svg(drawing, f"{key}-depth")
+        svg = traced_svg(drawing, f"{key}-depth")
     return Panel(svg, f"Penetration of the virtual peg over time, for {', '.join(runs)}.",
                  "how deep the virtual peg sinks in")
 

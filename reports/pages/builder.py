@@ -12,6 +12,7 @@ from reports.figures import RECIPES
 from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
+from reports.pages.inline import policy, script
 from reports.pages.legend import swatch
 from reports.pages.records import OUTCOMES, Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
@@ -31,8 +32,9 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     figures: dict[str, list[Figure | NotComputed]] = {}
     for section, figure in drawn:
         figures.setdefault(section, []).append(figure)
-    page = _environment().get_template("page.html.j2")
+    page, text = _environment().get_template("page.html.j2"), script()
     return page.render(
+        script=text, policy=policy(text),
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
         subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
     )

@@ -1,0 +1,1 @@
+// Playback: see below.
