@@ -14,35 +14,52 @@ from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
+# What a report compares with, or rests its proofs on.
+PEERS = ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon", "sympy",
+         "python-flint", "hypothesis", "mujoco", "pybullet", "drake", "siconos")  # fmt: skip
 UNKNOWN = "unknown"
+NOT_INSTALLED = "not installed"
 
 
 def collect_provenance(
-    seeds: Sequence[int] = (), command: str | None = None, threads: int | None = None
+    seeds: Sequence[int | str] = (), command: str | None = None, threads: int | None = None,
+    packages: Sequence[str] = (),
 ) -> dict[str, str]:
     """Return what it takes to make a result again, as texts by name.
 
     Parameters
     ----------
     seeds
-        Seeds of the random numbers used, if any.
+        Seeds of the random numbers used, if any, each with its name or without.
     command
         The command that makes it again; by default the one that runs now, without machine paths.
     threads
         Threads that took part; by default not stated.
+    packages
+        Packages beyond those that every result rests on, whose versions are stated too.
     """
     facts = dict(_facts())
     facts["seeds"] = ", ".join(str(seed) for seed in seeds) or "none"
     facts["command"] = current_command() if command is None else command
     if threads is not None:
         facts["threads"] = str(threads)
+    for package in packages:
+        found = package_version(package)
+        facts[package] = NOT_INSTALLED if found == UNKNOWN else found
     return facts
 
 
 def current_command() -> str:
-    """Return the command line of this process; absolute paths are cut to their last part."""
-    words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv]
-    return shlex.join([Path(words[0]).name or "python", *words[1:]])
+    """Return the command line of this process; paths into this machine are cut to their last part."""
+    return shlex.join([Path(sys.argv[0]).name or "python", *(_without_place(word) for word in sys.argv[1:])])
+
+
+def _without_place(word: str) -> str:
+    """An argument without the folders of a path that is absolute or leads upwards: they belong to a machine."""
+    option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
+    path = Path(value)
+    leads_out = path.is_absolute() or ".." in path.parts
+    return f"{option}{equals}{path.name}" if leads_out else word
 
 
 @cache
@@ -101,18 +118,34 @@ def linear_algebra() -> str:
 
 
 def _dirty() -> str:
-    status = _git("status", "--porcelain", "--untracked-files=no")
+    status = _git("status", "--porcelain", "--", *_TRACED)
     return UNKNOWN if status is None else str(bool(status)).lower()
 
 
-def _git(*arguments: str) -> str | None:
-    """Return what git says about the checkout, or None where there is neither git nor checkout."""
+# What can change a result; other files of the checkout may be in work.
+_TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
+
+
+def uncommitted_changes() -> str | None:
+    """Return what differs from the commit among the sources, the scenes and the lock, new files too, as a patch.
+
+    Empty where nothing does, None where there is neither git nor checkout.
+    """
+    changed, new = _git("diff", "HEAD", "--", *_TRACED), _git("ls-files", "--others", "--exclude-standard", *_TRACED)
+    if changed is None or new is None:
+        return None
+    added = [_git("diff", "--no-index", "/dev/null", name, fine=(0, 1)) or "" for name in new.splitlines()]
+    return "\n".join(part for part in (changed, *added) if part)
+
+
+def _git(*arguments: str, fine: tuple[int, ...] = (0,)) -> str | None:
+    """Return what git says about the checkout; None where there is neither, or an exit status that is not `fine`."""
     if not (_ROOT / ".git").exists():
         return None
     try:
         done = subprocess.run(
-            ["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20, check=True
+            ["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20, check=False
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return done.stdout.strip()
+    return done.stdout.strip() if done.returncode in fine else None

@@ -17,7 +17,7 @@ def changed(scene: Scene, values: dict[str, Any]) -> Scene:
     """Return the scene with new values by dotted path; see `Scene.with_values`."""
     plain = scene.resolved()
     for path, value in values.items():
-        _set(plain, path, value)
+        set_value(plain, path, value)
     try:
         made = type(scene).model_validate(plain)
     except ValidationError as failure:
@@ -28,8 +28,8 @@ def changed(scene: Scene, values: dict[str, Any]) -> Scene:
     return made
 
 
-def _set(plain: dict[str, Any], path: Any, value: Any) -> None:
-    """Put a value at a dotted path of plain values; a section that is absent is made."""
+def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
+    """Put a value at a dotted path of a resolved scene, unchecked; a section that is absent is made."""
     if not isinstance(path, str) or not path:
         raise ArgumentError("values", path, "dotted paths as keys, such as contact.friction")
     steps = path.split(".")

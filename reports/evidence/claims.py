@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from iapb.run import Run
+from iapb.scene import Scene
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, Numbers
 from reports.pages.records import Claim
@@ -12,11 +14,25 @@ from reports.runner import Runner
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> tuple[Claim, ...]:
-    """Check every claim with runs from the store."""
+    """Check every claim with runs from the store; each run is listed under every claim that uses it."""
     from verification.claims import check_claims
 
-    results = check_claims(lambda scene, world, rendering: runner(scene, world, rendering, keep=False), depth,
-                           progress=lambda done, total, _: progress(done, total))
+    files: dict[tuple[int, str, str], tuple[str, Scene]] = {}  # holds the scenes, so that their ids stay theirs
+
+    def run(scene: Scene, world: str, rendering: str) -> Run:
+        made = runner(scene, world, rendering, keep=False)
+        files[id(scene), world, rendering] = runner.file_of(scene, world, rendering), scene
+        return made
+
+    def asked(scene: Scene, world: str, rendering: str) -> None:
+        if (id(scene), world, rendering) in files:
+            runner.use_again(files[id(scene), world, rendering][0])
+
+    def begin(done: int, total: int, claim: str) -> None:
+        runner.user = claim
+        progress(done, total)
+
+    results = check_claims(run, depth, progress=begin, asked=asked)
     return tuple(as_record(result) for result in results)
 
 

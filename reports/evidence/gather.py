@@ -17,6 +17,7 @@ from reports.evidence import (
     properties,
     runs,
 )
+from reports.evidence.depends import depends_of
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage
 from reports.evidence.topics import TOPICS, compute_topic
@@ -32,17 +33,25 @@ from reports.pages.records import (
     SceneEffect,
     Topic,
 )
-from reports.provenance import collect_provenance
+from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
 
 Progress = Callable[[str, int, int], None]
 
+# what draws random numbers -> module with its SEED
+SEEDS = {
+    "claims": "verification.claims.study", "properties": "reports.evidence.properties",
+    "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.robots",
+    "power balance": "verification.mechanics.power_balance",
+    "coordinates": "verification.mechanics.coordinate_invariance",
+}  # fmt: skip
 SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
 
 
 def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     """Compute or read everything that the report shows; `out` receives runs/ and tables/."""
-    runner, kept = Runner(out / "runs"), _Kept(out / "tables", depth, progress)
+    runner = Runner(out / "runs")
+    kept = _Kept(out / "tables", depth, progress, runner)
     scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
     inputs: dict[str, Any] = dict(runs.figure_runs(runner, kept.of("runs of the figures")))
     inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
@@ -63,7 +72,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
         cross_checks=checks, hard_cases=hard, effects=needed, topics=topics,
-        provenance=collect_provenance(seeds=(properties.SEED,)), manifest=manifest(runner, kept.paths, out), bulk=bulk,
+        provenance=provenance(), manifest=manifest(runner.used, kept.stages, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)
 
@@ -71,6 +80,14 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
     topic: Topic = kept.stage(name, Topic, lambda done: compute_topic(name, runner, depth, done))
     return topic
+
+
+def provenance() -> dict[str, str]:
+    """Where the report comes from: the facts of every result, all seeds, and the packages it was compared with."""
+    from importlib import import_module
+
+    seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
+    return collect_provenance(seeds=seeds, packages=PEERS)
 
 
 def _with_verdicts(evidence: Evidence) -> Evidence:
@@ -86,11 +103,11 @@ def _arm_energies() -> Mapping[str, Any]:
 
 
 class _Kept:
-    """Stages of one folder and depth; remembers which files they used."""
+    """Stages of one folder and depth, in the order in which they were asked for."""
 
-    def __init__(self, folder: Path, depth: str, progress: Progress) -> None:
-        self.folder, self.depth, self.progress = folder, depth, progress
-        self.paths: list[Path] = []
+    def __init__(self, folder: Path, depth: str, progress: Progress, runner: Runner) -> None:
+        self.folder, self.depth, self.progress, self.runner = folder, depth, progress, runner
+        self.stages: list[Stage] = []
 
     def of(self, title: str) -> Callable[[int, int], None]:
         """Progress of one stage."""
@@ -98,8 +115,8 @@ class _Kept:
 
     def stage(self, name: str, kind: Any, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
         """The records of a stage, computed if they are not there."""
-        stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth})
-        records = stage.get_or_compute(lambda: compute(self.of(name)))
+        stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth}, depends_of(name))
+        records = stage.get_or_compute(lambda: compute(self.of(name)), self.runner)
         self.progress(name, 1, 1)
-        self.paths.append(stage.path)
+        self.stages.append(stage)
         return records

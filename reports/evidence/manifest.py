@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from reports.evidence.stage import Stage
 from reports.pages.records import StoredFile
-from reports.runner import Runner
 from reports.store_read import opened
+from reports.uses import UsedRun
+
+ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
+TABLE_COMMAND = "iapb reproduce"
 
 
-def manifest(runner: Runner, tables: Iterable[Path], out: Path) -> tuple[StoredFile, ...]:
-    """One line per run file used and per table file, in the order of use."""
-    runs = [_line(label.rsplit(" ", 1)[0], path, out) for label, path in runner.used.items()]
-    return tuple(runs + [_line(path.stem.rsplit("-", 1)[0], path, out) for path in tables])
+def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
+    """One line per run file used and per table file, in the order of use; files are named from the folder `out`."""
+    runs = [_run(run, out) for run in used.values()]
+    return tuple(runs + [_table(stage, out) for stage in stages])
 
 
-def _line(name: str, path: Path, out: Path) -> StoredFile:
-    with opened(path, expected_format=None) as file:
-        attributes = dict(file.attrs)
-    key = str(attributes.get("run_key", path.stem.rsplit("-", 1)[-1]))
-    place = path.relative_to(out).as_posix()
-    command = f"iapb inspect out/{place}" if "run_key" in attributes else "iapb reproduce"
-    return StoredFile(name, place, key, str(attributes["content_hash"]), command, path.stat().st_size)
+def _run(run: UsedRun, out: Path) -> StoredFile:
+    path = out / "runs" / run.file
+    status = run.status if path.is_file() else ABSENT
+    place = f"runs/{run.file}"
+    return StoredFile(run.name, place, run.key, run.content_hash, run.command, run.size, run.used_by, status)
+
+
+def _table(stage: Stage, out: Path) -> StoredFile:
+    with opened(stage.path, expected_format=None) as file:
+        content = str(file.attrs["content_hash"])
+    place, name = stage.path.relative_to(out).as_posix(), stage.name.replace("_", " ")
+    return StoredFile(name, place, stage.key, content, TABLE_COMMAND, stage.path.stat().st_size)

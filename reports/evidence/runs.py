@@ -49,6 +49,7 @@ def figure_runs(runner: Runner, progress: Callable[[int, int], None]) -> dict[st
     runs = {}
     for done, (name, (scene, values, world, rendering)) in enumerate(FIGURE_RUNS.items()):
         progress(done, len(FIGURE_RUNS))
-        runs[name] = runner(shipped_scene(scene, values), world, rendering)
+        with runner.recording(name):
+            runs[name] = runner(shipped_scene(scene, values), world, rendering)
     progress(len(FIGURE_RUNS), len(FIGURE_RUNS))
     return runs

@@ -1,33 +1,42 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
-The file's name carries a hash of what determines the records: the stage's inputs and the sources of the engine, the
-references and the verification. So a changed line of theirs makes the stage run again, a change of the report not.
+The file's name carries a hash of what determines the records: the stage's inputs, the sources of the engine, the
+references and the verification, the scenes, and what else the stage says that it depends on. So a changed line of
+theirs makes the stage run again, a change of the report not. Beside the records stand the runs they were made from.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from reports.evidence.tables import numbers_tables
-from reports.store_keys import canonical_json, code_version, plain
-from reports.store_tables import Column, Table, read_table, write_tables
+import numpy as np
 
-_RECORDS = "records"
+from iapb.scene_files import scene_folder
+from reports.evidence.tables import numbers_tables
+from reports.runner import Runner
+from reports.store_keys import canonical_json, code_version, plain
+from reports.store_tables import Column, Table, read_tables, write_tables
+from reports.uses import UsedRun, add_use
+
+_RECORDS, _RUNS = "records", "runs used"
 
 
 @cache
 def evidence_version() -> str:
-    """Hash of everything that can change a verdict: engine, references, verification, and these stages."""
+    """Hash of everything that can change a verdict: engine, references, verification, these stages, and the scenes."""
     digest = hashlib.sha256(code_version().encode())
     root = Path(__file__).resolve().parents[2]
     for folder in ("verification", "reports/evidence"):
         for path in sorted((root / folder).rglob("*.py")):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(path for path in scene_folder().rglob("*") if path.is_file()):
+        digest.update(path.relative_to(scene_folder()).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
@@ -40,30 +49,72 @@ class Stage:
     name : of the topic; starts the file's name.
     kind : the type of the records, such as ``tuple[Claim, ...]``.
     inputs : what determines them besides the code.
+    depends : what they depend on outside of the project, such as files beside it, by name.
+
+    Attributes
+    ----------
+    runs : the runs that the records were made from, by file; known once there are records.
     """
 
-    def __init__(self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any]) -> None:
-        text = canonical_json({"stage": name, "inputs": inputs, "code": evidence_version()})
-        self.key = hashlib.sha256(text.encode()).hexdigest()
+    def __init__(
+        self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any], depends: Mapping[str, str] | None = None
+    ) -> None:
+        given = {"stage": name, "inputs": inputs, "code": evidence_version(), "depends": depends or {}}
+        self.key = hashlib.sha256(canonical_json(given).encode()).hexdigest()
         self.name = name
         self.path = folder / f"{name}-{self.key[:16]}.h5"
+        self.runs: dict[str, UsedRun] = {}
         self._kind = kind
 
-    def get_or_compute(self, compute: Callable[[], Any]) -> Any:
-        """Return the records: from the file where there is one, else computed and written."""
+    def get_or_compute(self, compute: Callable[[], Any], runner: Runner | None = None) -> Any:
+        """Return the records: from the file where there is one, else computed and written.
+
+        The runs that `compute` asks `runner` for are remembered in the file, and count as used whenever it is read.
+        """
         from pydantic import TypeAdapter
 
         adapter = TypeAdapter(self._kind)
         if self.path.is_file():
-            return adapter.validate_python(json.loads(read_table(self.path, _RECORDS)["json"][0]))
-        records = compute()
+            return self._read(adapter, runner)
+        with runner.recording(self.name.replace("_", " ")) if runner else nullcontext({}) as used:
+            records = compute()
+        self.runs = dict(used)
         text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
         read_back = adapter.validate_python(json.loads(text))  # what is no such record is not written
-        title = f"Records of the stage {self.name}"
-        table = Table(_RECORDS, (Column("json", (text,), "1", "the records as JSON"),), title, command="iapb reproduce")
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_tables(self.path, (table, *numbers_tables(records)))
+        runs = (self._runs_table(),) if self.runs else ()
+        write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs))
         return read_back
+
+    def _read(self, adapter: Any, runner: Runner | None) -> Any:
+        tables = read_tables(self.path)
+        self.runs = {run.file: run for run in _runs_of(tables[_RUNS])} if _RUNS in tables else {}
+        for run in self.runs.values() if runner else ():
+            add_use(runner.used, run)
+        return adapter.validate_python(json.loads(tables[_RECORDS]["json"][0]))
+
+    def _records_table(self, text: str) -> Table:
+        column = Column("json", (text,), "1", "the records as JSON")
+        return Table(_RECORDS, (column,), f"Records of the stage {self.name}", tuple(self.runs), "iapb reproduce")
+
+    def _runs_table(self) -> Table:
+        rows = [plain_records(run) for run in self.runs.values()]
+        texts = [Column(name, tuple(row[name] for row in rows), "1", meaning) for name, meaning in _RUN_TEXTS.items()]
+        users = Column("used_by", tuple("\n".join(row["used_by"]) for row in rows), "1", "what used it, a line each")
+        size = Column("size", np.array([row["size"] for row in rows], np.int64), "byte", "size of the file")
+        return Table(_RUNS, (*texts, users, size), f"Runs behind the stage {self.name}", command="iapb reproduce")
+
+
+_RUN_TEXTS = {
+    "file": "name within the folder of runs", "name": "scene, world and rendering", "key": "hash of what determines it",
+    "content_hash": "hash of its results", "command": "makes it again", "status": "complete or partial",
+}  # fmt: skip
+
+
+def _runs_of(table: Table) -> Iterator[UsedRun]:
+    for row, users in enumerate(table["used_by"]):
+        texts = {name: str(table[name][row]) for name in _RUN_TEXTS}
+        yield UsedRun(**texts, size=int(table["size"][row]), used_by=tuple(str(users).split("\n")) if users else ())
 
 
 def plain_records(records: Any) -> Any:

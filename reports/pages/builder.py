@@ -16,6 +16,7 @@ from reports.pages.inline import policy, script
 from reports.pages.legend import swatch
 from reports.pages.records import OUTCOMES, Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
+from reports.pages.uses import runs_by_user
 from reports.pages.verdicts import verdicts
 
 # The mark that goes with each outcome: shape as well as colour.
@@ -67,7 +68,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, tables_without=tables_without,
+        as_finding=FINDINGS.__getitem__, tables_without=tables_without, runs_by_user=runs_by_user,
     )
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment

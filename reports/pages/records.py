@@ -153,7 +153,11 @@ class SceneEffect:
 
 @dataclass(frozen=True)
 class StoredFile:
-    """One line of the manifest: a run or table file, what it holds, and the command that makes it again."""
+    """One line of the manifest: a run or table file, what it holds, and the command that makes it again.
+
+    used_by : the claims, figures' inputs and topics made from a run; nobody for a table
+    status : "complete", "partial" where a simulation gave up, "absent" where the file is gone since
+    """
 
     name: str
     file: str
@@ -161,6 +165,8 @@ class StoredFile:
     content_hash: str
     command: str
     size: int | None = None  # bytes
+    used_by: tuple[str, ...] = ()
+    status: str = "complete"
 
 
 @dataclass(frozen=True)

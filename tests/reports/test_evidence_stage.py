@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 from iapb.errors import RunFileError
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records
 from reports.evidence.tables import numbers_table, numbers_tables
 from reports.figures.figure import Numbers
+from reports.runner import Runner
 from reports.store_tables import read_table
 
 
@@ -55,6 +59,49 @@ def test_numpy_values_become_plain_ones(tmp_path):
     [computed, read] = [stage.get_or_compute(lambda: record) for _ in range(2)]
     assert same(computed, read) and type(read.value) is float and type(read.holds) is bool
     assert plain_records({"a": (np.int64(1),)}) == {"a": [1]}
+
+
+def test_runs_are_remembered_beside_the_records(tmp_path):
+    """A stage that is read from its file lists the same runs as the one that made them."""
+    scene = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4})
+
+    def compute(runner):
+        runner(scene, "IAPB")
+        runner.user = "C07"
+        runner(scene, "PB")
+        return RECORDS
+
+    seen = []
+    for _ in range(2):
+        runner, stage = Runner(tmp_path / "runs"), Stage(tmp_path, "claims", tuple[Record, ...], {})
+        stage.get_or_compute(lambda: compute(runner), runner)  # noqa: B023
+        assert runner.used == stage.runs
+        seen.append(stage.runs)
+    assert seen[0] == seen[1] and [run.used_by for run in seen[0].values()] == [("claims",), ("C07",)]
+    listed = read_table(stage.path, "runs used")
+    assert list(listed["command"]) == [f"iapb run peg_corner --set duration=0.4 --world {w}" for w in ("IAPB", "PB")]
+
+
+def test_what_a_stage_reads_beside_the_project_is_in_its_key(tmp_path, monkeypatch):
+    monkeypatch.setattr(depends, "BESIDE", tmp_path)
+    found = [depends.depends_of("complementarity")]
+    for text in ("one", "two"):
+        (tmp_path / "problems").mkdir(exist_ok=True)
+        (tmp_path / "problems" / "case.txt").write_text(text)
+        found.append(depends.depends_of("complementarity"))
+    assert len({Stage(tmp_path, "complementarity", int, {}, one).path for one in found}) == 3
+    assert found[0] == {"problems": depends.ABSENT}
+    assert depends.depends_of("proofs") == {}
+    assert set(depends.depends_of("engines")) >= {"mujoco", "drake"}
+
+
+def test_a_changed_scene_is_another_key(tmp_path, monkeypatch):
+    (tmp_path / "peg.yaml").write_text("name: peg")
+    monkeypatch.setattr(stages, "scene_folder", lambda: tmp_path)
+    versions = [stages.evidence_version.__wrapped__()]
+    (tmp_path / "peg.yaml").write_text("name: pig")
+    versions.append(stages.evidence_version.__wrapped__())
+    assert versions[0] != versions[1]
 
 
 def test_another_depth_name_or_source_is_another_file(tmp_path, monkeypatch):

@@ -37,8 +37,9 @@ def test_a_run_is_computed_once_by_all_runners_of_a_folder(tmp_path, computed):
     second = runner(PEG, "IAPB")
     assert computed == ["IAPB"]
     assert np.array_equal(first.q, second.q) and runner(PEG, "IAPB") is second
-    [path] = runner.used.values()
-    assert np.array_equal(read_run(path).q, first.q)
+    [used] = runner.used.values()
+    assert np.array_equal(read_run(tmp_path / used.file).q, first.q)
+    assert (used.status, used.size) == ("complete", (tmp_path / used.file).stat().st_size)
 
 
 def test_whatever_changes_a_run_changes_its_key(tmp_path):
@@ -100,3 +101,24 @@ def test_progress_counts_to_the_end(tmp_path):
     seen = []
     Runner(tmp_path, lambda done, total: seen.append((done, total)))(PEG, "PB")
     assert seen[-1] == (PEG.steps, PEG.steps) and [done for done, _ in seen] == sorted(done for done, _ in seen)
+
+
+def test_runs_are_listed_under_everything_that_used_them(tmp_path):
+    runner = Runner(tmp_path)
+    with runner.recording("trajectories") as inside:
+        runner(PEG, "IAPB")
+        runner.user = "forces"
+        runner.use_again(runner.file_of(PEG, "IAPB"))
+        runner(PEG, "PB", keep=False)
+    assert [run.used_by for run in inside.values()] == [("trajectories", "forces"), ("forces",)]
+    with runner.recording("energy"):
+        runner(PEG, "IAPB")
+    assert [run.used_by for run in runner.used.values()] == [("trajectories", "forces", "energy"), ("forces",)]
+    assert runner.user == "" and len(inside) == 2
+
+
+def test_a_run_that_gave_up_is_listed_as_partial(tmp_path):
+    runner = Runner(tmp_path, interrupt)
+    runner(PEG, "IAPB", partial=True)
+    [used] = runner.used.values()
+    assert used.status == "partial" and (tmp_path / used.file).is_file()

@@ -26,6 +26,7 @@ from verification.claims.conditions import (
 from verification.claims.trace import Trace, trace_of
 
 Runner = Callable[[Scene, str, str], Run]
+Asked = Callable[[Scene, str, str], None]
 
 DEPTHS = ("quick", "full")
 SEED = 20050601  # of the random instances; the month the paper appeared
@@ -45,11 +46,13 @@ class Study:
     run : (scene, world, rendering) -> Run
     depth : "quick" or "full", how fine the conditions are
     seed : of the random impacts
+    asked : called whenever a claim uses a run, also one that was made for an earlier claim
     """
 
     run: Runner = run_directly
     depth: str = "quick"
     seed: int = SEED
+    asked: Asked | None = None
     _traces: dict[tuple[Any, ...], Trace] = field(default_factory=dict, repr=False)
     _scenes: dict[Any, Scene] = field(default_factory=dict, repr=False)
 
@@ -78,6 +81,8 @@ class Study:
         """The peg under a condition in a world, run once for all conditions that this world cannot tell apart."""
         seen = condition.seen_by(world, rendering)
         key = (seen, world, rendering)
+        if self.asked is not None:
+            self.asked(self.place(seen), world, rendering)
         if key not in self._traces:
             run = self.run(self.place(seen), world, rendering)
             self._traces[key] = trace_of(run)
@@ -100,6 +105,7 @@ def check_claims(
     depth: str = "quick",
     ids: Sequence[str] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    asked: Asked | None = None,
 ) -> tuple[ClaimResult, ...]:
     """Check the paper's claims and return one record each.
 
@@ -109,6 +115,7 @@ def check_claims(
     depth : "quick" (about a minute) or "full"
     ids : the claims to check; default all
     progress : called as progress(claims done, claims in all, id of the next)
+    asked : called as asked(scene, world, rendering) whenever a claim uses a run, also one made for an earlier claim
 
     Raises
     ------
@@ -121,7 +128,7 @@ def check_claims(
     if unknown:
         raise ArgumentError("ids", unknown, "some of " + ", ".join(CLAIMS))
     chosen = tuple(CLAIMS) if ids is None else tuple(ids)
-    study, results = Study(run, depth), []
+    study, results = Study(run, depth, asked=asked), []
     for done, name in enumerate(chosen):
         if progress is not None:
             progress(done, len(chosen), name)

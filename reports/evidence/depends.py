@@ -1,0 +1,40 @@
+"""What stages read besides the project's own sources: one line per stage. It is part of the stage's key."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from reports.provenance import package_version
+
+BESIDE = Path(__file__).resolve().parents[3] / "shared"  # files of others, where somebody has put them
+ABSENT = "absent"
+
+# stage -> folders beside the project that it reads where they exist
+FOLDERS: dict[str, tuple[str, ...]] = {
+    "mechanics": ("robots",),
+    "complementarity": ("problems",),
+    "hard cases": ("problems",),
+}
+# stage -> packages that it compares with, or leaves out where they are absent
+PACKAGES: dict[str, tuple[str, ...]] = {
+    "engines": ("mujoco", "pin", "pybullet", "drake", "siconos"),
+    "mechanics": ("pin", "coal"),
+    "cross-checks": ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon"),
+}
+
+
+def depends_of(stage: str) -> dict[str, str]:
+    """Return everything that a stage depends on by name: hashes of folders, or ABSENT, and versions of packages."""
+    folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
+    return folders | {name: package_version(name) for name in PACKAGES.get(stage, ())}
+
+
+def folder_hash(folder: Path) -> str:
+    """Return sha256 of the names and bytes of every file below a folder; ABSENT where there is no such folder."""
+    if not folder.is_dir():
+        return ABSENT
+    digest = hashlib.sha256()
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()

@@ -1,0 +1,117 @@
+"""Which runs something was made from, and the command that makes each of them again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Mapping, MutableMapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from iapb.errors import IapbError
+from iapb.scene import Scene
+
+COMPLETE, PARTIAL = "complete", "partial"
+
+
+@dataclass(frozen=True)
+class UsedRun:
+    """A run file that was read or written for something.
+
+    name : scene, world and rendering
+    file : name within the folder of runs
+    key, content_hash : what was asked for, and what came of it
+    command : makes the run again
+    size : of the file [bytes]
+    status : COMPLETE or PARTIAL, the latter where the simulation gave up
+    used_by : what used it, such as a claim or a topic
+    """
+
+    name: str
+    file: str
+    key: str
+    content_hash: str
+    command: str
+    size: int
+    status: str = COMPLETE
+    used_by: tuple[str, ...] = ()
+
+
+def read_use(path: Path, name: str, command: str) -> UsedRun:
+    """Return the run in a file, used by nobody yet."""
+    from reports.store_read import read_head
+
+    head = read_head(path)
+    return UsedRun(name, path.name, str(head["run_key"]), str(head["content_hash"]),
+                   command or f"iapb store again out/runs/{path.name}", path.stat().st_size, str(head["status"]))
+
+
+def add_use(used: MutableMapping[str, UsedRun], run: UsedRun) -> None:
+    """Add a run to those used, by file; who used it before stays known."""
+    before = used[run.file].used_by if run.file in used else ()
+    used[run.file] = replace(run, used_by=tuple(dict.fromkeys(before + run.used_by)))
+
+
+def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
+    """Return the `iapb run` that simulates this scene in this world; empty where no scene of the project leads to it.
+
+    Its values are tried before it is returned: as the command reads them, they must give the scene to the last bit.
+    """
+    from iapb.scene.changing import set_value
+    from reports.commands.run import parsed
+
+    shipped = _shipped(scene.name)
+    if shipped is None:
+        return ""
+    wanted, again = scene.resolved(), shipped.resolved()
+    sets = [f"{path}={json.dumps(value)}" for path, value in changes(again, wanted)]
+    try:
+        for path, value in parsed(sets).items():
+            set_value(again, path, value)
+    except IapbError:
+        return ""
+    if again != wanted:
+        return ""
+    words = ["iapb", "run", scene.name, *(word for text in sets for word in ("--set", text)), "--world", world]
+    return shlex.join(words + (["--rendering", rendering] if rendering != "full" else []))
+
+
+@cache
+def _shipped(name: str) -> Scene | None:
+    from iapb.scene import load_scene
+    from iapb.scene_files import find_scene, scene_names
+
+    return load_scene(find_scene(name)) if name in scene_names() else None
+
+
+def changes(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (dotted path, new value) wherever the values of two resolved scenes differ, as deep as paths reach."""
+    if old == new:
+        return
+    steps = _steps(old, new)
+    if steps is None:
+        yield path, new
+        return
+    for step in steps:
+        yield from changes(old[step], new[step], f"{path}.{_name(new, step)}".lstrip("."))
+
+
+def _steps(old: Any, new: Any) -> list[Any] | None:
+    """Keys or indices that both have; None where a path cannot go deeper."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping) and list(old) == list(new):
+        return list(new)
+    if isinstance(old, list) and isinstance(new, list) and _names(new) and _names(old) == _names(new):
+        return list(range(len(new)))
+    return None
+
+
+def _names(items: list[Any]) -> list[str]:
+    """Names of a list's items; none at all unless every one has its own: such a list is set as a whole."""
+    names = [item["name"] for item in items if isinstance(item, Mapping) and item.get("name")]
+    return names if len(set(names)) == len(items) else []
+
+
+def _name(place: Any, step: Any) -> str:
+    return str(step) if isinstance(place, Mapping) else str(place[step]["name"])

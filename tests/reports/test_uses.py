@@ -1,0 +1,69 @@
+"""The command beside a run makes that run again, to the last bit."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from iapb.scene import Scene, load_scene
+from iapb.scene_files import find_scene, scene_names
+from reports import cli
+from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+from reports.pages.records import StoredFile
+from reports.pages.uses import runs_by_user
+from reports.runner import Runner
+from reports.uses import changes, run_command
+
+PEG = load_scene(find_scene("peg_corner"))
+CHANGED = {
+    "duration": 0.4, "bodies.peg.position": [0.0205, -0.013250000000000001, 1e-7], "contact.friction": 0.1,
+    "walls.floor.normal": [0.1, -1.0], "device.delay": 1, "gravity": [0.0, 9.81], "couplings.unilateral": None,
+    "title": "it's \"quoted\": {a, b} # and more",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("values", [{"duration": 0.4}, CHANGED])
+@pytest.mark.parametrize(("world", "rendering"), [("PB", "full"), ("IAPB", "spread")])
+def test_a_pasted_command_makes_the_same_run_again(values, world, rendering, tmp_path):
+    runner = Runner(tmp_path / "one")
+    runner(PEG.with_values(values), world, rendering)
+    [used] = runner.used.values()
+    program, *words = shlex.split(used.command)
+    assert program == "iapb" and cli.main([*words, "--out", str(tmp_path / "two")]) == 0
+    [again] = Runner(tmp_path / "two").store.entries()
+    assert (again.file, again.run_key, again.content_hash) == (used.file, used.key, used.content_hash)
+
+
+def test_every_scene_and_every_run_of_the_figures_has_a_command():
+    assert all(run_command(load_scene(find_scene(name)), "IAPB") for name in scene_names())
+    for scene, values, world, rendering in FIGURE_RUNS.values():
+        command = run_command(shipped_scene(scene, values), world, rendering)
+        assert command.startswith(f"iapb run {scene} ") and command.count("--set") == len(values)
+
+
+def test_a_scene_of_ones_own_is_made_again_from_its_file(tmp_path):
+    """No words of a command line lead to it, so the command names the run file."""
+    own: Scene = PEG.with_values({"name": "own", "duration": 0.4})
+    runner = Runner(tmp_path)
+    runner(own, "PB")
+    [used] = runner.used.values()
+    assert run_command(own, "PB") == "" and used.command == f"iapb store again out/runs/{used.file}"
+    assert cli.main(["store", "again", str(tmp_path / used.file)]) == 0
+
+
+def test_changes_go_as_deep_as_paths_can():
+    walls = [{"name": "x", "e": 0}, {"name": "y", "e": 0}]
+    old = {"a": {"b": 1, "c": 2}, "walls": walls, "list": [1, 2], "none": None}
+    new = {"a": {"b": 1, "c": 3}, "walls": [walls[0], {"name": "y", "e": 1}], "list": [1, 3], "none": {"k": 1}}
+    assert list(changes(old, new)) == [("a.c", 3), ("walls.y.e", 1), ("list", [1, 3]), ("none", {"k": 1})]
+    assert list(changes({"walls": [{"name": "x"}]}, {"walls": []})) == [("walls", [])]
+    assert not list(changes(old, old))
+
+
+def test_runs_stand_under_each_of_their_users():
+    files = [StoredFile(name, f"runs/{name}.h5", "k", "c", "iapb run", 10, users, status)
+             for name, users, status in (("a", ("C07", "C10"), "complete"), ("b", ("C10",), "absent"), ("t", (), ""))]
+    first, second = runs_by_user(files)
+    assert (first.user, len(first.runs), first.missing) == ("C07", 1, 0)
+    assert (second.user, len(second.runs), second.size, second.missing) == ("C10", 2, 20, 1)
