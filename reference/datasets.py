@@ -19,7 +19,8 @@ from reference.complementarity.problem import ImpactProblem
 
 Floats = NDArray[np.float64]
 
-_LARGEST_SIZE = 20_000  # a dense W of 3.2 GB; a larger number in a header is damage, not a problem
+LARGEST_SIZE = 10_000  # a dense W of 0.8 GB; a larger number in a header is damage, not a problem
+_LARGEST_TEXT = 64 << 20  # bytes, unpacked: 2,500 unknowns with all their digits; a few packed bytes can ask for any
 
 # Rows that each constraint type of an MLCP file brings: True for a two-sided one.
 _MLCP_ROWS = {
@@ -51,7 +52,17 @@ class StoredProblem:
 
 
 def read_problem(path: Path | str) -> StoredProblem:
-    """Read a problem file of any known format: .lcp.gz or .lcp, .dat, .txt (MLCP), .hdf5 or .h5 (FCLIB)."""
+    """Read a problem file of any known format: .lcp.gz or .lcp, .dat, .txt (MLCP), .hdf5 or .h5 (FCLIB).
+
+    Parameters
+    ----------
+    path : of the file; its name's ending says which format
+
+    Raises
+    ------
+    DatasetError
+        The file is of no known kind, damaged, cut off, or larger than is read here; the message says where.
+    """
     path = Path(path)
     name = path.name.lower()
     if name.endswith((".hdf5", ".h5")):
@@ -136,8 +147,13 @@ def read_mlcp(path: Path | str) -> StoredProblem:
 
 def _text(path: Path) -> str:
     try:
-        raw = path.read_bytes()
-        return (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8")
+        with path.open("rb") as file:
+            packed = file.read(2) == b"\x1f\x8b"
+            file.seek(0)
+            raw = (gzip.GzipFile(fileobj=file) if packed else file).read(_LARGEST_TEXT + 1)
+        if len(raw) > _LARGEST_TEXT:
+            raise DatasetError(path, f"holds more than {_LARGEST_TEXT >> 20} MB of text: more than is read here")
+        return raw.decode("utf-8")
     except (OSError, EOFError, zlib.error) as error:
         raise DatasetError(path, f"cannot be read: {error}") from error
     except UnicodeDecodeError:
@@ -158,8 +174,8 @@ def _count(path: Path, numbers: Floats, index: int) -> int:
     if len(numbers) <= index:
         raise DatasetError(path, "is empty")
     n = numbers[index]
-    if n != int(n) or not 0 <= n <= _LARGEST_SIZE:
-        raise DatasetError(path, f"size {n:g}: expected a whole number up to {_LARGEST_SIZE}")
+    if n != int(n) or not 0 <= n <= LARGEST_SIZE:
+        raise DatasetError(path, f"size {n:g}: expected a whole number up to {LARGEST_SIZE}")
     return int(n)
 
 

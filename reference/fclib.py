@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.complementarity.problem import ImpactProblem
-from reference.datasets import DatasetError, StoredProblem
+from reference.datasets import LARGEST_SIZE, DatasetError, StoredProblem
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,17 @@ def read_fclib(path: Path | str) -> StoredProblem:
     """Read a local or global FCLIB problem as an ImpactProblem with friction.
 
     A global problem is condensed: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f; its mechanics comes along (J = Hᵀ).
+
+    Parameters
+    ----------
+    path : of the HDF5 file
+
+    Raises
+    ------
+    DatasetError
+        The file is no FCLIB problem, is damaged, or states a size beyond what is read here.
+    MissingDependencyError
+        h5py is not installed.
     """
     path, h5py = Path(path), _h5py()
     try:
@@ -37,13 +48,13 @@ def read_fclib(path: Path | str) -> StoredProblem:
             reader = _read_local if kinds[0] == "fclib_local" else _read_global
             problem = reader(path, group)
             remark = " ".join(_string(group, "info/title").split())
-            return StoredProblem(problem, _stored_impulse(file, problem.size), remark, kinds[0])
-    except (OSError, KeyError, RuntimeError) as error:
-        raise DatasetError(path, f"cannot be read: {error}") from error
+            return StoredProblem(problem, _stored_impulse(path, file, problem.size), remark, kinds[0])
+    except DatasetError:
+        raise
     except IapbError as error:
-        if isinstance(error, DatasetError):
-            raise
         raise DatasetError(path, str(error)) from error
+    except Exception as error:  # HDF5, but made by something else or damaged: can fail anywhere, with anything
+        raise DatasetError(path, f"cannot be read: {' '.join(str(error).split())}") from error
 
 
 def write_fclib(
@@ -75,7 +86,7 @@ def _h5py() -> Any:
 
 
 def _read_local(path: Path, group: Any) -> ImpactProblem:
-    q, mu = _vector(group, "vectors/q"), _vector(group, "vectors/mu")
+    q, mu = _vector(path, group, "vectors/q"), _vector(path, group, "vectors/mu")
     w = _matrix(path, group["W"], "W")
     size = _spacedim(path, group, len(mu), len(q))
     return ImpactProblem.from_delassus(w, q, 0.0, mu, contact_size=size, name=path.name)
@@ -83,7 +94,7 @@ def _read_local(path: Path, group: Any) -> ImpactProblem:
 
 def _read_global(path: Path, group: Any) -> ImpactProblem:
     mass, h = _matrix(path, group["M"], "M"), _matrix(path, group["H"], "H")
-    f, w, mu = (_vector(group, f"vectors/{name}") for name in ("f", "w", "mu"))
+    f, w, mu = (_vector(path, group, f"vectors/{name}") for name in ("f", "w", "mu"))
     if mass.shape != (len(f), len(f)) or h.shape != (len(f), len(w)):
         raise DatasetError(path, f"shapes M {mass.shape}, H {h.shape}, f {f.shape}, w {w.shape} do not fit")
     size, free = _spacedim(path, group, len(mu), len(w)), np.linalg.solve(mass, f)
@@ -95,7 +106,7 @@ def _read_global(path: Path, group: Any) -> ImpactProblem:
 
 
 def _spacedim(path: Path, group: Any, contacts: int, components: int) -> int:
-    size = int(np.asarray(group["spacedim"]).ravel()[0])
+    size = _whole(path, group, "spacedim")
     if size not in (2, 3) or contacts * size != components:
         raise DatasetError(
             path, f"spacedim {size}, {contacts} contacts and {components} components do not fit"
@@ -103,8 +114,28 @@ def _spacedim(path: Path, group: Any, contacts: int, components: int) -> int:
     return size
 
 
-def _vector(group: Any, name: str) -> Floats:
-    return np.asarray(group[name], np.float64).ravel()
+def _vector(path: Path, group: Any, name: str) -> Floats:
+    return _numbers(path, group, name, "iuf").astype(np.float64)
+
+
+def _numbers(path: Path, group: Any, name: str, kinds: str) -> NDArray[Any]:
+    """Return a dataset of real numbers as a vector; looked at before it is read, since its header may say anything."""
+    dataset = group[name]
+    if not hasattr(dataset, "dtype") or dataset.dtype.kind not in kinds or dataset.shape is None:
+        raise DatasetError(path, f"{name} is no dataset of {'whole ' if kinds == 'iu' else ''}numbers")
+    if dataset.size > LARGEST_SIZE**2:
+        raise DatasetError(path, f"{name} is said to hold {dataset.size} numbers: more than is read here")
+    values = np.asarray(dataset[()]).ravel()
+    if not np.isfinite(values).all():
+        raise DatasetError(path, f"{name} holds a number that is not finite")
+    return values
+
+
+def _whole(path: Path, group: Any, name: str) -> int:
+    values = _numbers(path, group, name, "iu")
+    if len(values) != 1:
+        raise DatasetError(path, f"{name} holds {len(values)} numbers: expected one")
+    return int(values[0])
 
 
 def _string(group: Any, name: str) -> str:
@@ -115,8 +146,11 @@ def _matrix(path: Path, group: Any, name: str) -> Floats:
     """Return a CXSparse matrix as a dense array."""
     from scipy import sparse
 
-    m, n, nz = (int(np.asarray(group[key]).ravel()[0]) for key in ("m", "n", "nz"))
-    i, p, x = (np.asarray(group[key]).ravel() for key in ("i", "p", "x"))
+    m, n, nz = (_whole(path, group, key) for key in ("m", "n", "nz"))
+    i, p, x = (_numbers(path, group, key, kinds) for key, kinds in (("i", "iu"), ("p", "iu"), ("x", "iuf")))
+    if not (0 <= m <= LARGEST_SIZE and 0 <= n <= LARGEST_SIZE and (nz in (_ROWS, _COLUMNS) or 0 <= nz <= len(x))):
+        raise DatasetError(path, f"matrix {name} of {m} x {n} with nz = {nz}: expected at most {LARGEST_SIZE} rows and "
+                           "columns, and nz -1, -2 or the number of its entries")  # fmt: skip
     try:
         if nz in (_ROWS, _COLUMNS):
             compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
@@ -127,10 +161,10 @@ def _matrix(path: Path, group: Any, name: str) -> Floats:
         raise DatasetError(path, f"matrix {name} is damaged: {error}") from error
 
 
-def _stored_impulse(file: Any, size: int) -> Floats | None:
+def _stored_impulse(path: Path, file: Any, size: int) -> Floats | None:
     if "solution/r" not in file:
         return None
-    r = _vector(file, "solution/r")
+    r = _vector(path, file, "solution/r")
     return r if r.any() and len(r) == size else None  # all zeros: a placeholder, never a reference
 
 

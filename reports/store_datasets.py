@@ -16,6 +16,8 @@ from reports.store_seal import seal
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
 _COMPRESSION_LEVEL = 4
+_MOST_PACKED = 1100  # times: deflate makes at most 1032 bytes of one
+_UNPACKED_SMALL = 1 << 20  # bytes that anything may state
 
 
 @contextmanager
@@ -114,13 +116,15 @@ def read_values(group: Any, name: str, path: str) -> Any:
     Raises
     ------
     RunFileError
-        If there is no such dataset.
+        If there is no such dataset, or it states more values than its bytes can hold.
     """
     import h5py
 
-    if name not in group:
+    if name not in group or not isinstance(group[name], h5py.Dataset):
         raise RunFileError(f"{path}: {group.name}/{name} is missing")
     dataset = group[name]
+    if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():
+        raise RunFileError(f"{path}: {group.name}/{name} states {dataset.size} values, more than its bytes can hold")
     if h5py.check_string_dtype(dataset.dtype) is None:
         return dataset[()]
     texts = dataset.asstr()[()]

@@ -74,9 +74,19 @@ def read_run(path: Path | str) -> Run:
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
-    """Return where a run or a table comes from, as texts by name."""
+    """Return where a run or a table comes from, as texts by name.
+
+    Raises
+    ------
+    RunFileError
+        If the file is damaged, or an entry is no text.
+    """
     with opened(path, expected_format=None) as file:
-        return {name: read_values(file["provenance"], name, str(path)) for name in file["provenance"]}
+        found = {name: read_values(file["provenance"], name, str(path)) for name in file["provenance"]}
+    for name, text in found.items():
+        if not isinstance(text, str):
+            raise RunFileError(f"{path}: provenance/{name} is no text")
+    return found
 
 
 def read_head(path: Path | str) -> dict[str, Any]:

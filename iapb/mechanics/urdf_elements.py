@@ -12,28 +12,64 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.mechanics.urdf_spelling import check_spelling
 
 Floats = NDArray[np.float64]
+
+MAX_BYTES = 10_000_000  # the largest of known robots has a tenth
+MAX_DEPTH = 32
 
 
 def _refuse_doctype(*_: object) -> NoReturn:
     raise ArgumentError("URDF file", "<!DOCTYPE", "no document type: it could declare entities without end")
 
 
+class _Depth:
+    """Counts the elements that are open; a URDF has five levels, a file without end as many as it likes."""
+
+    def __init__(self) -> None:
+        self.open = 0
+
+    def enter(self, *_: object) -> None:
+        self.open += 1
+        if self.open > MAX_DEPTH:
+            raise ArgumentError("URDF file", f"{self.open} levels", f"at most {MAX_DEPTH} levels of elements")
+
+    def leave(self, *_: object) -> None:
+        self.open -= 1
+
+
 def parse_robot(path: Path) -> ElementTree.Element:
-    """Return the robot element; document types are refused before anything is expanded."""
+    """Return the robot element; document types, endless depth and slips of spelling are refused.
+
+    Parameters
+    ----------
+    path : of the URDF file
+
+    Raises
+    ------
+    ArgumentError
+        The file cannot be read, is larger than MAX_BYTES, is no well-formed XML, or no URDF robot.
+    """
     try:
-        text = path.read_bytes()
-        scanner = expat.ParserCreate()
+        with path.open("rb") as file:
+            text = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        why = getattr(error, "strerror", None) or error
+        raise ArgumentError("path", str(path), f"a readable URDF file ({why})") from None
+    if len(text) > MAX_BYTES:
+        raise ArgumentError("URDF file", str(path), f"at most {MAX_BYTES} bytes")
+    try:
+        depth, scanner = _Depth(), expat.ParserCreate()
         scanner.StartDoctypeDeclHandler = _refuse_doctype
+        scanner.StartElementHandler, scanner.EndElementHandler = depth.enter, depth.leave
         scanner.Parse(text, True)
         robot = ElementTree.fromstring(text)
-    except OSError as error:
-        raise ArgumentError("path", str(path), f"a readable URDF file ({error.strerror})") from None
     except (expat.ExpatError, ElementTree.ParseError) as error:
         raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
     if robot.tag != "robot":
         raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")
+    check_spelling(robot)
     return robot
 
 

@@ -25,10 +25,11 @@ import numpy as np
 from pydantic import Field
 
 from iapb.errors import ArgumentError, Mistake, shown
-from iapb.scene.parts import Name, Part
+from iapb.scene.parts import Name, Number, Part, Text
 from iapb.scene.space import JOINTS, ORIGIN, SpatialShape, Vector3
 
 HELD = ("box", "sphere")  # of the URDF's geometries, those that the compiled narrow phase knows
+MAX_ROBOTS = 100  # in one scene: each is a file to read
 Place = tuple[str | int, ...]
 
 
@@ -36,10 +37,12 @@ class Robot(Part):
     """A URDF file as a tree of bodies."""
 
     name: Name = Field(description="the robot's name; its bodies are called <name>_<link>")
-    urdf: str = Field(description="path of the URDF file, relative to the scene file, inside its folder")
+    urdf: Text = Field(description="path of the URDF file, relative to the scene file, inside its folder")
     origin: Vector3 = Field(ORIGIN, description="where its root link lies [m], world axes")
     rpy: Vector3 = Field(ORIGIN, description="how its root link is turned: roll, pitch, yaw [rad]")
-    floating: bool = Field(False, description="true: the root link moves freely; default: fixed to the world")
+    floating: bool = Field(
+        False, strict=True, description="true: the root link moves freely; default: fixed to the world"
+    )
     collisions: Literal["none", "urdf"] = Field(
         "none", description="urdf: boxes and spheres of the file's <collision> elements can touch, where shapes says "
         "nothing about the link; none: shapes alone"
@@ -47,10 +50,10 @@ class Robot(Part):
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(
         default_factory=dict, description="what can touch, by link; link axes; [] for nothing"
     )
-    position: dict[str, tuple[float, ...]] = Field(
+    position: dict[str, tuple[Number, ...]] = Field(
         default_factory=dict, description="coordinates at the start of the joint that carries a link; default: at rest"
     )
-    velocity: dict[str, tuple[float, ...]] = Field(default_factory=dict, description="the same for velocities")
+    velocity: dict[str, tuple[Number, ...]] = Field(default_factory=dict, description="the same for velocities")
 
 
 def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
@@ -161,7 +164,11 @@ def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, i
 
     if not (isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)):
         return given, []
-    bodies, mistakes = list(given.get("bodies") or ()), []
+    listed, mistakes = given.get("bodies"), []
+    bodies = list(listed) if isinstance(listed, list) else []
+    if len(given["robots"]) > MAX_ROBOTS:
+        expected = f"at most {MAX_ROBOTS} robots"
+        return given, [Mistake(file, *stands_at(("robots",)), "robots", f"{len(given['robots'])} robots", expected)]
     for i, item in enumerate(given["robots"]):
         try:
             bodies += bodies_of(Robot.model_validate(item), Path(file).parent)
@@ -174,4 +181,5 @@ def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, i
             where, field = f"robots[{i}].{failure.argument}", failure.argument.split(" ")[0]
             place = ("robots", i, field if field in Robot.model_fields else "urdf")
             mistakes.append(Mistake(file, *stands_at(place), where, shown(failure.value), failure.expected))
-    return {key: value for key, value in given.items() if key != "robots"} | {"bodies": bodies}, mistakes
+    kept = {key: value for key, value in given.items() if key != "robots"}
+    return kept | {"bodies": bodies if listed is None or isinstance(listed, list) else listed}, mistakes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from iapb.errors import ArgumentError
-from iapb.scene_files import find_scene, scene_folder
+from iapb.scene_files import find_scene, scene_folder, scene_names
 from reports.sweeps.study import Study
 
 
@@ -31,6 +31,26 @@ def find_study(name: str) -> Path:
 
 
 def scene_of(study: Study, path: Path) -> Path:
-    """Return the scene file of a study: beside it, or one that comes with the project."""
-    beside = path.parent / study.scene
-    return beside if beside.is_file() else find_scene(study.scene)
+    """Return the scene file of a study: in its folder or below, or one that comes with the project.
+
+    Parameters
+    ----------
+    study : as read from its file
+    path : of that file
+
+    Raises
+    ------
+    ArgumentError
+        The scene lies elsewhere, or there is none.
+    """
+    folder = path.resolve().parent
+    if study.scene in scene_names():
+        beside = folder / study.scene
+        return beside if beside.is_file() else find_scene(study.scene)
+    given = Path(study.scene)
+    if given.is_absolute() or ".." in given.parts or "\0" in study.scene:
+        raise ArgumentError("scene", study.scene, "a path inside the study's folder, or the name of a scene of ours")
+    found = (folder / given).resolve()
+    if not (found.is_relative_to(folder) and found.is_file()):
+        raise ArgumentError("scene", study.scene, f"a file beside the study, or one of: {', '.join(scene_names())}")
+    return found

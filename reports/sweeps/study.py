@@ -54,6 +54,13 @@ class Span(Part):
     start: Number = Field(alias="from", description="least value")
     stop: Number = Field(alias="to", description="largest value")
 
+    @classmethod
+    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+        start, stop = (given.get(name) for name in ("from", "to")) if isinstance(given, dict) else (None, None)
+        if isinstance(start, int | float) and isinstance(stop, int | float) and start > stop:
+            return [located(("to",), stop, f"at least {start}, where it starts")]
+        return []
+
 
 class Draws(Part):
     """Random points: each draws every one of its values, evenly between two ends."""
