@@ -15,6 +15,7 @@ TOPICS: dict[str, str] = {
     "stability": "stability",
     "complementarity": "complementarity",
     "engines": "engines",
+    "haptic-rate": "haptic_rate",
     "survival": "survival",
 }
 

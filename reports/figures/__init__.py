@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reports.figures import (
     agreement_map,
+    anytime,
     coordinate_invariance,
     cost_of_contacts,
     energy_gains,
@@ -23,6 +24,7 @@ from reports.figures import (
     hard_cases,
     hardness,
     hero_corner,
+    impact_scaling,
     linked_impacts,
     performance_profile,
     rigid_convergence,
@@ -31,6 +33,7 @@ from reports.figures import (
     scenes_space,
     socket_collisions,
     stability_map,
+    trajectory_precision,
     tumbling_drift,
     work_precision,
 )
@@ -67,4 +70,7 @@ RECIPES: tuple[Recipe, ...] = (
     performance_profile.RECIPE,
     rigid_convergence.RECIPE,
     engine_errors.RECIPE,
+    trajectory_precision.RECIPE,
+    impact_scaling.RECIPE,
+    anytime.RECIPE,
 )

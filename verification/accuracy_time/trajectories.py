@@ -2,8 +2,8 @@
 
 Our compiled worlds are timed in their loop, the record included. The others are called from Python with set-up and
 record: their time is that of the run less that of a run of one step. All by the thread's own clock, the least of
-REPEATS short runs. What raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST by the
-time of the coarser steps is a time-out. Both stay among the records.
+REPEATS short runs. What raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST
+by the time of the coarser steps is a time-out. Both stay among the records.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene
 
 @dataclass(frozen=True)
 class TrajectoryRun:
-    """One method on one scene with one step [s]; the numbers of a failure are NaN.
+    """One method on one scene with one step [s]; the errors of a failure are NaN.
 
     position : largest distance of a body's centre, or of a point half a length beside it, from the truth, in lengths
     velocity : mean over the samples, a millisecond apart, of the largest error of a body's velocity, in largest true
         speeds (L¹: at an impact any two motions that are not simultaneous differ by the whole jump)
     energy : error of the energy at the end, in largest true kinetic energies; positive is a gain
-    seconds : CPU time of the run [s]
+    seconds : CPU time of the run [s]; until it failed, or expected where it was not tried
     """
 
     scene: str
@@ -100,25 +100,28 @@ def methods() -> dict[str, Motion]:
 def _over_steps(scene: FixedScene, method: str, way: Motion, judge: _Judge, steps: Sequence[float],
                 longest: float) -> list[TrajectoryRun]:  # fmt: skip
     runs: list[TrajectoryRun] = []
-    nothing, per_step = (np.nan,) * 4, 0.0
+    nothing, per_step = (np.nan,) * 3, 0.0
     for step in sorted(steps, reverse=True):
         expected = per_step * scene.duration / step
         if expected > longest:
-            runs.append(TrajectoryRun(scene.title, method, step, TIMED_OUT, f"would take {expected:.2g} s", *nothing))
+            note = f"would take {expected:.2g} s"
+            runs.append(TrajectoryRun(scene.title, method, step, TIMED_OUT, note, *nothing, expected))
             continue
+        started = time.thread_time()
         try:
             found = [way(scene, step, scene.duration)]
             while len(found) < REPEATS and found[0][1] < ONCE:
                 found.append(way(scene, step, scene.duration))
         except Exception as error:  # an engine's own errors are of every kind, and each is a result
             note = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-            runs.append(TrajectoryRun(scene.title, method, step, FAILED, note, *nothing))
+            spent = time.thread_time() - started
+            runs.append(TrajectoryRun(scene.title, method, step, FAILED, note, *nothing, spent))
             continue
         seconds = min(spent for _, spent in found)
         per_step = seconds / (scene.duration / step)
         motion = found[-1][0]
         if not motion.finite:
-            runs.append(TrajectoryRun(scene.title, method, step, FAILED, "not a number", *nothing))
+            runs.append(TrajectoryRun(scene.title, method, step, FAILED, "not a number", *nothing, seconds))
             continue
         runs.append(TrajectoryRun(scene.title, method, step, OK, "", *judge.errors(motion), seconds))
     return runs

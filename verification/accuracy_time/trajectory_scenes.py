@@ -1,4 +1,4 @@
-"""Three motions with an event-driven truth that every engine can be given: a cradle, a bouncing ball, a peg's landing."""
+"""Three motions with an event-driven truth, for every engine: a cradle, a bouncing ball, a landing peg."""
 
 from __future__ import annotations
 

@@ -1,0 +1,88 @@
+"""Everything that `iapb bench` measures beside the impact methods, in one run: every number is a ratio of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from iapb.errors import MissingDependencyError
+from verification.accuracy_time.against_mujoco import StepRace, race_mujoco
+from verification.accuracy_time.anytime import BudgetRow, anytime
+from verification.accuracy_time.haptic_rate import RateTrial, haptic_rate
+from verification.accuracy_time.kernels import KernelTime, kernel_times
+from verification.accuracy_time.resting_scenes import resting_scenes
+from verification.accuracy_time.scaling import Timing, scaling
+from verification.accuracy_time.start_up import StartUp, start_up
+from verification.accuracy_time.step_profile import PartTime, profile_step
+from verification.accuracy_time.trajectories import TrajectoryRun, trajectory_precision
+from verification.comparison.step_cost import CostRow, impact_cost
+from verification.studies.many_bodies import StepCost, study_many_bodies
+
+SIZES = ((12, 60), (12, 300))  # (d, c) at which the printed formula is to be ten and a hundred times slower
+SOLVER_CONTACTS = {"quick": (1, 4, 16, 64), "full": (1, 4, 16, 64, 128, 300)}
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class HapticStudy:
+    """Records of one run.
+
+    races : empty where MuJoCo is not installed, then `without_mujoco` says so
+    robots : rows of `verification.mechanics.robot_timing`; `robots_of` says whose robots they are
+    """
+
+    races: tuple[StepRace, ...]
+    without_mujoco: str
+    parts: tuple[PartTime, ...]
+    kernels: tuple[KernelTime, ...]
+    solvers: tuple[CostRow, ...]
+    scaling: tuple[Timing, ...]
+    trials: tuple[RateTrial, ...]
+    bodies: tuple[StepCost, ...]
+    robots: tuple[dict[str, Any], ...]
+    robots_of: str
+    start_up: tuple[StartUp, ...]
+    budgets: tuple[BudgetRow, ...]
+    trajectories: tuple[TrajectoryRun, ...]
+
+
+def haptic_study(depth: str = "quick", progress: Progress | None = None) -> HapticStudy:
+    """Measure all of it, one after the other: nothing else of ours runs meanwhile."""
+    full, say = depth == "full", progress or (lambda stage, done, total: None)
+
+    def within(stage: str) -> Callable[[int, int], None]:
+        return lambda done, total: say(stage, done, total)
+
+    races, missing = _races(20 if full else 9, within("a step against MuJoCo"))
+    scenes = resting_scenes()
+    parts = tuple(part for scene in scenes for part in profile_step(scene, 15 if full else 7))
+    robots, robots_of = _robots(depth)
+    say("printed formula and solvers", 0, 1)
+    return HapticStudy(
+        races, missing, parts, kernel_times(SIZES, 40 if full else 7),
+        impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say),
+        scaling(15 if full else 7, within("scaling laws")), haptic_rate(progress=within("contacts at 1 kHz")),
+        study_many_bodies(), robots, robots_of, start_up(depth),
+        anytime(40 if full else 15, progress=within("budgets")),
+        trajectory_precision(depth=depth, progress=within("whole motions")),
+    )  # fmt: skip
+
+
+def _races(rounds: int, progress: Callable[[int, int], None]) -> tuple[tuple[StepRace, ...], str]:
+    try:
+        return race_mujoco(rounds=rounds, progress=progress), ""
+    except MissingDependencyError as error:
+        return (), str(error)
+
+
+def _robots(depth: str) -> tuple[tuple[dict[str, Any], ...], str]:
+    """The robots of others where they are, else the project's own."""
+    from verification.mechanics.own_robots import SHIPPED
+    from verification.mechanics.robot_timing import time_robots
+    from verification.mechanics.robots import robot_files
+
+    files, _ = robot_files()
+    found = time_robots(None if files else SHIPPED / "robots", depth)
+    return tuple(found.table.records()), "robots of others" if files else "the project's own robots"
