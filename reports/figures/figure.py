@@ -34,6 +34,7 @@ class Panel:
     alt: str
     label: str = ""
     wide: bool = False  # take the whole width of the page
+    film: str = ""  # JSON that plays in the place of `svg` (reports/figures/film.py)
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def _environment() -> Environment:
         trim_blocks=True, lstrip_blocks=True,
     )
     environment.filters.update(
-        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
+        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled, film=_film,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         as_finding=FINDINGS.__getitem__, tables_without=tables_without, runs_by_user=runs_by_user,
     )
@@ -78,3 +78,8 @@ def _labelled(panel: Any) -> Markup:
     """Return a panel's SVG as an image with its description."""
     label = Markup.escape(panel.alt)
     return Markup(panel.svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))
+
+
+def _film(panel: Any) -> Markup:
+    """Return a panel's film as text that cannot end the script element it stands in."""
+    return Markup(panel.film.replace("<", "\\u003c"))

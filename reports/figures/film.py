@@ -1,0 +1,162 @@
+"""A run as a film: where its bodies are at some hundred moments, and where they touch, small enough for a page.
+
+Positions and marks are whole numbers of 16 bits, in base64. A picture is SIZE units large, y down. The moments are even
+in time, and those just before and after an impact are among them; no impulse between two moments is left out.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from iapb.run import Run
+from reports.figures.canvas import widened
+from reports.figures.film_parts import Parts, frames, is_spatial, parts
+from reports.figures.scenes_space import Sight
+from reports.figures.spatial import Floats, Placement
+
+SIZE = (400, 300)
+LARGEST = 60_000  # bytes of one film in the page
+_MOMENTS = (300, 220, 160, 120, 80, 50)  # as many as fit
+_IMPACTS = 60  # of them, the first get moments of their own
+_STRONGEST = 12  # contacts shown at a moment
+_MARGIN = 0.08  # of the picture
+_WHOLE = 32_000  # largest whole number written
+# steps of a mark per unit, per radian and per root of the strongest
+_PLACE_STEPS, _ANGLE_STEPS, _STRENGTH_STEPS = 40, 10_000, 1000
+
+
+@dataclass(frozen=True)
+class Film:
+    """What the player needs (`text`, JSON), and what the still pictures are drawn from."""
+
+    run: Run
+    parts: Parts
+    scale: float  # units per metre
+    corner: Floats  # (2,) [m] of the picture's lower left, in the view's frame
+    steps: tuple[int, ...]
+    text: str
+
+    def flat(self, points: Any) -> Floats:
+        """Return points (..., 2 or 3) [m] of the view's frame in the picture."""
+        x, y = np.moveaxis(np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
+        return np.stack([self.scale * x, SIZE[1] - self.scale * y], axis=-1)
+
+
+def film(run: Run, sight: Sight | None = None, beside: Sequence[Run] = ()) -> Film:
+    """Return a run as a film of at most LARGEST bytes; a run in space needs a `sight`.
+
+    Films that stand beside each other are given each other's runs (of the same scene), and so have one scale.
+    """
+    drawn = parts(run.scene_resolved, sight if is_spatial(run.scene_resolved) else None)
+    low, high = _bounds((run, *beside), drawn)
+    scale = SIZE[0] / float(high[0] - low[0])
+    for count in _MOMENTS:
+        steps = moments(run, count)
+        made = Film(run, drawn, scale, low, steps, "")
+        text = json.dumps(_plain(made), separators=(",", ":"))
+        if len(text) <= LARGEST:
+            break
+    return Film(run, drawn, scale, low, steps, text)
+
+
+def moments(run: Run, count: int) -> tuple[int, ...]:
+    """Return steps that are even in time, and those around the first impacts."""
+    even = np.linspace(0, run.steps, min(count, run.steps + 1)).round().astype(int)
+    struck = np.unique(run.impacts.step)[: min(_IMPACTS, count // 4)]
+    return tuple(int(step) for step in np.unique(np.concatenate([even, struck, struck + 1])) if step <= run.steps)
+
+
+def _bounds(runs: Sequence[Run], drawn: Parts) -> tuple[Floats, Floats]:
+    """Return the corners (2,) [m] of a picture in which all bodies stay, all the time."""
+    points = [corner for run in runs for step in moments(run, _MOMENTS[-1]) for corner in _corners(run, drawn, step)]
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    margin = _MARGIN * max(high - low)
+    return widened(low - margin, high + margin, SIZE[0] / SIZE[1])
+
+
+def _corners(run: Run, drawn: Parts, step: int) -> list[Floats]:
+    places = frames(run.scene_resolved, drawn.seen, run.q[step])
+    corners = [point for ring in drawn.rings for point in places[ring.body].of(ring.corners)[:, :2]]
+    for ball in drawn.balls:
+        center = places[ball.body].of(ball.center)[:2]
+        corners += [center - ball.radius, center + ball.radius]
+    return corners + [places[link.second].of(link.end)[:2] for link in drawn.links]
+
+
+def _plain(made: Film) -> dict[str, Any]:
+    """Return the film as plain values; lengths in units of the picture."""
+    run, scale = made.run, made.scale
+    turns, origins = _poses(made)
+    factor = _WHOLE / max(float(np.abs(origins).max()), float(max(SIZE)))
+    poses = np.concatenate([origins * factor, turns * _WHOLE], axis=-1)
+
+    def lengths(values: Any) -> list[float]:
+        return [round(scale * float(value), 2) for value in np.ravel(values)]
+
+    return {
+        "times": [round(float(run.time[step]), 5) for step in made.steps],
+        "bodies": len(run.scene_resolved["bodies"]), "factor": factor, "poses": _encoded(poses),
+        "rings": [[ring.body, int(ring.flat), *lengths(ring.corners)] for ring in made.parts.rings],
+        "balls": [[ball.body, int(ball.spoke), *lengths([*ball.center, ball.radius])] for ball in made.parts.balls],
+        "links": [[link.first, link.second, *lengths([*link.start, *link.end])] for link in made.parts.links],
+        "marks": _encoded(_marks(made)),
+    }  # fmt: skip
+
+
+def _poses(made: Film) -> tuple[Floats, Floats]:
+    """Return quaternions (moments, bodies, 4) and origins (moments, bodies, 3) in units, y up from the lower left."""
+    corner = np.append(made.corner, 0.0)
+    each = [frames(made.run.scene_resolved, made.parts.seen, made.run.q[step]) for step in made.steps]
+    origins = np.array([[made.scale * (place.origin - corner) for place in places] for places in each])
+    turns = np.array([[_quaternion(place) for place in places] for places in each])
+    for k in range(1, len(turns)):  # the nearer of ±, so that the player may go straight from one to the next
+        turns[k] *= np.where(np.sum(turns[k] * turns[k - 1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    return turns, origins
+
+
+def _quaternion(place: Placement) -> Floats:
+    """Return x, y, z, w of a rotation: the eigenvector of its largest eigenvalue in Bar-Itzhack's matrix."""
+    (a, b, c), (d, e, f), (g, h, i) = place.rotation
+    matrix = np.array([
+        [a - e - i, 0, 0, 0], [d + b, e - a - i, 0, 0], [g + c, h + f, i - a - e, 0], [h - f, c - g, d - b, a + e + i],
+    ])
+    vector: Floats = np.linalg.eigh(matrix)[1][:, -1]
+    return vector
+
+
+def _marks(made: Film) -> Floats:
+    """Return rows (moment, x, y, angle, strength): contacts at a moment, and impulses (strength < 0) since the last."""
+    contacts, offsets = made.run.contacts, made.run.contacts.offsets
+    rows: list[list[float]] = []
+    for k, step in enumerate(made.steps):
+        now = slice(int(offsets[min(step, made.run.steps - 1)]), int(offsets[min(step, made.run.steps - 1) + 1]))
+        since = slice(int(offsets[made.steps[k - 1]] if k else 0), int(offsets[step]))
+        rows += _rows(made, k, now, contacts.normal_force, 1.0) + _rows(made, k, since, contacts.impulse, -1.0)
+    return np.array(rows).reshape(-1, 5)
+
+
+def _rows(made: Film, moment: int, part: slice, strengths: Floats, sign: float) -> list[list[float]]:
+    """Return the strongest of some contacts; strength in shares of the strongest of the run, as its root."""
+    contacts, seen = made.run.contacts, made.parts.seen
+    largest = float(strengths.max(initial=0.0))
+    chosen = np.arange(part.start, part.stop)[strengths[part] > 0.0]
+    chosen = chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]
+    points = made.flat(seen.flat(contacts.point[chosen]))
+    normals = seen.flat(contacts.normal[chosen])
+    angles = _ANGLE_STEPS * np.arctan2(-normals[:, 1], normals[:, 0])
+    sizes = np.ceil(_STRENGTH_STEPS * np.sqrt(strengths[chosen] / largest)) if largest else strengths[chosen]
+    limit = 2.0 * max(SIZE)  # what is farther out is not seen
+    shown = np.all(np.abs(points) < limit, axis=1)
+    columns = np.column_stack([np.full(len(chosen), moment), _PLACE_STEPS * points, angles, sign * sizes])
+    return [list(row) for row in columns[shown]]
+
+
+def _encoded(values: Floats) -> str:
+    """Return whole numbers of 16 bits, the lower byte first, in base64."""
+    return base64.b64encode(np.rint(values).astype("<i2").tobytes()).decode()
