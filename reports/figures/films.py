@@ -31,7 +31,7 @@ FILMS = {
     "film-corner": Playback(
         "The corner, played back", UNLIMITED,
         "The peg of Figure 7 in four worlds at once, slowed down. The rigid world stops at the walls in blows; IAPB "
-        "does so at each new contact, then gives a little; with penalties alone a corner of the peg dives into the wall.",
+        "does so at each new contact, then gives a little; penalties alone let a corner dive into the wall.",
         "figures"),
     "film-hole": Playback(
         "The tight hole, played back", {"IAPB": "hole/IAPB"},
