@@ -47,6 +47,14 @@ reproduce: setup ## regenerate every figure, table and claim into out/report.htm
 verify: setup ## every law at 1,000,000 impacts and 5,000 trajectories; hours, and can be stopped and gone on with
 	@$(BIN)/iapb verify --full --workers $(PYTEST_WORKERS)
 
+.PHONY: fuzz
+fuzz: setup ## 100,000 wrong inputs: each must be read or refused by name; what breaks something is kept in out/fuzz
+	@$(BIN)/python -m reports.fuzz --cases $(or $(CASES),100000)
+
+.PHONY: docs
+docs: setup ## the pages of docs/ with the reference of the code, as HTML in out/docs; a warning is an error
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs
+
 .PHONY: lint
 lint: setup ## ruff
 	@$(BIN)/ruff check .

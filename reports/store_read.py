@@ -82,11 +82,21 @@ def read_provenance(path: Path | str) -> dict[str, str]:
         If the file is damaged, or an entry is no text.
     """
     with opened(path, expected_format=None) as file:
-        found = {name: read_values(file["provenance"], name, str(path)) for name in file["provenance"]}
+        group = _group(file, "provenance", path)
+        found = {name: read_values(group, name, str(path)) for name in group}
     for name, text in found.items():
         if not isinstance(text, str):
             raise RunFileError(f"{path}: provenance/{name} is no text")
     return found
+
+
+def _group(file: Any, name: str, path: Path | str) -> Any:
+    """Return a group; a dataset in its place could be gone through for ever."""
+    import h5py
+
+    if not isinstance(file.get(name), h5py.Group):
+        raise RunFileError(f"{path}: the group {name} is missing")
+    return file[name]
 
 
 def read_head(path: Path | str) -> dict[str, Any]:
@@ -130,7 +140,7 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
         "time": read_values(file["trajectory"], "time", place),
         "contacts": ContactTable(**group["contacts"]),
         "impacts": ImpactTable(**group["impacts"]),
-        "energy": _energy(file["energy"], place),
+        "energy": _energy(_group(file, "energy", place), place),
         "effects": _effects(file["effects"], place),
         **group["trajectory"],
         **group["steps"],

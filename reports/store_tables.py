@@ -178,6 +178,8 @@ def _write(group: Any, table: Table) -> None:
 
 
 def _read(group: Any, path: str) -> Table:
+    if not hasattr(group, "keys"):  # a dataset in a table's place could be gone through for ever
+        raise RunFileError(f"{path}: {group.name} is no table")
     columns = tuple(
         Column(
             name,

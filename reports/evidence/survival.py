@@ -1,4 +1,4 @@
-"""Topic: what is left of the results after crashes, full disks and damaged files; and runs that come out the same."""
+"""Topic: what crashes, full disks, damaged files and wrong input do; and runs that come out the same."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ LEAD = (
     "so."
 )
 TIMES = {"quick": 12, "full": 120}
+INPUTS = {"quick": 60, "full": 2000}  # wrong inputs of each kind
+_SAID = 160  # characters of a message that a table shows
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
@@ -27,9 +29,11 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     with tempfile.TemporaryDirectory() as folder:
         faults = try_faults(Path(folder), TIMES[depth], progress)
     repeated = tuple(_repeated(runner))
-    tables = {"faults": _fault_table(faults), "simulated again": _repeated_table(repeated)}
-    findings = (_faults(faults), _repetitions(repeated))
-    verdict = f"{findings[0].sentence} {findings[1].sentence}"
+    inputs = tuple(_wrong_inputs(INPUTS[depth]))
+    tables = {"faults": _fault_table(faults), "simulated again": _repeated_table(repeated),
+              "wrong input": _input_table(inputs)}  # fmt: skip
+    findings = (_faults(faults), _repetitions(repeated), _inputs(inputs))
+    verdict = " ".join(finding.sentence for finding in findings)
     return Topic("survival", "Runs that survive", LEAD, findings, tables, verdict)
 
 
@@ -41,6 +45,28 @@ def _repeated(runner: Runner) -> Any:
         runner(source, world, rendering)
         path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
         yield name, repeat_run(path)
+
+
+def _wrong_inputs(count: int) -> Any:
+    from reports.fuzz import fuzz
+    from reports.fuzz.kinds import kinds
+
+    for kind in kinds():
+        yield fuzz(kind, range(count))
+
+
+def _inputs(records: Any) -> Finding:
+    tried, broken = sum(record.tried for record in records), sum(len(record.broken) for record in records)
+    came = f"{broken} gave a traceback or hung" if broken else "none gave a traceback or hung"
+    return Finding(f"Of {tried} wrong inputs of {len(records)} kinds {came}: "
+                   f"{sum(record.refused for record in records)} were refused by name, the others taken as valid.",
+                   REFUTED if broken else REPRODUCED)  # fmt: skip
+
+
+def _input_table(records: Any) -> Numbers:
+    rows = tuple((r.kind, r.tried, r.refused, r.read, len(r.broken), " ".join(r.said.split())[:_SAID]) for r in records)
+    columns = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
+    return Numbers(columns, rows)
 
 
 def _faults(faults: Any) -> Finding:

@@ -7,6 +7,7 @@ import resource
 import signal
 import sys
 import tempfile
+import threading
 import traceback
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -139,7 +140,13 @@ def kept(folder: Path | None, kind: str, number: int, name: str, content: bytes,
 
 @contextmanager
 def bounded_time() -> Iterator[None]:
-    """Stop what runs longer than LONGEST, counted in this process's own time: a busy machine is no hang."""
+    """Stop what runs longer than LONGEST, counted in this process's own time: a busy machine is no hang.
+
+    Signals reach the main thread only; elsewhere nothing is stopped.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
 
     def stop(*_: object) -> None:
         raise TooLong
