@@ -10,29 +10,47 @@ import typer
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option(help="Folder of the report, the runs and the tables.")] = Path("out"),
+    out: Annotated[Path | None, typer.Option(
+        help="Folder of the report, the runs and the tables; default out, with --check a temporary one.")] = None,
     full: Annotated[bool, typer.Option("--full", help="The deep version: finer conditions, ten times the impacts.")]
     = False,
     figure: Annotated[str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")] = None,
+    check: Annotated[Path | None, typer.Option(
+        help="A report to check: compute everything again, and say which numbers agree with it.")] = None,
 ) -> None:
     """Regenerate the report; what was computed before is read from its files."""
+    depth, folder = "full" if full else "quick", out or Path("out")
+    if check is not None:
+        from reports.commands.reproduce_check import check_report
+
+        check_report(check, out)
+    elif figure is not None:
+        _write_figure(figure, folder, depth)
+    else:
+        make_report(folder, depth)
+
+
+def make_report(out: Path, depth: str) -> None:
+    """Compute all evidence, or read what is there; write the report and what goes beside it; say the verdicts."""
     import time
 
     from reports.commands.progress import stage_progress
+    from reports.companions import REPORT_NAME, remembering, write_companions
     from reports.evidence.gather import gather
+    from reports.figures import RECIPES
     from reports.report import build_report, write_report
 
-    if figure is not None:
-        _write_figure(figure, out, "full" if full else "quick")
-        return
     started = time.perf_counter()
     with stage_progress() as progress:
-        evidence = gather(out, "full" if full else "quick", progress)
-    path = write_report(out / "report.html", build_report(evidence))
+        evidence = gather(out, depth, progress)
+    recipes, figures = remembering(RECIPES)
+    path = write_report(out / REPORT_NAME, build_report(evidence, recipes))
+    beside = write_companions(out, evidence, figures, depth)
     for verdict in evidence.verdicts:
         print(f"{verdict.topic}: {verdict.sentence}")
     size, files = path.stat().st_size / 1e6, len(evidence.manifest)
     print(f"\n{path} ({size:.1f} MB, from {files} run and table files) in {time.perf_counter() - started:.0f} s.")
+    print(f"Beside it: {', '.join(file.name for file in beside)}.")
 
 
 def _write_figure(key: str, out: Path, depth: str) -> None:

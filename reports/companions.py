@@ -1,0 +1,74 @@
+"""The files beside the report: its numbers, its manifest, what was not committed, and what they are, for machines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from reports.codecheck import CODECHECK_NAME, write_codecheck
+from reports.crate import write_crate
+from reports.figures.figure import Figure, Recipe
+from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
+from reports.pages.records import Evidence
+from reports.provenance import uncommitted_changes
+
+REPORT_NAME, MANIFEST_NAME, DIRTY_NAME = "report.html", "manifest.json", "dirty.diff"
+_TEXTS = {
+    REPORT_NAME: "the report: one page that needs nothing else",
+    NUMBERS_NAME: "every number of the report, for iapb report diff and iapb reproduce --check",
+    MANIFEST_NAME: "every file behind the report: key, content hash, command, size and what was made from it",
+    DIRTY_NAME: "how the sources differed from the commit",
+    CODECHECK_NAME: "a draft for a CODECHECK",
+}
+
+
+def remembering(recipes: tuple[Recipe, ...]) -> tuple[tuple[Recipe, ...], dict[str, Figure]]:
+    """Return the recipes, and a mapping that receives each figure, by its key, once it is drawn."""
+    drawn: dict[str, Figure] = {}
+
+    def kept(recipe: Recipe) -> Recipe:
+        def draw(inputs: Mapping[str, Any]) -> Figure:
+            drawn[recipe.key] = figure = recipe.draw(inputs)
+            return figure
+
+        return replace(recipe, draw=draw)
+
+    return tuple(kept(recipe) for recipe in recipes), drawn
+
+
+def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> tuple[Path, ...]:
+    """Write everything that goes beside the report in `out`, the description of it all last; return the files."""
+    numbers = write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))
+    listed = _write_manifest(out / MANIFEST_NAME, evidence)
+    changed = _write_changes(out / DIRTY_NAME)
+    command = evidence.provenance.get("command", "iapb reproduce")
+    outputs = {name: _TEXTS[name] for name in (REPORT_NAME, NUMBERS_NAME, MANIFEST_NAME)}
+    tables = {entry.file: f"table of {entry.name}" for entry in evidence.manifest if not entry.used_by}
+    draft = write_codecheck(out, outputs | tables, command)
+    beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
+    crate = write_crate(out, beside, evidence.manifest, evidence.provenance)
+    return tuple(path for path in (numbers, listed, changed, draft, crate) if path)
+
+
+def _write_manifest(path: Path, evidence: Evidence) -> Path:
+    files = [asdict(entry) for entry in evidence.manifest]
+    content = {
+        "format": "iapb manifest", "format_version": 1, "provenance": dict(evidence.provenance),
+        "runs": [entry for entry in files if entry["used_by"]],
+        "tables": [entry for entry in files if not entry["used_by"]],
+    }  # fmt: skip
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
+    return path
+
+
+def _write_changes(path: Path) -> Path | None:
+    """Write what was not committed; where all was, no file is left, not even an older one."""
+    path.unlink(missing_ok=True)
+    changes = uncommitted_changes()
+    if not changes:
+        return None
+    path.write_text(changes + "\n", encoding="utf-8")
+    return path

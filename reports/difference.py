@@ -1,0 +1,176 @@
+"""Two reports compared number by number: what agrees exactly, what within a tolerance, what differs.
+
+Measured times are never judged: they belong to a machine and an hour.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reports.figures.figure import Numbers
+from reports.numbers_file import ReportNumbers
+
+EXACT, CLOSE, DIFFERS, TIMING, ONLY_OLD, ONLY_NEW = "exact", "close", "differs", "timing", "only old", "only new"
+# Another processor rounds and orders sums differently: some 1e-16 a step, grown by a thousand steps of a simulation.
+TOLERANCE = 1e-9
+# Below this a number of the report is itself rounding: errors of 1e-16 need not repeat to any digit.
+ROUNDING = 1e-12
+
+_TIME_UNIT = re.compile(r"\[(?:log₁₀ ?)?(?:s|ms|µs|us|ns|min|h)(?:\]| per | a |/)")
+_TIME_WORD = re.compile(r"\b(?:times?|timed|seconds|faster|slower|speed-up|real-time)\b", re.IGNORECASE)
+_NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number, text or verdict of both reports; `gap` is the relative difference of the numbers in it."""
+
+    table: str
+    column: str
+    row: str
+    old: Any
+    new: Any
+    state: str
+    gap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What came of the comparison.
+
+    cells : every cell of either report
+    tables_old, tables_new : tables that only one has
+    runs_same, runs_other, runs_single : runs of both that are the same to the last bit, or not, and of one alone
+    """
+
+    cells: tuple[Cell, ...]
+    tables_old: tuple[str, ...]
+    tables_new: tuple[str, ...]
+    runs_same: int
+    runs_other: tuple[str, ...]
+    runs_single: int
+
+    def count(self, state: str) -> int:
+        """How many cells are in a state."""
+        return sum(cell.state == state for cell in self.cells)
+
+    def of(self, state: str) -> tuple[Cell, ...]:
+        """The cells in a state, the largest gap first."""
+        return tuple(sorted((cell for cell in self.cells if cell.state == state), key=lambda cell: -cell.gap))
+
+    @property
+    def largest_gap(self) -> float:
+        """Largest relative difference among those that agree within the tolerance."""
+        return max((cell.gap for cell in self.of(CLOSE)), default=0.0)
+
+    def by_table(self) -> dict[str, Counter[str]]:
+        """Number of cells in each state, by table."""
+        found: dict[str, Counter[str]] = {}
+        for cell in self.cells:
+            found.setdefault(cell.table, Counter())[cell.state] += 1
+        return found
+
+
+def compare_reports(old: ReportNumbers, new: ReportNumbers, tolerance: float = TOLERANCE) -> Difference:
+    """Compare two reports; numbers are close within `tolerance` of the larger, or where both are below ROUNDING."""
+    both = [name for name in old.tables if name in new.tables]
+    cells = [cell for name in both for cell in _cells(name, old.tables[name], new.tables[name], tolerance)]
+    runs = {command: new.runs[command] == content for command, content in old.runs.items() if command in new.runs}
+    return Difference(
+        tuple(cells), _only(old.tables, new.tables), _only(new.tables, old.tables), sum(runs.values()),
+        tuple(command for command, same in runs.items() if not same), len(set(old.runs) ^ set(new.runs)),
+    )  # fmt: skip
+
+
+def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(name for name in first if name not in second)
+
+
+def is_timing(table: str, column: str) -> bool:
+    """Whether a column holds times, or what was made from times."""
+    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or _TIME_WORD.search(table))
+
+
+def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
+    old_rows, new_rows = _rows(old, new)
+    for row in dict.fromkeys((*old_rows, *new_rows)):
+        first, second = old_rows.get(row, {}), new_rows.get(row, {})
+        for column in dict.fromkeys((*first, *second)):
+            if column not in first or column not in second:
+                state, gap = (ONLY_OLD if column in first else ONLY_NEW), 0.0
+            else:
+                state, gap = compare_values(first[column], second[column], tolerance)
+            if is_timing(table, column) and state != EXACT:
+                state = TIMING
+            yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
+
+
+def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Rows of both by name: their number where there are equally many, else their first cell and which of those."""
+    if len(old.rows) == len(new.rows):
+        names = [f"{number}: {row[0]}" if row else str(number) for number, row in enumerate(old.rows, 1)]
+        return _named(names, old), _named(names, new)
+    return _named(_distinct(_first_cells(old)), old), _named(_distinct(_first_cells(new)), new)
+
+
+def _first_cells(table: Numbers) -> list[str]:
+    return [str(row[0]) if row else "" for row in table.rows]
+
+
+def _distinct(names: Sequence[str]) -> list[str]:
+    """Names, with a number behind those that came before."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return found
+
+
+def _named(names: Sequence[str], table: Numbers) -> dict[str, dict[str, Any]]:
+    columns = _distinct(table.columns)
+    return {name: dict(zip(columns, row, strict=True)) for name, row in zip(names, table.rows, strict=True)}
+
+
+def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
+    """Return how two cells compare, and their gap. In a text the numbers are compared, and the words must agree."""
+    if _same(old, new):
+        return EXACT, 0.0
+    if old is None or new is None:
+        return (ONLY_NEW if old is None else ONLY_OLD), 0.0
+    if _is_number(old) and _is_number(new):
+        gap = _gap(float(old), float(new))
+        return (CLOSE if gap <= tolerance else DIFFERS), gap
+    if isinstance(old, str) and isinstance(new, str) and _NUMBER.sub("#", old) == _NUMBER.sub("#", new):
+        pairs = zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
+        gap = max((_gap(_value(a), _value(b)) for a, b in pairs), default=0.0)
+        return (CLOSE if gap <= tolerance else DIFFERS), gap
+    return DIFFERS, math.inf
+
+
+def _same(old: Any, new: Any) -> bool:
+    both_nan = _is_number(old) and _is_number(new) and math.isnan(old) and math.isnan(new)
+    return both_nan or (isinstance(old, bool) == isinstance(new, bool) and old == new)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _gap(old: float, new: float) -> float:
+    """Relative difference; none where both are rounding."""
+    if old == new:
+        return 0.0
+    largest = max(abs(old), abs(new))
+    if not math.isfinite(largest):
+        return math.inf
+    return 0.0 if largest <= ROUNDING else abs(old - new) / largest
+
+
+def _value(text: str) -> float:
+    return float(text.replace("−", "-"))

@@ -1,0 +1,58 @@
+"""What a comparison of two reports says: sentences, and a short table of what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, TIMING, Cell, Difference
+
+SHOWN = 20  # rows of the table; the rest is counted
+_WIDEST = 34  # letters of a cell
+# What must be equal for runs to come out the same to the last bit.
+_BITWISE = ("cpu", "blas", "lock", "commit", "numpy", "numba")
+
+
+def sentences(found: Difference, tolerance: float) -> Iterator[str]:
+    """Say what agrees and what does not, each with its number."""
+    exact, close, differs = (found.count(state) for state in (EXACT, CLOSE, DIFFERS))
+    judged = exact + close + differs
+    yield (f"Of {judged} numbers and words in both reports, {exact} are exactly the same, {close} agree within "
+           f"{tolerance:.0e} (by {found.largest_gap:.1e} at most), and {differs} differ.")  # fmt: skip
+    yield f"{found.count(TIMING)} measured times differ, and are not judged."
+    old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
+    if old or new or found.tables_old or found.tables_new:
+        yield (f"{old} are only in the old report and {new} only in the new one, besides {len(found.tables_old)} and "
+               f"{len(found.tables_new)} whole tables.")  # fmt: skip
+    for title, tables in (("old", found.tables_old), ("new", found.tables_new)):
+        if tables:
+            yield f"Only in the {title} report: {', '.join(tables)}."
+    runs = found.runs_same + len(found.runs_other)
+    yield (f"Of {runs} runs behind both, {found.runs_same} are the same to the last bit; {found.runs_single} are "
+           "behind one only.")  # fmt: skip
+
+
+def table(found: Difference, state: str = DIFFERS) -> Iterator[tuple[str, str, str, str, str, str]]:
+    """Rows (table, row, column, old, new, relative difference) of what differs most, SHOWN at most."""
+    for cell in found.of(state)[:SHOWN]:
+        yield cell.table, _short(cell.row), _short(cell.column), *_values(cell), f"{cell.gap:.1e}"
+
+
+def _values(cell: Cell) -> tuple[str, str]:
+    """Both values; long texts from where they part."""
+    old, new = str(cell.old), str(cell.new)
+    parted = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0)
+    start = max(0, parted - 8) if max(len(old), len(new)) > _WIDEST else 0
+    return _short(old[start:]), _short(new[start:])
+
+
+def _short(text: Any) -> str:
+    text = str(text)
+    return text if len(text) <= _WIDEST else text[: _WIDEST - 1] + "…"
+
+
+def unlike(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
+    """Return why two reports need not agree to the last bit: the facts of their provenance that differ."""
+    facts = [name for name in _BITWISE if old.get(name) != new.get(name)]
+    dirty = [] if "true" not in (old.get("dirty"), new.get("dirty")) else ["uncommitted changes"]
+    return (*facts, *dirty)

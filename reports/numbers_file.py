@@ -1,0 +1,129 @@
+"""Every number of a report in one file beside it, numbers.json, so that two reports can be compared."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from iapb.errors import ArgumentError, RunFileError
+from reports.figures.figure import Figure, Numbers
+from reports.pages.records import Evidence
+from reports.store_keys import plain
+
+NUMBERS_NAME = "numbers.json"
+FORMAT, FORMAT_VERSION = "iapb numbers", 1
+LARGEST_FILE = 200_000_000  # bytes; a report's is a few million
+_NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+@dataclass(frozen=True)
+class ReportNumbers:
+    """What a report says in numbers.
+
+    tables : by place in the report, such as "claims/C07" or "mechanics/trees"
+    runs : content hash by the command that makes a run
+    provenance : where the report comes from
+    depth : "quick" or "full"
+    """
+
+    tables: Mapping[str, Numbers]
+    runs: Mapping[str, str]
+    provenance: Mapping[str, str]
+    depth: str
+
+
+def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> ReportNumbers:
+    """Return every table of a report, those under its figures too, its verdicts, and what its runs came to."""
+    tables = dict(_of_evidence(evidence))
+    tables |= {f"figures/{key}": figure.numbers for key, figure in figures.items() if figure.numbers is not None}
+    runs = {entry.command: entry.content_hash for entry in evidence.manifest if entry.used_by}
+    return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
+
+
+def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
+    yield "verdicts", Numbers(("topic", "outcome"), tuple((one.topic, one.outcome) for one in evidence.verdicts))
+    yield "claims", Numbers(("claim", "outcome"), tuple((one.id, one.outcome) for one in evidence.claims))
+    yield "proofs", Numbers(("statement", "holds", "wrong twins"),
+                            tuple((one.name, one.holds, len(one.twins)) for one in evidence.proofs))
+    yield "properties", Numbers(
+        ("law", "cases", "worst", "bound", "holds", "fault caught"),
+        tuple((one.law, one.cases, one.worst, one.bound, one.holds, one.fault_caught) for one in evidence.properties))
+    yield "counterexamples", Numbers(("who and law", "what happens"),
+                                     tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples))
+    yield "cross-checks", Numbers(
+        ("quantity", "against", "cases", "worst", "tolerance", "agrees"),
+        tuple((one.quantity, one.against, one.cases, one.worst, one.tolerance, one.agrees)
+              for one in evidence.cross_checks))  # fmt: skip
+    for claim in evidence.claims:
+        if claim.numbers is not None:
+            yield f"claims/{claim.id}", claim.numbers
+    for name, value in evidence.inputs.items():
+        if isinstance(value, Numbers):
+            yield f"inputs/{name}", value
+    for scene, effects in evidence.effects.items():
+        yield f"effects/{scene}", Numbers(("effect", "active"), tuple((one.name, one.active) for one in effects))
+    for topic in evidence.topics:
+        rows = tuple((number, one.outcome) for number, one in enumerate(topic.findings, 1))
+        yield topic.id, Numbers(("finding", "outcome"), rows)
+        yield from ((f"{topic.id}/{name}", table) for name, table in topic.tables.items())
+
+
+def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
+    """Write the numbers as JSON, to the last bit; what JSON has no number for is {"number": "nan"}, "inf" or "-inf"."""
+    tables = {name: {"columns": list(table.columns), "rows": [[_cell(value) for value in row] for row in table.rows]}
+              for name, table in numbers.tables.items()}  # fmt: skip
+    content = {"format": FORMAT, "format_version": FORMAT_VERSION, "depth": numbers.depth,
+               "provenance": dict(numbers.provenance), "runs": dict(numbers.runs), "tables": tables}  # fmt: skip
+    path.write_text(json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")), encoding="utf-8")
+    return path
+
+
+def _cell(value: Any) -> Any:
+    value = plain(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(value)}
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def read_numbers(where: Path | str) -> ReportNumbers:
+    """Return the numbers of a report: of its folder, of a page with numbers.json beside it, or of that file.
+
+    Raises
+    ------
+    ArgumentError
+        There is no such file.
+    RunFileError
+        It is none of ours, or damaged.
+    """
+    path = Path(where)
+    path = path / NUMBERS_NAME if path.is_dir() else path.with_name(NUMBERS_NAME) if path.suffix == ".html" else path
+    if not path.is_file():
+        raise ArgumentError("report", str(where), f"a report with {NUMBERS_NAME} beside it, or its folder")
+    if path.stat().st_size > LARGEST_FILE:
+        raise RunFileError(f"{path}: larger than {LARGEST_FILE} bytes: expected the numbers of a report")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return _checked(content)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise RunFileError(f"{path}: cannot be read as the numbers of a report: {error}") from error
+
+
+def _checked(content: Any) -> ReportNumbers:
+    if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
+        found = f"{content['format']!r} {content['format_version']!r}"
+        raise ValueError(f"format {found}: expected {FORMAT} {FORMAT_VERSION}")
+    tables = {str(name): _table(table) for name, table in content["tables"].items()}
+    texts = [{str(key): str(value) for key, value in content[part].items()} for part in ("runs", "provenance")]
+    return ReportNumbers(tables, *texts, str(content["depth"]))
+
+
+def _table(table: Any) -> Numbers:
+    columns = tuple(str(column) for column in table["columns"])
+    rows = tuple(tuple(_NOT_FINITE[v["number"]] if isinstance(v, dict) else v for v in row) for row in table["rows"])
+    if any(len(row) != len(columns) for row in rows):
+        raise ValueError("a row without a cell for each column")
+    return Numbers(columns, rows)

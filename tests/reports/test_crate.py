@@ -1,0 +1,169 @@
+"""What goes beside the report: true to the byte, readable by RO-Crate's own reader, and silent about the machine."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene
+from reports import companions, provenance
+from reports.codecheck import CODECHECK_NAME
+from reports.companions import DIRTY_NAME, MANIFEST_NAME, REPORT_NAME, remembering, write_companions
+from reports.crate import CRATE_NAME, sha256
+from reports.evidence import gather
+from reports.evidence.manifest import ABSENT, manifest
+from reports.evidence.stage import Stage
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.numbers_file import NUMBERS_NAME, read_numbers
+from reports.pages.records import REPRODUCED, Claim, Evidence
+from reports.report import build_report, write_report
+from reports.runner import Runner
+
+PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
+FIGURE = Figure("figA", "", "A", "See.", (PANEL,), Numbers(("x",), ((0.1,),)))
+RECIPE = Recipe("figA", "", "A", ("bulk",), lambda inputs: FIGURE)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory) -> Path:
+    """A small report from two runs and one stage, with everything beside it, made with uncommitted changes."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    scene, runner = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}), Runner(folder / "runs")
+
+    def compute():
+        runner.user = "C07"
+        runner(scene, "PB")
+        runner(scene.with_values({"name": "own"}), "PB")
+        return (Claim("C07", "s", "p", REPRODUCED, "h", numbers=Numbers(("κ", "gain"), ((1e3, 2e-16),))),)
+
+    stage = Stage(folder / "tables", "claims", tuple[Claim, ...], {"depth": "quick"})
+    claims = stage.get_or_compute(compute, runner)
+    with pytest.MonkeyPatch.context() as patch:
+        words = [str(folder / "bin" / "iapb"), "reproduce", "--out", str(folder), f"--check={folder}"]
+        patch.setattr(sys, "argv", words)
+        patch.setattr(companions, "uncommitted_changes", lambda: "--- a/iapb/x.py\n+++ b/iapb/x.py")
+        evidence = Evidence(inputs={"bulk": Numbers(("n",), ((3,),))}, claims=claims, provenance=gather.provenance(),
+                            manifest=manifest(runner.used, [stage], folder))  # fmt: skip
+        recipes, figures = remembering((RECIPE,))
+        write_report(folder / REPORT_NAME, build_report(evidence, recipes))
+        write_companions(folder, evidence, figures, "quick")
+    return folder
+
+
+def test_the_crate_is_read_by_the_reader_of_ro_crate(out: Path) -> None:
+    from rocrate.rocrate import ROCrate
+
+    crate = ROCrate(out)
+    assert crate.root_dataset["license"].id.endswith("MIT")
+    files = {entity.id: entity for entity in crate.data_entities}
+    on_disk = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert set(files) == on_disk - {CRATE_NAME, "runs/index.jsonl"}
+    action = crate.dereference("#reproduce")
+    assert action.type == "CreateAction" and "claims 20050601" in action["description"]
+    assert {entity.id for entity in action["result"]} == set(files)
+    needs = crate.dereference("#iapb")["softwareRequirements"]
+    assert f"lock {provenance.lock_hash()}" in needs and any(need.startswith("mujoco ") for need in needs)
+
+
+def test_every_file_it_names_has_the_size_and_the_hash_it_states(out: Path) -> None:
+    graph = json.loads((out / CRATE_NAME).read_text())["@graph"]
+    files = [entity for entity in graph if entity["@type"] == "File"]
+    for entity in files:
+        path = out / entity["@id"]
+        assert (int(entity["contentSize"]), entity["sha256"]) == (path.stat().st_size, sha256(path))
+    assert len({entity["@id"] for entity in graph}) == len(graph)
+    commands = [entity["description"] for entity in files if entity["@id"].startswith("runs/")]
+    assert any("iapb run peg_corner --set duration=0.4 --world PB" in text and "C07" in text for text in commands)
+
+
+def test_the_manifest_lists_each_run_with_its_users_and_its_command(out: Path) -> None:
+    content = json.loads((out / MANIFEST_NAME).read_text())
+    [shipped, own], [table] = content["runs"], content["tables"]
+    assert shipped["used_by"] == own["used_by"] == ["C07"] and shipped["status"] == "complete"
+    assert shipped["command"].startswith("iapb run peg_corner") and own["command"].startswith("iapb store again ")
+    assert (out / shipped["file"]).stat().st_size == shipped["size"] and (out / table["file"]).is_file()
+    page = (out / REPORT_NAME).read_text()
+    assert "2 runs and 1 tables" in page and shipped["command"] in page
+
+
+def test_a_run_that_was_removed_is_said_to_be_absent(tmp_path: Path) -> None:
+    runner = Runner(tmp_path / "runs")
+    with runner.recording("C07"):
+        runner(load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}), "PB")
+    [used] = runner.used.values()
+    (tmp_path / "runs" / used.file).unlink()
+    [listed] = manifest(runner.used, [], tmp_path)
+    assert listed.status == ABSENT
+
+
+def test_the_numbers_are_those_of_the_tables_and_of_the_figures(out: Path) -> None:
+    numbers = read_numbers(out)
+    assert numbers.tables["claims/C07"].rows == ((1e3, 2e-16),)
+    assert numbers.tables["figures/figA"].rows == ((0.1,),) and numbers.tables["inputs/bulk"].rows == ((3,),)
+    assert list(numbers.runs)[0] == "iapb run peg_corner --set duration=0.4 --world PB"
+
+
+def test_the_draft_of_the_codecheck_is_yaml_and_its_files_exist(out: Path) -> None:
+    from ruamel.yaml import YAML
+
+    draft = YAML(typ="safe").load(out / CODECHECK_NAME)
+    assert draft["version"].startswith("https://codecheck.org.uk/spec/config/")
+    assert all((out / entry["file"]).is_file() and entry["comment"] for entry in draft["manifest"])
+    assert draft["codechecker"] == [{"name": "", "ORCID": ""}]  # nobody has checked it yet
+
+
+def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
+    host = re.compile(rf"\b{re.escape(socket.gethostname())}\b")
+    root = str(Path(__file__).resolve().parents[2])
+    for name in (REPORT_NAME, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME):
+        text = (out / name).read_text()
+        assert str(out) not in text and root not in text and str(Path.home()) + "/" not in text
+        assert not host.search(text) or len(socket.gethostname()) < 4, name  # "x86" would be found in any page
+
+
+def test_changes_that_are_committed_leave_no_patch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / DIRTY_NAME).write_text("old")
+    monkeypatch.setattr(companions, "uncommitted_changes", lambda: "")
+    (tmp_path / REPORT_NAME).write_text("<p>")
+    written = write_companions(tmp_path, Evidence(), {}, "quick")
+    assert not (tmp_path / DIRTY_NAME).exists() and DIRTY_NAME not in [path.name for path in written]
+
+
+@pytest.mark.parametrize(
+    ("word", "kept"),
+    [("--out=/srv/data/out", "--out=out"), ("/srv/data/out", "out"), ("../../her/out", "out"), ("out/runs", "out/runs"),
+     ("--set", "--set"), ("rate=1/512", "rate=1/512"), ("--check=../r.html", "--check=r.html")],
+)  # fmt: skip
+def test_paths_of_a_machine_are_cut_from_the_command(word: str, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["/srv/bin/iapb", "run", word])
+    assert provenance.current_command() == f"iapb run {kept}"
+
+
+def test_uncommitted_changes_are_a_patch_with_new_files_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import subprocess
+
+    def git(*words: str) -> None:
+        subprocess.run(["git", "-C", str(tmp_path), "-c", "user.name=n", "-c", "user.email=e@e", *words], check=True,
+                       capture_output=True)  # fmt: skip
+
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    assert provenance.uncommitted_changes() is None and provenance._dirty() == provenance.UNKNOWN
+    (tmp_path / "iapb").mkdir()
+    (tmp_path / "iapb" / "old.py").write_text("a = 1\n")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-q", "-m", "one")
+    assert provenance.uncommitted_changes() == "" and provenance._dirty() == "false"
+    (tmp_path / "notes.txt").write_text("not a source")
+    assert provenance._dirty() == "false"
+    (tmp_path / "iapb" / "old.py").write_text("a = 2\n")
+    (tmp_path / "iapb" / "new.py").write_text("b = 3\n")
+    patch = provenance.uncommitted_changes() or ""
+    assert "+a = 2" in patch and "+b = 3" in patch and str(tmp_path) not in patch
+    assert provenance._dirty() == "true"

@@ -1,0 +1,188 @@
+"""Two reports compared: a planted change is found, whatever its kind; measured times are left alone."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from iapb.errors import ArgumentError, RunFileError
+from reports import cli
+from reports.difference import (
+    CLOSE,
+    DIFFERS,
+    EXACT,
+    ONLY_NEW,
+    ONLY_OLD,
+    TIMING,
+    compare_reports,
+    compare_values,
+)
+from reports.difference_text import SHOWN, sentences, table, unlike
+from reports.figures.figure import Numbers
+from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
+
+TABLE = Numbers(("method", "gain", "median [µs]", "stable", "note"),
+                (("factored", 1.5, 12.0, True, "rank 3 of 4"), ("svd", math.nan, 40.0, True, ""),
+                 ("pinv", math.inf, 41.0, False, "gains 2.5e-3"), ("qr", None, 7.0, True, "x")))  # fmt: skip
+REPORT = ReportNumbers({"claims/C07": TABLE, "claims": Numbers(("claim", "outcome"), (("C07", "reproduced"),))},
+                       {"iapb run peg_corner": "c" * 64}, {"cpu": "one", "commit": "abc"}, "quick")  # fmt: skip
+
+
+def changed(row: int, column: str, value: object) -> ReportNumbers:
+    """The report with another value in one cell."""
+    rows = [list(cells) for cells in TABLE.rows]
+    rows[row][TABLE.columns.index(column)] = value
+    return replace(REPORT, tables={**REPORT.tables, "claims/C07": replace(TABLE, rows=tuple(map(tuple, rows)))})
+
+
+def test_a_report_agrees_with_itself_through_its_file(tmp_path):
+    again = read_numbers(write_numbers(tmp_path / NUMBERS_NAME, REPORT))
+    found = compare_reports(REPORT, again)
+    assert {cell.state for cell in found.cells} == {EXACT} and len(found.cells) == 22
+    assert (found.runs_same, found.runs_other, found.tables_old, found.tables_new) == (1, (), (), ())
+    assert (again.runs, again.provenance, again.depth) == (REPORT.runs, REPORT.provenance, "quick")
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "value", "state"),
+    [
+        (0, "gain", 1.5 * (1 + 1e-12), CLOSE), (0, "gain", 1.5 * (1 + 1e-8), DIFFERS), (0, "gain", -1.5, DIFFERS),
+        (0, "gain", math.nan, DIFFERS), (1, "gain", 1.0, DIFFERS), (2, "gain", -math.inf, DIFFERS),
+        (0, "gain", None, ONLY_OLD), (3, "gain", 1.0, ONLY_NEW), (0, "median [µs]", 99.0, TIMING),
+        (0, "stable", False, DIFFERS), (0, "stable", 1, DIFFERS), (0, "note", "rank 2 of 4", DIFFERS),
+        (2, "note", "gains 2.50000000001e-3", CLOSE), (2, "note", "loses 2.5e-3", DIFFERS),
+    ],
+)  # fmt: skip
+def test_a_planted_change_is_found_and_named(row, column, value, state):
+    found = compare_reports(REPORT, changed(row, column, value))
+    [cell] = [cell for cell in found.cells if cell.state != EXACT]
+    assert (cell.state, cell.table, cell.column) == (state, "claims/C07", column)
+    assert cell.row.startswith(f"{row + 1}: ")
+
+
+def test_what_is_rounding_itself_need_not_repeat():
+    assert compare_values(2.2e-16, 4.4e-16, 1e-9)[0] == CLOSE
+    assert compare_values(2.2e-16, 1e-11, 1e-9)[0] == DIFFERS
+
+
+def test_a_row_more_does_not_shift_the_others():
+    more = replace(TABLE, rows=(("new", 1.0, 1.0, True, ""), *TABLE.rows))
+    found = compare_reports(REPORT, replace(REPORT, tables={**REPORT.tables, "claims/C07": more}))
+    assert (found.count(ONLY_NEW), found.count(DIFFERS), found.count(EXACT)) == (4, 0, 22)
+    fewer = replace(TABLE, columns=TABLE.columns[:-1], rows=tuple(row[:-1] for row in TABLE.rows))
+    found = compare_reports(REPORT, replace(REPORT, tables={**REPORT.tables, "claims/C07": fewer}))
+    assert (found.count(ONLY_OLD), found.count(DIFFERS)) == (4, 0)
+
+
+def test_columns_of_one_name_are_kept_apart():
+    twice = ReportNumbers({"t": Numbers(("a", "a"), ((1.0, 2.0),))}, {}, {}, "quick")
+    other = ReportNumbers({"t": Numbers(("a", "a"), ((3.0, 2.0),))}, {}, {}, "quick")
+    assert [cell.state for cell in compare_reports(twice, other).cells] == [DIFFERS, EXACT]
+
+
+def test_sentences_count_everything():
+    other = replace(changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "iapb run new": "e"})
+    other = replace(other, tables={"extra": TABLE, **{k: v for k, v in other.tables.items() if k != "claims"}})
+    found = compare_reports(REPORT, other)
+    text = " ".join(sentences(found, 1e-9))
+    assert "20 numbers and words" in text and "19 are exactly" in text and "1 differ" in text
+    assert "Only in the old report: claims." in text and "Only in the new report: extra." in text
+    assert "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only." in text
+    [row] = table(found)
+    assert row == ("claims/C07", "1: factored", "gain", "1.5", "2.0", "2.5e-01")
+    many = Numbers(("x",), tuple((float(i),) for i in range(1, 100)))
+    twice = replace(many, rows=tuple((2 * x,) for (x,) in many.rows))
+    pair = [ReportNumbers({"t": one}, {}, {}, "quick") for one in (many, twice)]
+    assert len(list(table(compare_reports(*pair)))) == SHOWN
+
+
+def test_what_keeps_runs_from_repeating_is_named():
+    assert unlike(REPORT.provenance, REPORT.provenance) == ()
+    assert unlike({"cpu": "a", "dirty": "true"}, {"cpu": "b"}) == ("cpu", "uncommitted changes")
+
+
+def test_the_command_ends_with_1_only_where_results_differ(tmp_path, capsys):
+    for name, report in (("a", REPORT), ("b", changed(0, "median [µs]", 99.0)), ("c", changed(0, "gain", 2.0))):
+        (tmp_path / name).mkdir()
+        write_numbers(tmp_path / name / NUMBERS_NAME, report)
+    a, b, c = (str(tmp_path / name) for name in "abc")
+    assert cli.main(["report", "diff", a, f"{b}/report.html"]) == 0
+    assert "1 measured times differ, and are not judged" in capsys.readouterr().out
+    assert cli.main(["report", "diff", a, f"{c}/{NUMBERS_NAME}"]) == 1
+    assert "The largest 1 of 1 differences" in capsys.readouterr().out
+    assert cli.main(["report", "diff", a, c, "--tolerance", "0.5"]) == 0
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", "null", '{"format": "other"}', "\x00", "[" * 100_000, "not JSON",
+             '{"format": "iapb numbers", "format_version": 1, "depth": "q", "runs": {}, "provenance": {}, '
+             '"tables": {"t": {"columns": ["a"], "rows": [[1, 2]]}}}'],
+)  # fmt: skip
+def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
+    path = tmp_path / NUMBERS_NAME
+    path.write_text(text)
+    with pytest.raises(RunFileError, match="numbers of a report"):
+        read_numbers(path)
+    assert cli.main(["report", "diff", str(path), str(path)]) == 1
+    assert capsys.readouterr().err.startswith("iapb: ")
+
+
+def test_a_page_alone_is_not_enough(tmp_path):
+    (tmp_path / "report.html").write_text("<p>")
+    with pytest.raises(ArgumentError, match=NUMBERS_NAME):
+        read_numbers(tmp_path / "report.html")
+
+
+def test_numbers_keep_their_last_bit_and_the_file_is_strict_json(tmp_path):
+    value = 0.1 + 0.2
+    report = replace(REPORT, tables={"t": Numbers(("x",), ((value,), (-math.inf,)))})
+    path = write_numbers(tmp_path / NUMBERS_NAME, report)
+    json.loads(path.read_text(), parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    assert read_numbers(path).tables["t"].rows == ((value,), (-math.inf,))
+
+
+@pytest.fixture
+def remade(monkeypatch):
+    """Stand in for the hours of computing: `reproduce --check` makes the report that is put here."""
+    made, folders = [REPORT], []
+
+    def make_report(out, depth):
+        folders.append(out)
+        out.mkdir(exist_ok=True)
+        write_numbers(out / NUMBERS_NAME, replace(made[-1], depth=depth))
+
+    monkeypatch.setattr("reports.commands.reproduce.make_report", make_report)
+    return made, folders
+
+
+@pytest.mark.parametrize(
+    ("other", "status", "said"),
+    [
+        (REPORT, 0, "every number was made again"),
+        (changed(0, "median [µs]", 99.0), 0, "every number was made again"),
+        (changed(0, "gain", 1.5 + 1e-12), 0, "1 agree within 1e-09"),
+        (changed(0, "gain", 1.6), 1, "not every number"),
+        (changed(0, "gain", None), 1, "not every number"),
+        (replace(REPORT, tables={}), 1, "not every number"),
+        (replace(REPORT, runs={"iapb run peg_corner": "d" * 64}), 1, "runs must agree to the last bit"),
+        (replace(REPORT, runs={"iapb run peg_corner": "d" * 64}, provenance={"cpu": "two", "commit": "abc"}), 0,
+         "made with another cpu: numbers must agree within 1e-09"),
+    ],
+)  # fmt: skip
+def test_a_report_is_checked_by_making_it_again(other, status, said, remade, tmp_path, capsys):
+    write_numbers(tmp_path / NUMBERS_NAME, REPORT)
+    remade[0].append(other)
+    assert cli.main(["reproduce", "--check", str(tmp_path / "report.html")]) == status
+    assert said in capsys.readouterr().out
+    assert not remade[1][0].exists()  # the temporary folder is gone
+
+
+def test_a_check_never_reads_what_is_there(remade, tmp_path, capsys):
+    write_numbers(tmp_path / NUMBERS_NAME, replace(REPORT, depth="full"))
+    assert cli.main(["reproduce", "--check", str(tmp_path), "--out", str(tmp_path)]) == 1
+    assert "an empty folder" in capsys.readouterr().err and not remade[1]
+    assert cli.main(["reproduce", "--check", str(tmp_path), "--out", str(tmp_path / "new")]) == 0
+    assert read_numbers(tmp_path / "new").depth == "full"
