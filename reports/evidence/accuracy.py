@@ -1,4 +1,4 @@
-"""Stage: what accuracy costs in time, for the impact methods and the cvxpy QP."""
+"""Stage: what accuracy costs in time, for impact methods and complementarity solvers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def compute(progress: Callable[[int, int], None]) -> Numbers:
     rows = tuple(_row(found) for found in work_precision(progress=progress))
     return Numbers(
         ("method", "problem", "time [µs]", "quartiles [µs]", "relative error", "relative energy gain",
-         "restitution residual", "outcome"), rows, 3,
+         "restitution residual", "failed after [µs]", "outcome"), rows, 3,
         "Medians of warm, interleaved calls from Python; errors against exact rational arithmetic, in the kinetic "
         "metric. A negative gain is a loss and is drawn as none.")  # fmt: skip
 
@@ -25,7 +25,7 @@ def _row(found: Any) -> tuple[Any, ...]:
     seconds = found.seconds
     spread = f"{seconds.lower * 1e6:.3g} to {seconds.upper * 1e6:.3g}"
     return (found.method, found.label, _finite(seconds.median * 1e6), spread, _finite(found.forward_error),
-            _gain(found.energy_gain), _finite(found.restitution_residual),
+            _gain(found.energy_gain), _finite(found.restitution_residual), _finite(found.failed_after * 1e6),
             f"{found.status}: {found.note}" if found.note else found.status)  # fmt: skip
 
 

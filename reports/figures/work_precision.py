@@ -7,20 +7,23 @@ name. Times are medians in microseconds; an error or gain of 0 is drawn at the b
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
-from reports.figures.style import CYCLE, line_arguments, series_legend, styled
+from reports.figures.rigid_convergence import look
+from reports.figures.style import line_arguments, styled
 from reports.figures.svg import to_svg
 
 KEY, TITLE = "work-precision", "What a microsecond buys"
 INPUT = "work_precision"
 METHOD, PROBLEM, TIME = "method", "problem", "time [µs]"
+FAILED = "failed after [µs]"
 ERROR, RESIDUAL, GAIN = "relative error", "restitution residual", "relative energy gain"
 CAPTION = (
     "Each mark is one method on one problem; lower left is better. Marks at the very bottom mean none that double "
-    "precision can show. "
+    "precision can show. Crosses at the upper rim are failures, after the time at which they were given up. "
 )
 NO_GAIN = "No method gained energy on these problems."
 SOME_GAIN = "A method that gains energy is not safe to hold, however fast or accurate it is."
@@ -36,7 +39,8 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     panels = tuple(Panel(_marks(numbers, methods, column), f"{column} against time for {', '.join(methods)}.", column)
                    for column in shown)
     caption = CAPTION + (SOME_GAIN if GAIN in shown else NO_GAIN)
-    return Figure(KEY, "", TITLE, caption, panels, numbers, series_legend(methods, line=False), (INPUT,))
+    legend = tuple((method, replace(look(number), width=0.0)) for number, method in enumerate(methods))
+    return Figure(KEY, "", TITLE, caption, panels, numbers, legend, (INPUT,))
 
 
 def _any_positive(numbers: Numbers, column: str) -> bool:
@@ -55,11 +59,22 @@ def _marks(numbers: Numbers, methods: tuple[str, ...], column: str) -> str:
         for number, method in enumerate(methods):
             points = [(float(row[at]), max(float(row[of]), _SMALLEST)) for row in numbers.rows
                       if row[where] == method and None not in (row[at], row[of])]
-            look = {**line_arguments(CYCLE[number % len(CYCLE)]), "linestyle": "none", "markersize": 6}
-            axes.plot(*zip(*points, strict=True), **look) if points else None
+            marks = {**line_arguments(look(number)), "linestyle": "none", "markersize": 6}
+            axes.plot(*zip(*points, strict=True), **marks) if points else None
+            lost = _failures(numbers, method)
+            axes.plot(lost, [0.985] * len(lost), "x", color=look(number).color, markersize=5,
+                      transform=axes.get_xaxis_transform())  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=TIME, ylabel=column)
         plain_powers(axes)
         return to_svg(drawing, f"{KEY}-{column.split()[-1]}")
+
+
+def _failures(numbers: Numbers, method: str) -> list[float]:
+    """Times at which a method's failures were given up."""
+    if FAILED not in numbers.columns:
+        return []
+    where, at = numbers.columns.index(METHOD), numbers.columns.index(FAILED)
+    return [float(row[at]) for row in numbers.rows if row[where] == method and row[at] is not None]
 
 
 RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="accuracy")

@@ -39,6 +39,7 @@ class Measurement:
     forward_error : |v⁺ − exact v⁺| / |v⁻| in the kinetic metric.
     energy_gain : (KE⁺ − KE⁻)/KE⁻ exactly; negative is a loss.
     restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
+    failed_after : seconds until a failure was given up, warm; NaN for what worked.
     """
 
     family: str
@@ -54,6 +55,7 @@ class Measurement:
     energy_gain: float
     restitution_residual: float
     seconds: Quartiles
+    failed_after: float = np.nan
 
 
 def work_precision(
@@ -79,6 +81,12 @@ def _measure(problem: TimedProblem, names: tuple[str, ...], rounds: int) -> list
     working = [name for name in names if not isinstance(answers[name], str)]
     times = _interleaved(problem, working, rounds)
     return [_record(problem, name, answers[name], times.get(name, [])) for name in names]
+
+
+def _seconds_to_fail(name: str, problem: TimedProblem) -> float:
+    started = time.perf_counter()
+    _try(name, problem)
+    return time.perf_counter() - started
 
 
 def _try(name: str, problem: TimedProblem) -> Floats | str:
@@ -126,6 +134,7 @@ def _record(problem: TimedProblem, name: str, answer: Floats | str, times: list[
         gain,
         residual,
         Quartiles(float(lower), float(median), float(upper), len(times)),
+        _seconds_to_fail(name, problem) if failed else np.nan,
     )
 
 

@@ -20,15 +20,19 @@ def _engine(method: str, budget: int | None = None) -> TimedMethod:
     return call
 
 
-def cvxpy_qp(problem: TimedProblem) -> Floats:
-    """The impact as a convex program over p ≥ 0, modelled by cvxpy and solved by Clarabel."""
-    from reference.complementarity import ImpactProblem, solve
+def _solver(name: str) -> TimedMethod:
+    """The impact as a complementarity problem in p ≥ 0, made and solved anew at each call."""
 
-    given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
-    solution = solve(ImpactProblem.from_impact(*given), "cvxpy_clarabel")
-    if solution.impulse is None:
-        raise SolverError(f"cvxpy gave no impulse: {solution.note}")
-    return solution.velocity_plus
+    def call(problem: TimedProblem) -> Floats:
+        from reference.complementarity import ImpactProblem, solve
+
+        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
+        solution = solve(ImpactProblem.from_impact(*given), name)
+        if solution.impulse is None:
+            raise SolverError(f"{name} gave no impulse: {solution.note}")
+        return solution.velocity_plus
+
+    return call
 
 
 METHODS: dict[str, TimedMethod] = {
@@ -37,7 +41,13 @@ METHODS: dict[str, TimedMethod] = {
     "gram_cholesky": _engine("gram_cholesky"),
     "damped": _engine("damped"),
     "svd": _engine("svd"),
-    "cvxpy QP": cvxpy_qp,
+    # complementarity: pivoting, sweeps, active sets, proximal, and an interior point modelled by cvxpy
+    "lemke LCP": _solver("lemke"),
+    "gauss_seidel LCP": _solver("gauss_seidel"),
+    "daqp QP": _solver("daqp"),
+    "quadprog QP": _solver("quadprog"),
+    "proxqp QP": _solver("proxqp"),
+    "cvxpy QP": _solver("cvxpy_clarabel"),
     # the anytime form: what a budget of rows buys
     "factored, 1 row": _engine("factored", 1),
     "factored, 2 rows": _engine("factored", 2),

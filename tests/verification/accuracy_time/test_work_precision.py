@@ -45,10 +45,13 @@ def test_a_failure_is_recorded_with_its_reason() -> None:
     assert record.status == "failed"
     assert "independent rows" in record.note
     assert np.isnan(record.forward_error) and np.isnan(record.seconds.median) and record.seconds.rounds == 0
+    assert record.failed_after > 0.0
 
 
-def test_kernel_times_show_the_cost_of_the_printed_formula() -> None:
+def test_kernel_times_speak_of_the_sizes_asked_for() -> None:
+    """Times themselves are never judged by a test: that is for `iapb bench`."""
     small, large = kernel_times(((3, 4), (12, 300)), rounds=3)
-    assert small.ratio > 1.0
-    assert large.ratio > 10.0
-    assert large.factored.median < 100.0 * small.factored.median + 1e-3
+    assert [(found.coordinates, found.contacts) for found in (small, large)] == [(3, 4), (12, 300)]
+    for found in (small, large):
+        assert found.factored.rounds == found.printed.rounds == 3
+        assert found.ratio == found.printed.median / found.factored.median
