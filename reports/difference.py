@@ -23,6 +23,9 @@ ROUNDING = 1e-12
 
 _TIME_UNIT = re.compile(r"\[(?:log₁₀ ?)?(?:s|ms|µs|us|ns|min|h)(?:\]| per | a |/)")
 _TIME_WORD = re.compile(r"\b(?:times?|timed|seconds|faster|slower|speed-up|real-time)\b", re.IGNORECASE)
+# Tables whose other columns are made from times as well: ratios, late calls, shares solved within a factor of the best.
+_FROM_TIMES = re.compile(r"^(?:haptic-rate/|claims/C(?:19|22)$|complementarity/(?:time per|.*profile)|inputs/work_prec|"
+                         r"figures/.*(?:profile|cost|precision|haptic|budget))")  # fmt: skip
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
@@ -93,7 +96,7 @@ def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...
 
 def is_timing(table: str, column: str) -> bool:
     """Whether a column holds times, or what was made from times."""
-    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or _TIME_WORD.search(table))
+    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or _FROM_TIMES.search(table))
 
 
 def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
