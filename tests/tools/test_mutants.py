@@ -1,0 +1,118 @@
+"""The tool that mutates the physics: its places, its sample, its choice of tests, its verdicts."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("cosmic_ray")
+
+from cosmic_ray.mutating import mutate_code
+
+from tools.mutants.explained import Explanation, explanations
+from tools.mutants.judge import NOTICED, SURVIVED, Judgement, Kept
+from tools.mutants.operators import OPERATORS
+from tools.mutants.report import likely_range, score, unexplained
+from tools.mutants.selection import MeasuredTest, Selection
+from tools.mutants.sites import Mutant, places, sample
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = """\
+LIMIT = 2.0
+
+
+def fall(speeds, n):
+    \"\"\"Not code: 1 + 1.\"\"\"
+    total = 0.0
+    for k in range(n):
+        total += LIMIT * min(speeds[k], 1.0)
+    store(total)
+    if n < 0:
+        raise ValueError(f"n < 0: {n + 1}")
+    return total
+"""
+
+
+@pytest.mark.parametrize("name", ["AugmentedSign", "OtherExtreme", "DropStatement"])
+def test_own_operators_do_what_their_examples_say(name: str) -> None:
+    for example in OPERATORS[name].examples():
+        before, after = example.pre_mutation_code + "\n", example.post_mutation_code + "\n"
+        assert mutate_code(before, OPERATORS[name], 0) == after
+
+
+def test_every_place_changes_code_and_still_parses() -> None:
+    for mutant in places("fall.py", TEXT):
+        changed = ast.dump(ast.parse(mutant.source(TEXT)))
+        assert changed != ast.dump(ast.parse(TEXT)), mutant
+        assert mutant.becomes(TEXT) != mutant.line
+
+
+def test_places_know_their_function_and_skip_messages() -> None:
+    found = list(places("fall.py", TEXT))
+    assert {mutant.function for mutant in found} == {"", "fall"}
+    assert not [mutant for mutant in found if "raise" in mutant.line or "Not code" in mutant.line]
+    assert {"total += LIMIT * min(speeds[k], 1.0)", "store(total)"} <= {
+        mutant.line for mutant in found if mutant.operator == "DropStatement"
+    }
+
+
+def test_sample_depends_on_the_seed_alone() -> None:
+    first, again, other = (sample(ROOT, 20, seed, only="projector") for seed in (0, 0, 1))
+    assert first == again
+    assert set(first) != set(other)
+    assert sample(ROOT, 10, 0, only="projector") == first[:10]
+
+
+def _mutant(function: str) -> Mutant:
+    return Mutant("iapb/a.py", "NumberReplacer", 0, 3, "x = 1", function)
+
+
+def test_tests_that_call_the_function_judge_first_and_their_files_second() -> None:
+    mirrored = MeasuredTest("tests/test_a.py::test_slow", 2.0, frozenset({"iapb/a.py::f"}))
+    elsewhere = MeasuredTest("tests/test_b.py::test_quick", 0.1, frozenset({"iapb/a.py::f"}))
+    beside = MeasuredTest("tests/test_b.py::test_shared", 0.1, frozenset())
+    unrelated = MeasuredTest("tests/test_c.py::test_c", 0.1, frozenset({"iapb/a.py::g"}))
+    selection = Selection([unrelated, beside, elsewhere, mirrored])
+    assert selection.first_look(_mutant("f")) == [mirrored, elsewhere]
+    assert selection.second_look(_mutant("f")) == [beside]
+    assert selection.first_look(_mutant("h")) == []
+    assert unrelated in selection.first_look(_mutant(""))  # a constant of the module
+
+
+def _judgement(verdict: str, key: str, code: str = "now") -> Judgement:
+    return Judgement("iapb/a.py", "f", 3, "x = 1", "x = 2", "NumberReplacer", verdict, key=key, code=code)
+
+
+def test_a_survivor_is_judged_again_when_the_tests_have_changed(tmp_path: Path) -> None:
+    kept = Kept(tmp_path / "verdicts.jsonl", "before")
+    for verdict in (NOTICED, SURVIVED):
+        kept.add(_judgement(verdict, verdict, code="before"))
+    later, same = Kept(tmp_path / "verdicts.jsonl", "now"), Kept(tmp_path / "verdicts.jsonl", "before")
+    assert later.find(NOTICED) is not None
+    assert later.find(SURVIVED) is None
+    assert same.find(SURVIVED) is not None
+
+
+def test_only_the_explained_change_of_the_explained_line_is_excused() -> None:
+    survivor = _judgement(SURVIVED, "1")
+    judged = [survivor, _judgement(NOTICED, "2")]
+    explanation = Explanation("iapb/a.py", "x = 1", "harmless", "because", becomes="x = 2")
+    assert unexplained(judged, [explanation]) == []
+    assert unexplained(judged, [dataclasses.replace(explanation, becomes="x = 0")]) == [survivor]
+    assert unexplained(judged, [dataclasses.replace(explanation, line="y = 1")]) == [survivor]
+    assert score(judged) == 0.5
+
+
+def test_likely_range_narrows_with_the_sample_and_stays_within_one() -> None:
+    few, many = likely_range(0.9, 50), likely_range(0.9, 5000)
+    assert few[0] < many[0] < 0.9 < many[1] < few[1] < 1.0
+    assert likely_range(1.0, 10)[0] < 1.0
+
+
+def test_every_explained_line_is_still_in_its_file() -> None:
+    for entry in explanations():
+        lines = {line.strip() for line in (ROOT / entry.file).read_text().splitlines()}
+        assert entry.line in lines, f"explained.toml: {entry.file} no longer holds {entry.line!r}"

@@ -1,0 +1,104 @@
+"""What a mutant may change: operators of cosmic-ray that fit numerical code, and three that it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from cosmic_ray.operators.operator import Example, Operator
+from cosmic_ray.plugins import get_operator
+from parso.python.tree import Keyword, Name, PythonNode
+from parso.tree import Leaf
+
+_FROM_COSMIC_RAY = (
+    "ReplaceBinaryOperator_Add_Sub",
+    "ReplaceBinaryOperator_Sub_Add",
+    "ReplaceBinaryOperator_Mul_Div",
+    "ReplaceBinaryOperator_Div_Mul",
+    "ReplaceUnaryOperator_Delete_USub",
+    "ReplaceUnaryOperator_Delete_Not",
+    "ReplaceComparisonOperator_Lt_LtE",
+    "ReplaceComparisonOperator_Lt_GtE",
+    "ReplaceComparisonOperator_LtE_Lt",
+    "ReplaceComparisonOperator_LtE_Gt",
+    "ReplaceComparisonOperator_Gt_GtE",
+    "ReplaceComparisonOperator_Gt_LtE",
+    "ReplaceComparisonOperator_GtE_Gt",
+    "ReplaceComparisonOperator_GtE_Lt",
+    "ReplaceComparisonOperator_Eq_NotEq",
+    "ReplaceComparisonOperator_NotEq_Eq",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "ReplaceBreakWithContinue",
+    "ReplaceContinueWithBreak",
+    "NumberReplacer",  # ±1: constants, indices and the ends of ranges
+)
+
+
+class AugmentedSign(Operator):
+    """`a += b` becomes `a -= b`, and the other way round; `*=` and `/=` likewise."""
+
+    _OTHER = {"+=": "-=", "-=": "+=", "*=": "/=", "/=": "*="}
+
+    def mutation_positions(self, node: Any) -> Iterator[Any]:
+        if isinstance(node, Leaf) and node.value in self._OTHER:
+            yield node.start_pos, node.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        node.value = self._OTHER[node.value]
+        return node
+
+    @classmethod
+    def examples(cls) -> tuple[Example, ...]:
+        return (Example("a += b", "a -= b"),)
+
+
+class OtherExtreme(Operator):
+    """`min` becomes `max`, and the other way round."""
+
+    _OTHER = {"min": "max", "max": "min"}
+
+    def mutation_positions(self, node: Any) -> Iterator[Any]:
+        if isinstance(node, Name) and node.value in self._OTHER:
+            yield node.start_pos, node.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        node.value = self._OTHER[node.value]
+        return node
+
+    @classmethod
+    def examples(cls) -> tuple[Example, ...]:
+        return (Example("min(a, b)", "max(a, b)"),)
+
+
+class DropStatement(Operator):
+    """A call or an augmented assignment that stands alone on its line becomes `pass`."""
+
+    def mutation_positions(self, node: Any) -> Iterator[Any]:
+        if isinstance(node, PythonNode) and node.type == "simple_stmt":
+            statement = node.children[0]
+            call = statement.type == "atom_expr" and statement.children[-1].type == "trailer"
+            augmented = statement.type == "expr_stmt" and statement.children[1].type in ("operator", "augassign")
+            if call or (augmented and _operator_of(statement) != "="):
+                yield statement.start_pos, statement.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        first = node.get_first_leaf()
+        node.children[0] = Keyword("pass", first.start_pos, prefix=first.prefix)
+        return node
+
+    @classmethod
+    def examples(cls) -> tuple[Example, ...]:
+        return (Example("f(x)", "pass"), Example("a += b", "pass"))
+
+
+def _operator_of(statement: Any) -> str:
+    return str(statement.children[1].get_code().strip())
+
+
+OPERATORS: dict[str, Operator] = {
+    **{name: get_operator(f"core/{name}")() for name in _FROM_COSMIC_RAY},
+    **{kind.__name__: kind() for kind in (AugmentedSign, OtherExtreme, DropStatement)},
+}
