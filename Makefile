@@ -51,6 +51,10 @@ verify: setup ## every law at 1,000,000 impacts and 5,000 trajectories; hours, a
 fuzz: setup ## 100,000 wrong inputs: each must be read or refused by name; what breaks something is kept in out/fuzz
 	@$(BIN)/python -m reports.fuzz --cases $(or $(CASES),100000)
 
+.PHONY: mutants
+mutants: setup ## sampled small faults in the physics: the share that the tests notice; N=100 SEED=0
+	@$(BIN)/python -m tools.mutants -n $(or $(N),100) --seed $(or $(SEED),0) --workers $(PYTEST_WORKERS)
+
 .PHONY: docs
 docs: setup ## the pages of docs/ with the reference of the code, as HTML in out/docs; a warning is an error
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs

@@ -26,12 +26,13 @@ def main() -> int:
     try:
         root = clones[0].root
         mutants = sample(root, asked.count, asked.seed, asked.only)
+        number, commit = len(all_places(root, asked.only)), git("rev-parse", "HEAD", folder=root)
         judged = _judged(mutants, clones)
     finally:
         for clone in clones:
             clone.remove()
-    table, number = explanations(), len(all_places(REPOSITORY, asked.only))
-    write(REPOSITORY / "out" / "mutants.json", judged, table, asked.seed, git("rev-parse", "HEAD"))
+    table = explanations()
+    write(REPOSITORY / "out" / "mutants.json", judged, table, asked.seed, commit)
     print("\n".join(sentences(judged, table, number)))
     return int(score(judged) < WANTED or bool(unexplained(judged, table)))
 
@@ -52,7 +53,7 @@ def _judged(mutants: list[Mutant], clones: list[Clone]) -> list[Judgement]:
     def told(done: int, judgement: Judgement) -> None:
         _show(f"{done} of {len(mutants)} mutants: {judgement.file} {judgement.verdict}")
 
-    judged = judge_all(mutants, selection, clones, Kept(OUT / "verdicts.jsonl", code_version()), told)
+    judged = judge_all(mutants, selection, clones, Kept(OUT / "verdicts.jsonl", code_version(clones[0])), told)
     print(file=sys.stderr)
     return judged
 

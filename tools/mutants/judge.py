@@ -48,7 +48,7 @@ class Kept:
     """
 
     def __init__(self, path: Path, code: str) -> None:
-        self._path, self._code = path, code
+        self._path, self.code = path, code
         path.parent.mkdir(parents=True, exist_ok=True)
         lines = path.read_text().splitlines() if path.exists() else []
         judged = [Judgement(**json.loads(line)) for line in lines]
@@ -64,9 +64,10 @@ class Kept:
             file.write(json.dumps(asdict(judgement)) + "\n")
 
 
-def code_version() -> str:
-    """Stamp of engine and tests in the last commit."""
-    return hashlib.sha256(git("rev-parse", "HEAD:iapb", "HEAD:tests").encode()).hexdigest()[:16]
+def code_version(clone: Clone) -> str:
+    """Stamp of engine and tests in a clone."""
+    trees = git("rev-parse", "HEAD:iapb", "HEAD:tests", folder=clone.root)
+    return hashlib.sha256(trees.encode()).hexdigest()[:16]
 
 
 def judge_all(
@@ -97,7 +98,7 @@ def _judge(mutant: Mutant, selection: Selection, clone: Clone, kept: Kept) -> Ju
         path.write_text(text)
     judgement = Judgement(
         mutant.file, mutant.function, mutant.number, mutant.line, mutant.becomes(text), mutant.operator, verdict,
-        by, tests, key, code_version(),
+        by, tests, key, kept.code,
     )  # fmt: skip
     kept.add(judgement)
     return judgement
