@@ -117,8 +117,8 @@ def _checked(content: Any) -> ReportNumbers:
         found = f"{content['format']!r} {content['format_version']!r}"
         raise ValueError(f"format {found}: expected {FORMAT} {FORMAT_VERSION}")
     tables = {str(name): _table(table) for name, table in content["tables"].items()}
-    texts = [{str(key): str(value) for key, value in content[part].items()} for part in ("runs", "provenance")]
-    return ReportNumbers(tables, *texts, str(content["depth"]))
+    runs, facts = ({str(key): str(value) for key, value in content[part].items()} for part in ("runs", "provenance"))
+    return ReportNumbers(tables, runs, facts, str(content["depth"]))
 
 
 def _table(table: Any) -> Numbers:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -76,9 +75,7 @@ class Stage:
         adapter = TypeAdapter(self._kind)
         if self.path.is_file():
             return self._read(adapter, runner)
-        with runner.recording(self.name.replace("_", " ")) if runner else nullcontext({}) as used:
-            records = compute()
-        self.runs = dict(used)
+        records = self._computed(compute, runner)
         text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
         read_back = adapter.validate_python(json.loads(text))  # what is no such record is not written
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,11 +83,20 @@ class Stage:
         write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs))
         return read_back
 
+    def _computed(self, compute: Callable[[], Any], runner: Runner | None) -> Any:
+        if runner is None:
+            return compute()
+        with runner.recording(self.name.replace("_", " ")) as used:
+            records = compute()
+        self.runs = dict(used)
+        return records
+
     def _read(self, adapter: Any, runner: Runner | None) -> Any:
         tables = read_tables(self.path)
         self.runs = {run.file: run for run in _runs_of(tables[_RUNS])} if _RUNS in tables else {}
-        for run in self.runs.values() if runner else ():
-            add_use(runner.used, run)
+        if runner is not None:
+            for run in self.runs.values():
+                add_use(runner.used, run)
         return adapter.validate_python(json.loads(tables[_RECORDS]["json"][0]))
 
     def _records_table(self, text: str) -> Table:
