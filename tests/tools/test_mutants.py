@@ -67,7 +67,7 @@ def test_sample_depends_on_the_seed_alone() -> None:
 
 
 def _mutant(function: str) -> Mutant:
-    return Mutant("iapb/a.py", "NumberReplacer", 0, 3, "x = 1", function)
+    return Mutant("iapb/a.py", "Constant", 0, 3, "x = 1", function)
 
 
 def test_tests_that_call_the_function_judge_first_and_their_files_second() -> None:
@@ -83,7 +83,7 @@ def test_tests_that_call_the_function_judge_first_and_their_files_second() -> No
 
 
 def _judgement(verdict: str, key: str, code: str = "now") -> Judgement:
-    return Judgement("iapb/a.py", "f", 3, "x = 1", "x = 2", "NumberReplacer", verdict, key=key, code=code)
+    return Judgement("iapb/a.py", "f", 3, "x = 1", "x = 2", "Constant", verdict, key=key, code=code)
 
 
 def test_a_survivor_is_judged_again_when_the_tests_have_changed(tmp_path: Path) -> None:

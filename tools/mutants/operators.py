@@ -1,10 +1,11 @@
-"""What a mutant may change: operators of cosmic-ray that fit numerical code, and three that it lacks."""
+"""What a mutant may change: operators of cosmic-ray that fit numerical code, and some that it lacks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+from cosmic_ray.operators.number_replacer import NumberReplacer
 from cosmic_ray.operators.operator import Example, Operator
 from cosmic_ray.plugins import get_operator
 from parso.python.tree import Keyword, Name, PythonNode
@@ -33,8 +34,25 @@ _FROM_COSMIC_RAY = (
     "ReplaceFalseWithTrue",
     "ReplaceBreakWithContinue",
     "ReplaceContinueWithBreak",
-    "NumberReplacer",  # ±1: constants, indices and the ends of ranges
 )
+
+
+def _is_first_length(number: Any) -> bool:
+    """Is this the 0 of `shape[0]`?"""
+    bracket = number.get_previous_leaf()
+    return bool(number.value == "0" and bracket.value == "[" and bracket.get_previous_leaf().value == "shape")
+
+
+def _operator_of(statement: Any) -> str:
+    return str(statement.children[1].get_code().strip())
+
+
+class Constant(NumberReplacer):
+    """A number ± 1: constants, indices and the ends of ranges; but `shape[-1]` for `shape[0]` changes no vector."""
+
+    def mutation_positions(self, node: Any) -> Iterator[Any]:
+        positions = list(super().mutation_positions(node))
+        yield from positions[:1] if positions and _is_first_length(node) else positions
 
 
 class AugmentedSign(Operator):
@@ -94,11 +112,7 @@ class DropStatement(Operator):
         return (Example("f(x)", "pass"), Example("a += b", "pass"))
 
 
-def _operator_of(statement: Any) -> str:
-    return str(statement.children[1].get_code().strip())
-
-
 OPERATORS: dict[str, Operator] = {
     **{name: get_operator(f"core/{name}")() for name in _FROM_COSMIC_RAY},
-    **{kind.__name__: kind() for kind in (AugmentedSign, OtherExtreme, DropStatement)},
+    **{kind.__name__: kind() for kind in (Constant, AugmentedSign, OtherExtreme, DropStatement)},
 }

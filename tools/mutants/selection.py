@@ -13,7 +13,7 @@ from tools.mutants import calls
 from tools.mutants.clones import Clone, in_clones
 from tools.mutants.sites import MODULE_LEVEL, Mutant, functions, physics_files
 
-TEST_FOLDERS = ("tests/iapb", "tests/verification", "tests/reference")
+TEST_FOLDERS = ("tests/iapb", *(f"tests/verification/{part}" for part in ("mechanics", "properties", "hard_cases")))
 LONGEST_FILE = 30  # [s] of CPU to measure one test file; the tests that were reached by then count
 FIRST_LOOK, SECOND_LOOK = 10.0, 40.0  # [s] of CPU for the tests of a mutant, as measured without one
 
