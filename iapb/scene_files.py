@@ -8,7 +8,13 @@ from iapb.errors import ArgumentError
 
 
 def scene_folder() -> Path:
-    """Return the folder of the scenes that come with the project."""
+    """Return the folder of the scenes that come with the project.
+
+    Returns
+    -------
+    Path
+        inside an installed package, or in the checkout.
+    """
     package = Path(__file__).resolve().parent
     installed = package / "scenes"
     return installed if installed.is_dir() else package.parent / "scenes"
@@ -21,6 +27,15 @@ def scene_names() -> tuple[str, ...]:
 
 def find_scene(name: str | Path) -> Path:
     """Return the scene file that `name` means: a path, or the name of a scene that comes with the project.
+
+    Parameters
+    ----------
+    name : path of a file, or a name such as ``peg_corner``
+
+    Returns
+    -------
+    Path
+        of a file that exists.
 
     Raises
     ------

@@ -91,6 +91,19 @@ def event_driven(
     """Return the motion from q, v (d,) for `duration` [s], or up to event number `most_events`.
 
     An accumulation of impacts (a ball coming to rest) ends it early: `end` then says how far it goes.
+
+    Parameters
+    ----------
+    system : constant mass matrix and force, gaps that are linear in q
+    q, v : (d,) at the start, [m | rad] and their rates
+    duration : [s]
+    law : impact law; by default Newton's as a linear complementarity problem
+    most_events : after which the motion ends
+
+    Returns
+    -------
+    ExactTrajectory
+        parabolas between the events, so exact at every time.
     """
     q_now, v_now, now = np.array(q, np.float64), np.array(v, np.float64), 0.0
     speed, arcs = float(np.abs(v_now).max(initial=0.0)), []

@@ -59,7 +59,20 @@ def exact_impact(
 ) -> ExactImpact:
     """Return the exact outcome of (21) for M (d, d), J (c, d), v (d,) and scalar e.
 
-    Entries are doubles or `fractions.Fraction`; M is taken as symmetric positive definite.
+    Parameters
+    ----------
+    mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M is taken as symmetric positive definite
+    restitution : e, one for all rows
+
+    Returns
+    -------
+    ExactImpact
+        v⁺, the generalized impulse, the rows used, and the energies before and after, all as fractions.
+
+    Raises
+    ------
+    ArgumentError
+        An entry is not finite, or the shapes do not fit.
     """
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
     chosen = independent_rows(contact_jacobian)

@@ -59,7 +59,18 @@ WORLDS: dict[str, Callable[[str], World]] = {
 
 
 def find_world(name: str, rendering: str = "full") -> World:
-    """The world of that name; `rendering` says how IAPB meets the device's limits (``full`` ignores them)."""
+    """Return the world of that name.
+
+    Parameters
+    ----------
+    name : ideal, IAPB, PB or CBuc
+    rendering : how IAPB meets the device's limits: full (ignores them), saturate, scale or spread
+
+    Raises
+    ------
+    ArgumentError
+        There is no such world, or its law has no impulses that a rendering could fit.
+    """
     if name not in WORLDS:
         raise ArgumentError("world", name, "one of " + ", ".join(WORLDS))
     world = WORLDS[name](rendering)
@@ -77,7 +88,27 @@ def run_world(
     partial: bool = False,
     **options: Any,
 ) -> Run:
-    """Simulate a scene in one of the paper's worlds; `partial` says that an incomplete run will do too."""
+    """Simulate a scene in one of the paper's worlds.
+
+    Parameters
+    ----------
+    scene : a checked scene
+    name, rendering : as `find_world` takes them
+    progress : called with (steps done, steps) now and then
+    partial : True: an incomplete run (interrupted, or out of range) is returned; False: it is raised
+    options : as `iapb.simulate` takes them
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    ArgumentError
+        There is no such world, or the scene has no gains for its coupling.
+    IapbError
+        The run stopped early, and `partial` is False.
+    """
     world = find_world(name, rendering)
     label = name if rendering == "full" else f"{name} {rendering}"
     run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)

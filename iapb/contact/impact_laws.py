@@ -93,6 +93,11 @@ def resolve_frictional_impact(
     restitution : e in [0, 1], one for all contacts.
     friction : μ ≥ 0, one or (c,).
 
+    Returns
+    -------
+    FrictionalImpact
+        v⁺ (d,) [m/s | rad/s], normal and tangential impulses [N s], energy change [J].
+
     Raises
     ------
     ArgumentError, RangeError

@@ -50,6 +50,11 @@ def decide_effects(
     law, coupling, rendering
         names as they stand in a run: such as "penalty", "four-channel", "scale". None leaves the choice open: an
         effect is then on if some choice would need it. An unknown law is taken to use the whole contact section.
+
+    Returns
+    -------
+    tuple of Effect
+        every effect in a fixed order: `active`, the reason, and what leaving it out would change.
     """
     question = Question.about(scene, law, coupling, rendering)
     return tuple(decide(question) for decide in EFFECTS)

@@ -32,8 +32,8 @@ class CollisionShape(NamedTuple):
     """One <collision> element of a link.
 
     kind : box, sphere, cylinder, capsule or mesh
-    lengths : [m] full sides of a box (3,), radius of a sphere (1,), radius and length (2,) of cylinder and capsule; a
-        mesh has none
+    lengths : [m] full sides of a box (3,), radius of a sphere (1,), radius and length (2,) of cylinder and capsule;
+    a mesh has none
     rotation, center : (3, 3) and (3,) [m] of the shape's own axes, in link axes
     """
 

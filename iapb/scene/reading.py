@@ -21,6 +21,15 @@ Place = tuple[str | int, ...]
 def load_scene(path: str | Path) -> Scene:
     """Read a scene from a YAML file.
 
+    Parameters
+    ----------
+    path : of the file; the URDF files that it names lie in its folder or below
+
+    Returns
+    -------
+    Scene
+        checked whole, every default filled in.
+
     Raises
     ------
     ArgumentError

@@ -64,7 +64,20 @@ def work_precision(
     rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Measurement, ...]:
-    """Return one record per problem and method, for a work-precision figure and its table."""
+    """Measure error, energy gain and time of every method on every problem, methods interleaved.
+
+    Parameters
+    ----------
+    problems : by default `timed_problems()`, which know their exact answers
+    methods : names of impact methods, by default all
+    rounds : how often each is timed
+    progress : called with (problems done, problems) after each
+
+    Returns
+    -------
+    tuple of Measurement
+        one record per problem and method, for a work-precision figure and its table.
+    """
     chosen = timed_problems() if problems is None else tuple(problems)
     names = tuple(METHODS if methods is None else methods)
     records: list[Measurement] = []

@@ -14,8 +14,8 @@ class EngineRecord:
     choice : "own" or "matched"; settings : step and options in words; note : what the engine cannot do
     duration : simulated time [s]
     energy_error : (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
-    energy_gain : largest rise of kinetic and potential energy above the start's, over the kinetic energy at the start
-        or, at rest, over the work of gravity along the scene's length
+    energy_gain : largest rise of kinetic and potential energy above the start's, over the kinetic energy at the start;
+    at rest, over the work of gravity along the scene's length
     momentum_error : |momentum at the end − true| / sum of m |v| at the start; impact scenes
     velocity_error : largest error of a body's final velocity / largest speed at the start; impact scenes
     penetration : deepest overlap [m], by our measure; most_contacts : of one instant, as the engine counts

@@ -23,6 +23,11 @@ def judge_hard_cases(
     cases : names in `HARD_CASES`, by default all of them. Cases of files that are absent are left out: ask
         `HARD_CASES[name]()` for the reason, which it raises as `CaseAbsent`.
     simulate : how a scene is run in a world: ``simulate(scene, world) -> Run``.
+
+    Returns
+    -------
+    tuple of HardCaseVerdict
+        one for each pair of case and method: the verdict in a word, and the numbers that it follows from.
     """
     wanted = None if methods is None else tuple(methods)
     found = (verdict for name in (HARD_CASES if cases is None else cases) for verdict in _of(name, wanted, simulate))

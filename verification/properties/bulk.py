@@ -141,9 +141,15 @@ def bulk_impacts(
 
     Parameters
     ----------
+    impacts, seed : how many, and of which random numbers.
     method, clamp : as `iapb.resolve_impact` takes them.
     largest_condition : κ(M) is log-uniform up to it.
     progress : called with (done, impacts) after each batch.
+
+    Returns
+    -------
+    BulkImpacts
+        one value per impact: sizes, κ(M), relative energy gain, its bound, and more.
     """
     columns: dict[str, list[Floats]] = {}
     seconds, done = 0.0, 0
