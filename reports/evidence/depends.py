@@ -15,11 +15,13 @@ FOLDERS: dict[str, tuple[str, ...]] = {
     "mechanics": ("robots",),
     "complementarity": ("problems",),
     "hard cases": ("problems",),
+    "haptic-rate": ("robots",),
 }
 # stage -> packages that it compares with, or leaves out where they are absent
 PACKAGES: dict[str, tuple[str, ...]] = {
     "engines": ("mujoco", "pin", "pybullet", "drake", "siconos"),
     "mechanics": ("pin", "coal"),
+    "haptic-rate": ("mujoco", "pybullet", "drake", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
     "cross-checks": ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon"),
 }
 

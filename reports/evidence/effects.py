@@ -1,31 +1,67 @@
-"""Stage: which effects the peg scene calls for, why, and what they cost."""
+"""Stage: which effects a scene calls for, why, what they cost, and what changes without them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from reports.evidence.runs import shipped_scene
+from reports.figures.figure import Numbers
 from reports.pages.records import SceneEffect
 
-SCENES = ("peg_corner", "arm_pushing")
+SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")
+INPUT = "effect_costs"
 
 
 def compute(progress: Callable[[int, int], None]) -> dict[str, tuple[SceneEffect, ...]]:
-    """The effects of each scene in the IAPB world, with the measured cost of those that can be left out."""
-    from iapb import decide_effects
-    from reference.worlds import find_world
-    from verification.accuracy_time.effect_cost import effect_costs
-
+    """The effects of each scene in the IAPB world; those that can be left out are measured."""
     found = {}
     for done, name in enumerate(SCENES):
         progress(done, len(SCENES))
-        scene = shipped_scene(name)
-        world = find_world("IAPB")
-        costs = effect_costs(scene)
-        effects = decide_effects(scene, world.law.name, world.coupling_in(scene).name, "full")
-        found[name] = tuple(
-            SceneEffect(effect.name, effect.active, effect.reason, costs.get(effect.name, ""), effect.left_out)
-            for effect in effects
-        )
+        found[name] = effects_of(shipped_scene(name))
     progress(len(SCENES), len(SCENES))
     return found
+
+
+def effects_of(
+    scene: Any, world: str = "IAPB", progress: Callable[[int, int], None] | None = None
+) -> tuple[SceneEffect, ...]:
+    """Every effect of a scene in a world of the compiled engine, measured where it is on and can be left out."""
+    from iapb import decide_effects
+    from reference.worlds import find_world
+    from verification.accuracy_time.effect_cost import in_words, measure_effects
+
+    chosen = find_world(world)
+    measured = {one.effect: one for one in measure_effects(scene, world, progress=progress)}
+    effects = []
+    for effect in decide_effects(scene, chosen.law.name, chosen.coupling_in(scene).name, "full"):
+        one = measured.get(effect.name)
+        cost, change = in_words(one) if one is not None else ("", "")
+        effects.append(SceneEffect(
+            effect.name, effect.active, effect.reason, cost, effect.left_out, change,
+            _known(one.saved) if one else None, _known(one.position) if one else None,
+        ))  # fmt: skip
+    return tuple(effects)
+
+
+def summary(effects: Mapping[str, Sequence[SceneEffect]]) -> Numbers:
+    """The table behind the figure: a row per scene and measured effect."""
+    rows = tuple((scene, one.name, 100.0 * one.saved, 1e3 * one.position, _best(one, found))
+                 for scene, found in effects.items() for one in found
+                 if one.saved is not None and one.position is not None)  # fmt: skip
+    return Numbers(("scene", "effect", "time saved [%]", "error [mm]", "best of its error"), rows, 3,
+                   "Best of its error: no other effect saves more time at the cost of no larger error.")
+
+
+def _best(one: SceneEffect, others: Sequence[SceneEffect]) -> str:
+    """Whether an effect is on the Pareto front of time saved and error made."""
+    rivals = [(other.saved, other.position) for other in others if other is not one]
+    beaten = any(saved is not None and position is not None and one.saved is not None and one.position is not None
+                 and saved >= one.saved and position <= one.position and (saved, position) != (one.saved, one.position)
+                 for saved, position in rivals)  # fmt: skip
+    return "no" if beaten else "yes"
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

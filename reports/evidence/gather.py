@@ -69,6 +69,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
     inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
+    inputs[effects.INPUT] = effects.summary(needed)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
         cross_checks=checks, hard_cases=hard, effects=needed, topics=topics,

@@ -7,6 +7,7 @@ from reports.figures import (
     anytime,
     coordinate_invariance,
     cost_of_contacts,
+    effect_costs,
     energy_gains,
     engine_errors,
     fig01_contact_forces,
@@ -75,4 +76,5 @@ RECIPES: tuple[Recipe, ...] = (
     trajectory_precision.RECIPE,
     impact_scaling.RECIPE,
     anytime.RECIPE,
+    effect_costs.RECIPE,
 )
