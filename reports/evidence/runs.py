@@ -32,6 +32,8 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "device/PB": ("peg_corner", EMULATED_DEVICE, "PB", "full"),
     "hole/IAPB": ("peg_hole", {}, "IAPB", "full"),
     "group/IAPB": ("arm_pushing", {}, "IAPB", "full"),
+    "plane/two_link_arm": ("two_link_arm_a", {}, "IAPB", "full"),
+    "plane/cradle": ("newton_cradle", {}, "IAPB", "full"),
     "space/peg_hole": ("peg_hole_space", {}, "IAPB", "full"),
     "space/arm_obstacles": ("arm_obstacles", {}, "IAPB", "full"),
     "space/tumbling_body": ("tumbling_body", {}, "IAPB", "full"),

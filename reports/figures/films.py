@@ -36,6 +36,12 @@ FILMS = {
     "film-hole": Playback(
         "The tight hole, played back", {"IAPB": "hole/IAPB"},
         "The peg is in the hole with little air on either side; it meets both sides and the end."),
+    "film-two-link-arm": Playback(
+        "Two-link arm against an obstacle, played back", {"IAPB": "plane/two_link_arm"},
+        "The arm of Figure 2, case A: it turns into the disc at its left, and is struck once, at the start."),
+    "film-cradle": Playback(
+        "A row of touching balls, played back", {"IAPB": "plane/cradle"},
+        "One ball strikes four that stand 1 mm apart: the blow is handed on, and the last ball leaves alone."),
     "film-pushing": Playback(
         "An arm pushes what it holds, played back", {"IAPB": "group/IAPB"},
         "A linkage and loose bodies that touch one another answer an impact as one group."),

@@ -37,7 +37,7 @@ def still_times(film: Film) -> tuple[float, ...]:
 def _cell(film: Film, key: str, step: int, column: int, row: int) -> str:
     width, height = SIZE[0] / _CELLS[0], SIZE[1] / _CELLS[1]
     layers = {"walls": f'<use xlink:href="#{key}-walls"/>', "links": "".join(_links(film, step)),
-              "bodies": "".join(_bodies(film, step)), "marks": ""}  # fmt: skip
+              "bodies": "".join(bodies_markup(film, step)), "marks": ""}  # fmt: skip
     looks = _looks(is_spatial(film.run.scene_resolved))
     groups = "".join(f'<g data-layer="{name}" {looks[name]}>{inside}</g>' for name, inside in layers.items())
     text = f'font-size="22" font-family="var(--sans, sans-serif)" {_paint("fill", INK)}'
@@ -68,8 +68,8 @@ def _ring(points: Floats) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + "z"
 
 
-def _bodies(film: Film, step: int) -> Iterator[str]:
-    """Yield faces and discs, the farthest first."""
+def bodies_markup(film: Film, step: int) -> Iterator[str]:
+    """Yield the faces and discs of the bodies at a step as SVG, the farthest first."""
     places = frames(film.run.scene_resolved, film.parts.seen, film.run.q[step])
     drawn: list[tuple[float, str]] = []
     for ring in film.parts.rings:

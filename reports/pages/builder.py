@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -35,7 +35,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
         figures.setdefault(section, []).append(figure)
     page, text = _environment().get_template("page.html.j2"), script()
     return page.render(
-        script=text, policy=policy(text),
+        script=text, policy=policy(text), played=played(figures),
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
         subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
     )
@@ -52,6 +52,12 @@ def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
     """Return how many records have each outcome, those that occur only."""
     counts = {outcome: sum(record.outcome == outcome for record in claims) for outcome in OUTCOMES}
     return {outcome: count for outcome, count in counts.items() if count}
+
+
+def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
+    """Return the figure that plays a run, by the run's name among the inputs."""
+    drawn = [figure for group in figures.values() for figure in group if isinstance(figure, Figure)]
+    return {name: figure.key for figure in drawn if figure.panels[0].film for name in figure.inputs}
 
 
 def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Numbers], ...]:

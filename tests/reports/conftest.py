@@ -46,7 +46,7 @@ def _impacts(rng: np.random.Generator, count: int, d: int) -> ImpactTable:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_run() -> Callable[..., Run]:
     """Return a maker of runs: ``make_run(steps=20, contacts=7, impacts=3, seed=0, **fields)``."""
 

@@ -1,0 +1,146 @@
+"""The report of made-up records in a headless browser that is cut off from everything but the page.
+
+Without a browser the tests are skipped, and say so.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb import find_scene, load_scene
+from iapb.run import Run
+from reports.figures import RECIPES
+from reports.figures.fig03_energy_loss import arm_energies
+from reports.figures.figure import Numbers
+from reports.pages.records import LIMITED, REPRODUCED, Claim, CrossCheck, Evidence, Finding, Topic, Verdict
+from reports.report import build_report
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+DESK, PHONE = (1400, 900), (400, 800)
+STEPS = 128
+FIGURES = ("fig07", "fig08", "film-corner", "film-obstacles", "fig03")
+SPATIAL = {"space/arm_obstacles": "arm_obstacles"}  # the runs that are not of the peg in the corner
+
+
+@dataclass
+class Sight:
+    """A page in a browser, and what it did that it should not: `errors` of its console, `requests` beside its own."""
+
+    page: Any
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def ask(self, script: str, argument: Any = None) -> Any:
+        """Return what a script says inside the page."""
+        return self.page.evaluate(script, argument)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Start a browser, or skip the test and say why."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"no browser is installed (looked for {', '.join(NAMES)})")
+    with playwright.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=found, args=list(ARGUMENTS))
+        yield started
+        started.close()
+
+
+@contextmanager
+def opened(started: Any, path: Path, size: tuple[int, int] = DESK, **context: Any) -> Iterator[Sight]:
+    """Open a page; any request of it is refused and remembered."""
+    own = path.resolve().as_uri()
+    room = started.new_context(viewport={"width": size[0], "height": size[1]}, offline=True, **context)
+    sight = Sight(room.new_page())
+
+    def judge(route: Any) -> None:
+        if route.request.url.split("#")[0] == own or route.request.url.startswith("data:"):
+            route.continue_()
+        else:
+            sight.requests.append(route.request.url)
+            route.abort()
+
+    room.route("**/*", judge)
+    sight.page.on("console", lambda said: said.type in ("error", "warning") and sight.errors.append(said.text))
+    sight.page.on("pageerror", lambda error: sight.errors.append(str(error)))
+    sight.page.goto(own)
+    yield sight
+    room.close()
+
+
+def _run(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
+    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
+    resolved = load_scene(find_scene(scene)).resolved()
+    start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
+    time = np.arange(STEPS + 1) / 512
+    swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
+    run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, scene_name=scene,
+                   scene_resolved=resolved)
+    return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
+
+
+@pytest.fixture(scope="session")
+def evidence(make_run: Callable[..., Run]) -> Evidence:
+    """Made-up records: a little of each kind, wide tables and long words among them."""
+    recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
+    names = sorted({name for recipe in recipes for name in recipe.needs if "/" in name})
+    runs = {name: _run(make_run, SPATIAL.get(name, "peg_corner"), k) for k, name in enumerate(names)}
+    table = Numbers(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
+    return Evidence(
+        inputs={**runs, "arm_energies": arm_energies()},
+        verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),
+        claims=(Claim("C01", "energy never rises", "Theorem 1", LIMITED, "half: $\\frac{1}{2}$", numbers=table),),
+        cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
+        topics=(Topic("scene-ledger", "The scenes", "Asked.", (Finding("It holds.", REPRODUCED),), {"wide": table}),),
+        provenance={"commit": "0123456789abcdef" * 4},
+    )
+
+
+@pytest.fixture(scope="session")
+def path(evidence: Evidence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of made-up records, with a few figures of each kind."""
+    recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
+    target = tmp_path_factory.mktemp("page") / "report.html"
+    target.write_text(build_report(evidence, recipes), encoding="utf-8")
+    return target
+
+
+@pytest.fixture(scope="module")
+def started() -> Iterator[Any]:
+    """A browser for the tests of one file; its loop would be in the way of other files' tests."""
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module", params=[DESK, PHONE], ids=["desk", "phone"])
+def sight(request: pytest.FixtureRequest, started: Any, path: Path) -> Iterator[Sight]:
+    """The page at both widths, to look at only."""
+    with opened(started, path, request.param) as seen:
+        yield seen
+
+
+@pytest.fixture
+def desk(started: Any, path: Path) -> Iterator[Sight]:
+    """A page of one's own, to change."""
+    with opened(started, path) as seen:
+        yield seen
+
+
+@pytest.fixture
+def see(started: Any, path: Path) -> Callable[..., Any]:
+    """Return ``see(size=DESK, path=path, **context)``: a context manager that opens the page."""
+    return lambda size=DESK, path=path, **context: opened(started, path, size, **context)

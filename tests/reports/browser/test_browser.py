@@ -1,0 +1,147 @@
+"""The report as a reader meets it: wide and narrow, light and dark, by keyboard, on paper, without script."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PHONE = (400, 800)
+LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
+REAL = Path(__file__).parents[3] / "out" / "report.html"
+
+# What a page must be at any width; each returns what is wrong.
+DEAD_ANCHORS = """() => [...document.querySelectorAll("a[href^='#']")].map((a) => a.getAttribute("href").slice(1))
+    .filter((id) => !document.getElementById(id))"""
+OUT_OF_SIGHT = """() => [...document.querySelectorAll("main figure svg")]
+    .filter((svg) => !svg.closest("details:not([open])") && !svg.parentElement.closest("svg"))
+    .map((svg) => [svg.getAttribute("aria-label") || svg.className.baseVal, svg.getBoundingClientRect()])
+    .filter(([, box]) => box.width < 5 || box.height < 5 || box.left < -1 || box.right > innerWidth + 1)
+    .map(([name]) => name)"""
+OVERFLOW = """() => document.documentElement.scrollWidth - innerWidth"""
+CLIPPED = """() => [...document.querySelectorAll("main p, main h2, main h3, main li, main dd, button, summary")]
+    .filter((part) => part.checkVisibility() && !part.closest(".scroll, .display, .steps, .plain"))
+    .filter((part) => part.getBoundingClientRect().right > innerWidth + 1)
+    .map((part) => part.textContent.slice(0, 60))"""
+# Contrast of every text with the colour below it, WCAG's formula.
+PALE = """(least) => {
+    const canvas = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+    const rgba = (color) => {
+        canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = color; canvas.fillRect(0, 0, 1, 1);
+        return [...canvas.getImageData(0, 0, 1, 1).data];
+    };
+    const linear = (v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const light = (color) => color.slice(0, 3).map((v) => linear(v / 255))
+        .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+    const below = (part) => {
+        for (let place = part; place; place = place.parentElement) {
+            const color = rgba(getComputedStyle(place).backgroundColor);
+            if (color[3] === 255) return color;
+        }
+        return [255, 255, 255, 255];
+    };
+    const found = {};
+    for (const part of document.querySelectorAll("body *")) {
+        const own = [...part.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+        if (!own || !part.checkVisibility() || part.closest("script, .skip, [data-layer]")) continue;
+        const style = getComputedStyle(part);
+        const [a, b] = [light(rgba(part.closest("svg") ? style.fill : style.color)), light(below(part))];
+        const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        const name = `${part.tagName}.${part.className.baseVal ?? part.className}`;
+        if (contrast < least) found[name] = contrast.toFixed(2);
+    }
+    return found;
+}"""
+FOCUSED = "(names) => names.filter((name) => document.activeElement.matches(name))"
+
+
+def check_page(sight: Any) -> None:
+    assert sight.errors == []
+    assert sight.requests == []
+    assert sight.ask(DEAD_ANCHORS) == []
+    assert sight.ask(OUT_OF_SIGHT) == []
+    assert sight.ask(CLIPPED) == []
+    assert sight.ask(OVERFLOW) <= 0
+
+
+def test_the_page_is_whole_at_any_width(sight: Any) -> None:
+    check_page(sight)
+    assert sight.ask("() => document.querySelectorAll('main figure').length") == 5
+
+
+def test_the_checks_see_a_page_that_is_not_whole(desk: Any) -> None:
+    desk.ask("""() => {
+        document.querySelector("nav a").setAttribute("href", "#nowhere");
+        document.querySelector("main figure svg:not(.swatch)").style.height = "0";
+        const wide = { textContent: "wide", style: "width: 3000px" };
+        document.querySelector("main").append(Object.assign(document.createElement("p"), wide));
+        document.querySelector("h2").style.color = "#888";
+        document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
+    }""")
+    desk.page.wait_for_timeout(100)
+    assert desk.ask(DEAD_ANCHORS) == ["nowhere"]
+    assert len(desk.ask(OUT_OF_SIGHT)) == 1
+    assert desk.ask(OVERFLOW) > 1000
+    assert desk.ask(CLIPPED) == ["wide"]
+    assert "H2." in desk.ask(PALE, LEAST_CONTRAST)
+    assert desk.errors != []  # the page's own policy refused the picture, before any request
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_text_can_be_read(see: Callable[..., Any], scheme: str) -> None:
+    with see(color_scheme=scheme) as sight:
+        sight.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        assert sight.ask(PALE, LEAST_CONTRAST) == {}
+
+
+def test_without_script_the_content_is_there(see: Callable[..., Any]) -> None:
+    with see(PHONE, java_script_enabled=False) as sight:
+        page = sight.page
+        assert page.locator("figure").count() == 5
+        assert page.locator("#film-corner .cell").count() == 4 * 4
+        assert page.locator("#fig07 [data-curve] path").count() > 0
+        assert page.locator("button:visible, input:visible").count() == 0
+        box = page.locator("#film-obstacles .panel > svg").bounding_box()
+        assert box["width"] > 100 and box["height"] > 75
+        assert sight.errors == []
+
+
+def test_the_keyboard_reaches_everything(desk: Any) -> None:
+    page = desk.page
+    page.keyboard.press("Tab")
+    assert desk.ask("() => document.activeElement.className") == "skip"
+    assert page.locator(".skip").bounding_box()["x"] >= 0
+    page.keyboard.press("Enter")
+    assert page.url.endswith("#content")
+    wanted = {"#fig07 .legend button", "#fig07 svg[data-trace]", ".controls button", ".controls input",
+              ".controls select", "summary", ".scroll"}
+    reached: set[str] = set()
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        reached |= set(desk.ask(FOCUSED, list(wanted)))
+        if reached == wanted:
+            break
+    assert reached == wanted
+
+
+def test_a_link_into_something_folded_unfolds_it(desk: Any) -> None:
+    desk.ask("() => { location.hash = '#C01'; }")
+    desk.page.wait_for_function("() => document.getElementById('C01').open")
+
+
+def test_print_shows_the_content_and_no_controls(desk: Any) -> None:
+    desk.page.emulate_media(media="print")
+    desk.ask("() => window.dispatchEvent(new Event('beforeprint'))")
+    assert desk.page.locator("#C01 .claim-body").is_visible()
+    assert desk.page.locator("#fig07 .numbers table").is_visible()
+    assert desk.page.locator(".controls:visible, .tools:visible, nav:visible").count() == 0
+    assert len(desk.page.pdf()) > 10_000
+
+
+@pytest.mark.skipif(not REAL.is_file(), reason="no out/report.html here; `make reproduce` makes one")
+@pytest.mark.parametrize("width", [1400, 400])
+def test_the_report_that_is_here(see: Callable[..., Any], width: int) -> None:
+    with see((width, 900), REAL) as sight:
+        check_page(sight)
