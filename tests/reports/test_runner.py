@@ -122,3 +122,28 @@ def test_a_run_that_gave_up_is_listed_as_partial(tmp_path):
     runner(PEG, "IAPB", partial=True)
     [used] = runner.used.values()
     assert used.status == "partial" and (tmp_path / used.file).is_file()
+
+
+class _UsesOne:
+    """A claim that looks at one run."""
+
+    def __init__(self, worlds):
+        self.worlds = worlds
+
+    def check(self, study):
+        for world in self.worlds:
+            study.trace(study.starts()[0], world)
+        return self
+
+
+def test_a_run_is_listed_under_every_claim_that_uses_it_though_it_is_made_once(tmp_path, computed, monkeypatch):
+    import verification.claims as verified
+    from reports.evidence import claims
+
+    monkeypatch.setattr(verified, "CLAIMS", {"A": _UsesOne(["IAPB", "PB"]), "B": _UsesOne(["PB", "IAPB", "PB"])})
+    monkeypatch.setattr(claims, "as_record", lambda result: result)
+    runner = Runner(tmp_path)
+    with runner.recording("claims") as used:
+        claims.compute(runner, "quick", lambda done, total: None)
+    assert computed == ["IAPB", "PB"]
+    assert [run.used_by for run in used.values()] == [("A", "B"), ("A", "B")]
