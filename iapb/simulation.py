@@ -92,7 +92,8 @@ class Simulation:
         self.state = self.system.make_state()
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.world = self.system.world_under(self.law if self.compiled else Penalty())
-        self.port = self.system.make_port(self.coupling, getattr(self.law, "rendering", "full"))
+        self.port = self.system.make_port(self.coupling, getattr(self.law, "rendering", "full"),
+                                          getattr(self.law, "impulses", False))
         self.steps_done = 0
 
     @property

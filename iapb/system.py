@@ -24,6 +24,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.restitution import restitution_by_pair, restitution_by_shape
 from iapb.scene import Scene, SpatialScene
 from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.system_port import force_limit, make_port
 
 Floats = NDArray[np.float64]
 
@@ -84,9 +85,9 @@ class System:
         """A fresh state at the scene's start."""
         return make_state(self)
 
-    def make_port(self, coupling: Coupling, rendering: str = "full") -> Port:
+    def make_port(self, coupling: Coupling, rendering: str = "full", impulses: bool = True) -> Port:
         """Hand, coupling and device at the scene's start."""
-        return make_port(self, coupling, rendering)
+        return make_port(self, coupling, rendering, impulses)
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:
@@ -110,9 +111,9 @@ def make_world(system: System, law: Any) -> World:
     """Collect the parameters of the scene and the switches of its effects under a law."""
     scene, contact, mechanism = system.scene, system.scene.contact, system.mechanism
     limit = np.full(mechanism.nv, np.inf)
-    scaled = law.impulses and law.rendering in ("scale", "spread") and _force_limit(scene) is not None
+    scaled = law.impulses and law.rendering in ("scale", "spread") and force_limit(scene) is not None
     if scaled:
-        limit[slice(*system.tool_dofs)] = _force_limit(scene)
+        limit[slice(*system.tool_dofs)] = force_limit(scene)
     switches = Switches(
         gravity=bool(np.any(system.gravity)),
         varying_inertia=not mechanism.has_constant_mass_matrix,
@@ -145,10 +146,6 @@ def make_world(system: System, law: Any) -> World:
     ))  # fmt: skip
 
 
-def _force_limit(scene: Scene) -> tuple[float, ...] | None:
-    return scene.device.force_limit if scene.device is not None else None
-
-
 def slides_in_impacts(scene: Scene) -> bool:
     """Whether a law with friction in impacts has any here; rows (13)-(14) of one body alone have no slip to stop."""
     return scene.contact.friction > 0.0 and scene.contact.self_collision_rows == "relative"
@@ -177,9 +174,9 @@ def make_state(system: System) -> State:
         stage_contacts=make_contact_buffer(capacity), contact_count=np.zeros(2, np.int64),
         group_of_tree=np.arange(trees, dtype=np.int64), state_of_tree=np.zeros(trees, np.int8),
         island_of_tree=np.arange(trees, dtype=np.int64), collides_of_tree=np.zeros(trees, np.bool_),
-        spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq), contact_impulse=np.zeros(rows),
-        rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64), row_impulse=np.zeros(rows),
-        row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
+        row_budget=np.array([d], np.int64), spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq),
+        contact_impulse=np.zeros(rows), rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64),
+        row_impulse=np.zeros(rows), row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
         push_work=make_push_work(d * pushing, rows * pushing),
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents), impacts=_make_log(trees, d),
         **vectors, **squares,
@@ -195,55 +192,3 @@ def _make_log(trees: int, d: int) -> ImpactLog:
         logged=np.zeros(1, np.int64), energy_lost=np.zeros(trees), approaching=np.full(trees, -1, np.int64),
         solved=np.ones(trees, np.bool_), **counts, **numbers, **vectors,
     )  # fmt: skip
-
-
-def make_port(system: System, coupling: Coupling, rendering: str = "full") -> Port:
-    """Allocate the hand's side: the device starts where the tool does, with its velocity."""
-    scene, d = system.scene, system.mechanism.nv
-    held = system.tool_tree >= 0
-    if not held and not isinstance(coupling, NoCoupling):
-        raise ArgumentError("coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device")
-    device = system.device_mechanism() if held else system.mechanism
-    (v_start, v_stop), (q_start, q_stop) = system.tool_dofs, system.tool_coordinates
-    size, nq = v_stop - v_start, q_stop - q_start
-    state = make_state(system)
-    q, v = state.q[q_start:q_stop].copy(), state.v[v_start:v_stop].copy()
-    mass = device.mass_matrix(q) if held else np.zeros((0, 0))
-    lower = np.zeros_like(mass)
-    cholesky(mass, lower)
-    body = system._held_body() if held else -1
-    settings = scene.device
-    limit = _force_limit(scene)
-    resolution = settings.position_resolution if settings is not None else None
-    damping = settings.damping if settings is not None else None
-    slots = 1 + (settings.delay if settings is not None else 0)
-    hand = scene.hand
-    wrench = np.zeros(6)
-    point = np.zeros(3)
-    if hand is not None:
-        wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
-        point[: len(hand.point)] = hand.point
-    gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
-    for name, values in gains.items():
-        if len(values) != size:  # the kernels would read past the end
-            raise ArgumentError(f"coupling {name}", values, f"{size} values, one for each coordinate of the tool")
-    zeros = {name: np.zeros(d) for name in ("hand_force", "coupling_force", "environment_force", "applied")}
-    tool_zeros = {name: np.zeros(size) for name in (
-        "device_hand_force", "device_force", "error", "acceleration", "measured_v")}
-    return block(Port(
-        coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
-        v_stop=v_stop, hand_body=body, device_body=device.index(hand.body) if hand is not None else -1,
-        hand_point=point, wrench=wrench, stiffness=_per_coordinate(gains.get("stiffness"), size),
-        damping=_per_coordinate(gains.get("damping"), size), mechanism=device.arrays, body=device.workspace(),
-        varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
-        device_lower=lower, device_damping=_per_coordinate(damping, size), damped=any(damping or ()),
-        force_limit=_per_coordinate(limit, size, np.inf), limited=limit is not None and rendering != "full",
-        resolution=_per_coordinate(resolution, nq), quantised=any(resolution or ()),
-        delayed_force=np.zeros((slots, size)), delayed_q=np.zeros((slots, nq)), delayed_v=np.zeros((slots, size)),
-        sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_), clock=np.zeros(1, np.int64),
-        **zeros, **tool_zeros,
-    ))  # fmt: skip
-
-
-def _per_coordinate(values: Any, size: int, default: float = 0.0) -> Floats:
-    return np.full(size, default) if values is None else np.array(values, dtype=np.float64)

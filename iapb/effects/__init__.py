@@ -35,6 +35,7 @@ EFFECTS: tuple[Callable[[Question], Effect], ...] = (
     device.delay,
     device.quantisation,
     device.device_damping,
+    device.waveform,
 )
 
 

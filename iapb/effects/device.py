@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from iapb.effects.question import Effect, Question, number, numbers
+from iapb.effects.question import IMPULSES, Effect, Question, number, numbers
 
 
 def coupling(question: Question) -> Effect:
@@ -60,6 +60,18 @@ def device_damping(question: Question) -> Effect:
     return Effect(
         "device_damping", active, reason, "the device would be a pure inertia, the worst case for stability"
     )
+
+
+def waveform(question: Question) -> Effect:
+    """An impulse handed out to the device over many steps."""
+    name = question.scene.device.waveform if question.scene.device else "step"
+    absent = question.without_device() or question.unused(IMPULSES)
+    if absent is None and question.coupling == "unilateral":
+        absent = "a unilateral coupler gives the hand no impulse"
+    if absent is None and name == "step":
+        absent = "device.waveform = step: an impulse is given in one step"
+    reason = absent or f"device.waveform = {name}: an impulse is given over many steps, watched by the observer"
+    return Effect("waveform", absent is None, reason, "the hand would get each impulse as a blow of one step")
 
 
 def _listed(question: Question, field: str, values: Sequence[float] | None, unit: str) -> tuple[bool, str]:

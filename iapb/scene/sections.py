@@ -59,6 +59,9 @@ class Hand(Part):
     )
 
 
+Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"]
+
+
 class Device(Part):
     """The haptic device: kinematically the tool's equal, so its lists have one number per tool coordinate."""
 
@@ -73,6 +76,9 @@ class Device(Part):
     )
     damping: PerCoordinate | None = Field(
         None, description="physical damping per coordinate [N s/m, N m s/rad]; default: none"
+    )
+    waveform: Waveform = Field(
+        "step", description="how an impulse reaches the hand: in one step, as a brake, or ringing; default step"
     )
 
 

@@ -25,15 +25,18 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     """Maps of the sampled wall, and the peg under the same laws."""
     from verification.stability.maps import stability_maps
     from verification.stability.peg import peg_contacts
+    from verification.stability.waveforms import compare_waveforms
 
     maps = stability_maps(depth)
     pegs = peg_contacts(shipped_scene("peg_corner"),
                         lambda scene, world: runner(scene, world, keep=False, partial=True), depth, progress)
+    pulses = compare_waveforms(shipped_scene("peg_corner"), lambda scene: runner(scene, "IAPB", keep=False))
     tables = {
         "maps": _maps(maps), "dampings": Numbers(("damping [N s/m]",), tuple((float(B),) for B in maps[0].damping)),
         "hardness": _hardness(maps), "peg": _pegs(pegs),
+        "waveforms": _waveforms(pulses),
     }  # fmt: skip
-    findings = (_held(maps), _beyond(maps), _undamped(maps), _hard(maps), *_peg(pegs))
+    findings = (_held(maps), _beyond(maps), _undamped(maps), _hard(maps), *_peg(pegs), _pulses(pulses))
     return Topic("stability", "Stability of contact", LEAD, findings, tables, findings[0].sentence)
 
 
@@ -148,3 +151,22 @@ def _peg(pegs: Sequence[Any]) -> tuple[Finding, ...]:
         f"The peg in the corner comes to rest no later with impulses in {len(sooner)} of {len(decided)} trials of "
         f"device and wall where either does, and bounces no more often in {fewer} of {len(pairs)}.",
         outcome),)  # fmt: skip
+
+
+def _waveforms(pulses: Sequence[Any]) -> Numbers:
+    rows = tuple((p.waveform, p.rate_hardness, p.peak_force, p.settling_time, p.bounces, 1e3 * p.penetration, p.unpaid,
+                  1e3 * p.given, 1e3 * p.lost) for p in pulses)  # fmt: skip
+    return Numbers(
+        ("waveform", "rate-hardness [N/m]", "peak force [N]", "settles after [s]", "bounces", "penetration [mm]",
+         "momentum not given", "given to the hand [mJ]", "lost in collisions [mJ]"), rows, 3,
+        "The peg in the corner at 1 kHz, the impulse given by its device in each way. Negative energy: the pulses took "
+        "it from the hand. Momentum not given is still on its way at the end.")  # fmt: skip
+
+
+def _pulses(pulses: Sequence[Any]) -> Finding:
+    most, unpaid = max(p.given - p.lost for p in pulses), max(p.unpaid for p in pulses)
+    step, brake = (next(p for p in pulses if p.waveform == name) for name in ("step", "brake"))
+    return Finding(
+        f"Every waveform gives the hand the computed momentum (all but {unpaid:.0e}) and no more energy than the "
+        f"collisions took; a brake asks for {brake.peak_force:.3g} N at most where one step asks for "
+        f"{step.peak_force:.3g} N.", REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip

@@ -48,6 +48,7 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
     "delay": (PEG, {"device.delay": 4}, {"device.delay": 0}, "4 steps, 7.8125 ms"),
     "quantisation": (PEG, {"device.position_resolution": [1e-5, 1e-5, 0]}, {}, "[1e-05, 1e-05, 0]"),
     "device_damping": (PEG, {"device.damping": [0.5, 0.5, 0]}, {"device.damping": [0, 0, 0]}, "[0.5, 0.5, 0]"),
+    "waveform": (PEG, {"device.waveform": "brake"}, {"device.waveform": "step"}, "device.waveform = brake"),
 }  # fmt: skip
 
 

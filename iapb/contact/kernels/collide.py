@@ -101,7 +101,8 @@ def resolve_rows(world, state, size, count):
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e)
     else:
-        rank, clamp = factored_impact(mass, lower, v, e, count, rank_tolerance(lower), size, True, work,
+        budget = min(size, state.row_budget[0])
+        rank, clamp = factored_impact(mass, lower, v, e, count, rank_tolerance(lower), budget, True, work,
                                       state.group_v_plus[:size], state.group_impulse[:size])
     if world.switches.impact_friction:
         span = rank

@@ -76,6 +76,7 @@ class State(NamedTuple):
     state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
     island_of_tree: np.ndarray  # (t,) int64: first tree of those resolved with it in one impact
     collides_of_tree: np.ndarray  # (t,) bool: the first tree of an island that collides
+    row_budget: np.ndarray  # (1,) int64: at most so many rows of an impact are used, the most violated first
     spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
     penalty_force: np.ndarray  # (d,) [N, N m]
     friction_force: np.ndarray  # (d,)

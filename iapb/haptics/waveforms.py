@@ -1,0 +1,95 @@
+"""How an impulse reaches the hand: the force signals that carry its momentum over one step or many (paper I, VIII).
+
+A waveform is a list of weights w_j, j = 0 … n − 1, with Σ w_j = 1: the impulse p of a collision is given to the
+device as the forces w_j p/T in the n steps after it. So each carries exactly the computed momentum, whatever its shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import ArgumentError
+
+Floats = NDArray[np.float64]
+
+
+class Material(NamedTuple):
+    """A decaying sinusoid A e^(−Bt) sin(2πft) per speed of impact.
+
+    attack A [1/s], decay B [1/s], frequency f [Hz]: measured by tapping on real materials (Okamura, Dennerlein and
+    Howe, Vibration feedback models for virtual environments, ICRA 1998).
+    """
+
+    attack: float
+    decay: float
+    frequency: float
+
+
+MATERIALS = {
+    "rubber": Material(116.7, 60.0, 18.0),
+    "wood": Material(150.0, 80.0, 100.0),
+    "aluminium": Material(300.0, 90.0, 300.0),
+}
+
+PULSE_SECONDS = 0.008  # of the braking pulse: about the fastest that a hand feels as one blow
+_FADED = 1e-3  # a sinusoid ends where its envelope has fallen to this share
+
+
+def step_weights(dt: float) -> Floats:
+    """All in one step: the paper's own rendering."""
+    return np.ones(1)
+
+
+def brake_weights(dt: float) -> Floats:
+    """A braking pulse: half a sine over PULSE_SECONDS, as a damper that is very hard and soon gone."""
+    count = max(1, round(PULSE_SECONDS / dt))
+    return _summing_to_one(np.sin(np.pi * (np.arange(count) + 0.5) / count))
+
+
+def ring_weights(material: str) -> Callable[[float], Floats]:
+    """The momentum in one step, and the material's decaying sinusoid, freed of its mean, behind it.
+
+    The sinusoid's acceleration A e^(−Bt) sin(2πft) v is given to the mass that the impulse (1 + e) m v stopped; as a
+    share of the impulse each step gets T A e^(−Bt) sin(2πft), for a plastic impact.
+    """
+    attack, decay, frequency = MATERIALS[material]
+
+    def weights(dt: float) -> Floats:
+        time = dt * np.arange(1, max(2, round(-np.log(_FADED) / decay / dt)))
+        if 2.0 * frequency * dt > 1.0:
+            raise ArgumentError("waveform", f"ring-{material}", f"a material below half the rate: {frequency:g} Hz "
+                                                               f"cannot be rendered at {1.0 / dt:g} Hz")
+        envelope = np.exp(-decay * time)
+        ringing = envelope * np.sin(2.0 * np.pi * frequency * time)
+        ringing -= envelope * (ringing.sum() / envelope.sum())  # no momentum of its own
+        return _summing_to_one(np.concatenate([[1.0], attack * dt * ringing]))
+
+    return weights
+
+
+WAVEFORMS: dict[str, Callable[[float], Floats]] = {
+    "step": step_weights,
+    "brake": brake_weights,
+    **{f"ring-{material}": ring_weights(material) for material in MATERIALS},
+}
+
+
+def waveform_weights(name: str, dt: float) -> Floats:
+    """The weights (n,) of a waveform for steps of dt [s]; their sum is 1 to rounding.
+
+    Raises
+    ------
+    ArgumentError
+        An unknown waveform, or one that this rate cannot render.
+    """
+    if name not in WAVEFORMS:
+        raise ArgumentError("waveform", name, "one of " + ", ".join(WAVEFORMS))
+    return WAVEFORMS[name](dt)
+
+
+def _summing_to_one(weights: Floats) -> Floats:
+    return weights / weights.sum()
