@@ -1,28 +1,73 @@
-"""`iapb bench`: error and energy gain against time for the impact methods."""
+"""`iapb bench`: what accuracy costs in time, and every ratio that was asked for, all within one run."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Annotated
 
-def bench() -> None:
-    """Time the impact methods and the cvxpy QP against their error, warm and interleaved."""
+import typer
+
+from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED
+
+if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+
+    from reports.figures.figure import Numbers
+
+LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
+_WORDS = {REPRODUCED: "as asked for", LIMITED: "not as asked for", NOT_COMPUTED: "not measured"}
+
+
+def bench(
+    full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compiling: minutes.")] = False,
+    tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
+) -> None:
+    """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
+    from rich.console import Console
 
     from reports.commands.progress import stage_progress
-    from reports.evidence.accuracy import compute
-    from reports.figures.numbers import format_cell
-    from verification.accuracy_time import kernel_times
+    from reports.evidence import accuracy
+    from reports.evidence.haptic_rate import topic_of
+    from verification.accuracy_time.study import haptic_study
 
     with stage_progress() as progress:
-        numbers = compute(lambda done, total: progress("methods on problems", done, total))
-    table = Table(title="What a microsecond buys", caption=numbers.note)
+        topic = topic_of(haptic_study("full" if full else "quick", progress))
+        methods = accuracy.compute(lambda done, total: progress("methods on problems", done, total))
+    console = Console(width=max(140, Console().width))
+    for name, numbers in topic.tables.items():
+        if tables or name not in LONG:
+            _print(console, name.capitalize(), numbers)
+    if tables:
+        _print(console, "What a microsecond buys", methods)
+    for finding in topic.findings:
+        console.print(f"• {_WORDS[finding.outcome]}: {finding.sentence}", highlight=False, markup=False)
+    console.print(_methods(methods), highlight=False, markup=False)
+    if not tables:
+        console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
+
+
+def _print(console: Console, title: str, numbers: Numbers) -> None:
+    from rich.table import Table
+
+    from reports.figures.numbers import format_cell
+
+    table = Table(title=title, caption=numbers.note)
     for heading in numbers.columns:
         table.add_column(heading, overflow="fold")
     for row in numbers.rows:
-        table.add_row(*(format_cell(value, 3) for value in row))
-    console = Console(width=max(140, Console().width))
+        table.add_row(*(format_cell(value, numbers.digits) for value in row))
     console.print(table)
-    print("Kernels alone, factored against the printed formula:")
-    for found in kernel_times():
-        print(f"  d = {found.coordinates}, c = {found.contacts}: {found.factored.median * 1e6:.2f} µs against "
-              f"{found.printed.median * 1e6:.1f} µs, a factor of {found.ratio:.0f}")
+
+
+def _methods(numbers: Numbers) -> str:
+    """One line per method: worst error, worst residual and median time over the problems, failures counted."""
+    import statistics
+
+    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    lines = ["Impact methods over all problems: worst relative error, median time, failures"]
+    for method in dict.fromkeys(row["method"] for row in rows):
+        here = [row for row in rows if row["method"] == method]
+        done = [row for row in here if row["outcome"] == "ok"]
+        worst = max(row["relative error"] for row in done)
+        median = statistics.median(row["time [µs]"] for row in done)
+        lines.append(f"  {method:<18} {worst:8.1e}  {median:9.1f} µs  {len(here) - len(done)} of {len(here)} failed")
+    return "\n".join(lines)

@@ -56,7 +56,7 @@ def _races(study: Any) -> Iterator[Finding]:
             f"{race.ratio.upper:.2g})" for race in forms
         ]  # fmt: skip
         met = all(race.ratio.median <= race.target for race in forms)
-        missed = "" if met else f" Not met: {_largest_parts(study, scene)}."
+        missed = "" if met else f" Where the time goes: {_largest_parts(study, scene)}."
         yield Finding(
             f"{scene.capitalize()}, at rest: a recorded step of ours, with {forms[0].contacts:.0f} contacts, takes "
             f"{forms[0].ours.median * 1e6:.2f} µs, {'; '.join(texts)}. Asked for: at most {forms[0].target:g}.{missed}",
@@ -64,12 +64,12 @@ def _races(study: Any) -> Iterator[Finding]:
 
 
 def _largest_parts(study: Any, scene: str) -> str:
-    """Where a step's time goes, the three largest parts."""
+    """Where a step's time goes, and what the ratio would be without its largest part."""
     parts = {part.part: part.seconds.median for part in study.parts if part.scene == scene}
     whole = parts.pop("whole step")
     largest = sorted(parts.items(), key=lambda item: -item[1])[:3]
-    return "of the step " + ", ".join(f"{name} take {100 * t / whole:.0f} %" for name, t in largest) + \
-        ", no part alone is what is missing"  # fmt: skip
+    return (f"{', '.join(f'{name} {100 * t / whole:.0f} %' for name, t in largest)} of the step; without the first of "
+            f"these it would take {100 * (1 - largest[0][1] / whole):.0f} % of its time")  # fmt: skip
 
 
 def _printed(study: Any) -> Iterator[Finding]:
@@ -99,11 +99,23 @@ def _solvers(study: Any) -> Iterator[Finding]:
                   (solver, family)]  # fmt: skip
             parts.append(f"{solver} on the {family} at {_listed(at)} contacts")
         unsaid = len(pairs) - len(decided)
+        checks = _checks(study.solvers) if called == "from Python" else ""
         yield Finding(
             f"From M, J, v to v⁺ to the same accuracy, {called} on both sides: IAPB is faster in "
             f"{len(decided) - len(slower)} of {len(decided)} pairings of solver and size that differ clearly "
-            f"({unsaid} do not){'; slower than ' + ', '.join(parts) if parts else ''}.", _outcome(not slower)
+            f"({unsaid} do not){'; slower than ' + ', '.join(parts) if parts else ''}.{checks}", _outcome(not slower)
         )  # fmt: skip
+
+
+def _checks(rows: Any) -> str:
+    """What of a call from Python is the impact itself."""
+    from verification.comparison.step_cost import IAPB, KERNEL
+
+    shares = [kernel.median / whole.median for kernel in rows for whole in rows if
+              (kernel.solver, whole.solver) == (KERNEL, IAPB) and (kernel.family, kernel.contacts) ==
+              (whole.family, whole.contacts)]  # fmt: skip
+    least, most = 100 * min(shares), 100 * max(shares)
+    return f" Of a call of ours from Python the impact is {least:.0f} to {most:.0f} %, the rest checks and results."
 
 
 def _listed(contacts: list[int]) -> str:
