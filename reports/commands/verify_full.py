@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from reports.campaign import Campaign, CampaignRequest
+
+if TYPE_CHECKING:
+    from verification.properties.tally import LawCount
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
 _SHOWN = 20  # counterexamples listed; all are in their folder
@@ -33,15 +37,23 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
 
 
 def _print_counts(campaign: Campaign, batches: tuple[object, ...]) -> bool:
+    from verification.properties.campaign import OF_ONE_CALL, ONE_IN
+
     kept = True
     for part, laws in campaign.counts(batches).items():  # type: ignore[arg-type]
         print(f"{part}:")
         for count in laws.values():
-            mark = "BROKEN" if count.failures else "kept  "
-            worst = f"worst {count.worst.value:.2e} of {count.worst.tolerance:.2e}" if count.worst else "-"
-            print(f"  {mark} {count.law}: {count.failures} of {count.checked:,}, {worst}")
+            print(f"  {'BROKEN' if count.failures else 'kept  '} {count_in_words(count)}")
             kept = kept and not count.failures
+    print(f"Of the laws of impacts, {', '.join(OF_ONE_CALL)} are put to every one; each other to one in {ONE_IN}.")
     return kept
+
+
+def count_in_words(count: LawCount) -> str:
+    """Return how many broke a law, of how many, and the worst as a share of its tolerance."""
+    worst = count.worst
+    nearest = "" if worst is None else f", worst {worst.value:.2e} of {worst.tolerance:.2e} ({worst.ratio:.3f} of it)"
+    return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
 
 
 def print_recheck(path: Path) -> bool:

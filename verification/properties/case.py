@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -36,7 +37,7 @@ class LawResidual:
     @property
     def ratio(self) -> float:
         """value / tolerance; infinite where the value is unknown."""
-        if not np.isfinite(self.value):
+        if not math.isfinite(self.value):
             return np.inf
         return self.value / self.tolerance if self.tolerance > 0.0 else (np.inf if self.value > 0.0 else 0.0)
 
@@ -102,25 +103,25 @@ class ImpactCase:
         _, values, right = np.linalg.svd(self.unit_rows, full_matrices=False)
         return values, right
 
-    @property
+    @cached_property
     def is_separated(self) -> bool:
         """No singular value of the unit rows lies between rounding and motion: the rank is beyond doubt."""
         values = self._svd[0]
         return not np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE))
 
-    @property
+    @cached_property
     def row_space(self) -> Floats:
         """Orthonormal basis (rank, d) of the row space of A."""
         values, right = self._svd
         return right[values > RANK_CUT]
 
-    @property
+    @cached_property
     def smallest_motion(self) -> float:
         """Smallest singular value of the unit rows that counts as motion; 1 without rows."""
         values = self._svd[0]
         return float(np.min(values[values > RANK_CUT], initial=1.0))
 
-    @property
+    @cached_property
     def largest_noise(self) -> float:
         """Largest singular value of the unit rows that counts as rounding; 0 where there is none."""
         values = self._svd[0]
@@ -136,17 +137,58 @@ class ImpactCase:
         length = float(np.linalg.norm(self.lower.T @ (one - other)))
         return length / self.speed if self.speed > 0.0 else (0.0 if length == 0.0 else np.inf)
 
+    @cached_property
+    def _answers(self) -> dict[int, tuple[Resolver, Answer]]:
+        """What resolvers gave for this very case, by their identity; kept with them, so that it stays theirs."""
+        return {}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One call: v⁺ (d,), or why there is none, and how many of its arguments the call has changed."""
+
+    velocity: Floats | ResolverFault
+    changed: int
+
+
+def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
+    """Return what the resolver gives for the case itself; all laws of a case share the one call."""
+    known = case._answers.get(id(resolver))
+    if known is None:
+        own = (case.mass_matrix, case.contact_jacobian, case.velocity, case.given_restitution())
+        given = tuple(np.copy(argument) if isinstance(argument, np.ndarray) else argument for argument in own)
+        velocity = _velocity(resolver, given, case)
+        changed = sum(not np.array_equal(one, other) for one, other in zip(own, given, strict=True))
+        known = case._answers[id(resolver)] = resolver, Answer(velocity, changed)
+    return known[1]
+
+
+def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
+    """Return v⁺ (d,) of the case itself, from the call that all its laws share."""
+    velocity = own_answer(resolver, case).velocity
+    if isinstance(velocity, ResolverFault):
+        raise velocity
+    return velocity
+
 
 def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
-    """Return v⁺ (d,) as the resolver gives it on copies of the case's arrays, checked for shape and finiteness."""
-    given = case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy()
+    """Return v⁺ (d,) of a call of its own, on copies of the case's arrays, checked for shape and finiteness."""
+    given = case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy(), case.given_restitution()
+    velocity = _velocity(resolver, given, case)
+    if isinstance(velocity, ResolverFault):
+        raise velocity
+    return velocity
+
+
+def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> Floats | ResolverFault:
+    """Return v⁺, copied, or what is wrong with it; raise ResolverFault where the resolver raises."""
     try:
-        answer = resolver(*given, case.given_restitution())
+        answer = resolver(*given)
     except Exception as error:  # anybody's resolver: whatever it raises is the finding
         raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
     velocity = np.asarray(getattr(answer, "velocity", answer))
     if velocity.dtype.kind != "f" or velocity.shape != case.velocity.shape:
-        raise ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
+        return ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
     if not np.all(np.isfinite(velocity)):
-        raise ResolverFault("returned a velocity that is not finite")
+        return ResolverFault("returned a velocity that is not finite")
     return velocity.astype(np.float64)

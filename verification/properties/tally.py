@@ -62,9 +62,27 @@ class LawCount:
     worst: LawResidual | None
 
 
-def one_count(law: str, residual: LawResidual) -> LawCount:
-    """Count a single case."""
-    return LawCount(law, 1, int(not residual.passed), residual)
+@dataclass
+class RunningCount:
+    """The same in the making, case by case."""
+
+    checked: int = 0
+    failures: int = 0
+    worst: LawResidual | None = None
+    worst_ratio: float = -np.inf
+
+    def add(self, residual: LawResidual) -> bool:
+        """Count one case; return whether it keeps the law."""
+        ratio = residual.ratio
+        self.checked += 1
+        self.failures += not ratio <= 1.0
+        if self.worst is None or ratio > self.worst_ratio:
+            self.worst, self.worst_ratio = residual, ratio
+        return ratio <= 1.0
+
+    def count(self, law: str) -> LawCount:
+        """What there is so far."""
+        return LawCount(law, self.checked, self.failures, self.worst)
 
 
 def added(one: LawCount, other: LawCount) -> LawCount:
@@ -76,7 +94,7 @@ def added(one: LawCount, other: LawCount) -> LawCount:
 
 def residual_count(residuals: Iterable[LawResidual]) -> LawCount:
     """Count many cases of one law."""
-    total = LawCount("", 0, 0, None)
+    total = RunningCount()
     for residual in residuals:
-        total = added(total, one_count(residual.law, residual))
-    return total
+        total.add(residual)
+    return total.count("")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 
 def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
@@ -27,4 +27,5 @@ def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     if not other.is_separated:
         return None
     tolerance = max(bounds.comparison(case), bounds.comparison(other))
-    return LawResidual("coordinates", case.distance(outcome(resolver, case), T @ outcome(resolver, other)), tolerance)
+    distance = case.distance(own_outcome(resolver, case), T @ outcome(resolver, other))
+    return LawResidual("coordinates", distance, tolerance)

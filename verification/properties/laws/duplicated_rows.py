@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 
 def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
@@ -18,5 +18,5 @@ def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds:
     doubled = replace(case, contact_jacobian=np.vstack([case.contact_jacobian, copies, copies[:1]]))
     if not doubled.is_separated:
         return None
-    distance = case.distance(outcome(resolver, case), outcome(resolver, doubled))
+    distance = case.distance(own_outcome(resolver, case), outcome(resolver, doubled))
     return LawResidual("duplicated_rows", distance, bounds.comparison(case))

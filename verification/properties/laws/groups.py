@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import Floats, ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import Floats, ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 
 def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
@@ -22,7 +22,7 @@ def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds)
         velocity=np.concatenate([case.velocity, -2.0 * case.velocity]),
         translations=None,
     )
-    both, alone = outcome(resolver, together), outcome(resolver, case)
+    both, alone = outcome(resolver, together), own_outcome(resolver, case)
     mirrored = outcome(
         resolver, replace(case, contact_jacobian=-case.contact_jacobian[::-1].copy(), velocity=-2.0 * case.velocity)
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 
 def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
@@ -18,4 +18,5 @@ def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bound
     chosen = qr(case.unit_rows.T, mode="r", pivoting=True)[1][:rank]
     reduced = replace(case, contact_jacobian=case.contact_jacobian[sorted(chosen)])
     tolerance = max(bounds.comparison(case), bounds.comparison(reduced))
-    return LawResidual("redundancy", case.distance(outcome(resolver, case), outcome(resolver, reduced)), tolerance)
+    distance = case.distance(own_outcome(resolver, case), outcome(resolver, reduced))
+    return LawResidual("redundancy", distance, tolerance)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import Floats, ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import Floats, ImpactCase, LawResidual, Resolver, own_outcome
 
 
 def restitution_residual(case: ImpactCase, v_plus: Floats) -> float:
@@ -18,4 +18,4 @@ def restitution_residual(case: ImpactCase, v_plus: Floats) -> float:
 
 def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
     """Largest relative residual of Newton's law."""
-    return LawResidual("restitution", restitution_residual(case, outcome(resolver, case)), bounds.restitution)
+    return LawResidual("restitution", restitution_residual(case, own_outcome(resolver, case)), bounds.restitution)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 _POWERS = np.array([0, 7, -5, 12, -11, 3])
 _FACTORS = np.array([3.0, 0.1, 7e2, 1.0, 1.3e-3])
@@ -17,7 +17,7 @@ def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     """Distance of the outcomes; infinite where a power of two changed a bit and that was promised."""
     if not case.is_separated or case.contacts == 0:
         return None
-    plain = outcome(resolver, case)
+    plain = own_outcome(resolver, case)
     powers = np.ldexp(1.0, np.resize(_POWERS, case.contacts))
     by_powers = outcome(resolver, _scaled(case, powers))
     by_factors = outcome(resolver, _scaled(case, np.resize(_FACTORS, case.contacts)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.properties.bounds import Bounds
-from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome
+from verification.properties.case import ImpactCase, LawResidual, Resolver, outcome, own_outcome
 
 _FACTORS = np.array([1.0, 30.0, 0.02, 5.0, 0.7])  # mild: the laws' bounds grow with κ(S M S)
 
@@ -25,4 +25,5 @@ def units_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
         translations=None,
     )
     tolerance = max(bounds.comparison(case), bounds.comparison(other))
-    return LawResidual("units", case.distance(outcome(resolver, case), s * outcome(resolver, other)), tolerance)
+    distance = case.distance(own_outcome(resolver, case), s * outcome(resolver, other))
+    return LawResidual("units", distance, tolerance)
