@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ def _texts(file: Any, path: Path | str) -> dict[str, Any]:
 
 
 def _head(file: Any) -> dict[str, Any]:
-    ranges = {name: tuple(int(end) for end in file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
+    ranges = {name: tuple(index(end) for end in file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
     return {
         "dt": float(file.attrs["dt"]),
         "complete": file.attrs["status"] == "complete",
