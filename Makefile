@@ -40,8 +40,8 @@ $(PROJECT_STAMP): $(LOCK_STAMP)
 test: lint types imports pytest ## everything that must pass: ruff, mypy, import contracts, pytest
 
 .PHONY: reproduce
-reproduce: setup ## regenerate every figure, table and claim into out/report.html
-	@$(BIN)/iapb reproduce
+reproduce: setup ## regenerate every figure, table and claim into out/report.html; FULL=1 for the deep version
+	@$(BIN)/iapb reproduce $(if $(FULL),--full)
 
 .PHONY: verify
 verify: setup ## every law at 1,000,000 impacts and 5,000 trajectories; hours, and can be stopped and gone on with
