@@ -10,7 +10,7 @@ from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, TIMING
 SHOWN = 20  # rows of the table; the rest is counted
 _WIDEST = 34  # letters of a cell
 # What must be equal for runs to come out the same to the last bit.
-_BITWISE = ("cpu", "blas", "lock", "commit", "numpy", "numba")
+_BITWISE = ("cpu", "blas", "lock", "sources")
 
 
 def sentences(found: Difference, tolerance: float) -> Iterator[str]:
@@ -53,6 +53,4 @@ def _short(text: Any) -> str:
 
 def unlike(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
     """Return why two reports need not agree to the last bit: the facts of their provenance that differ."""
-    facts = [name for name in _BITWISE if old.get(name) != new.get(name)]
-    dirty = [] if "true" not in (old.get("dirty"), new.get("dirty")) else ["uncommitted changes"]
-    return (*facts, *dirty)
+    return tuple(name for name in _BITWISE if old.get(name) != new.get(name))

@@ -19,7 +19,7 @@ from reports.evidence import (
 )
 from reports.evidence.depends import depends_of
 from reports.evidence.manifest import manifest
-from reports.evidence.stage import Stage
+from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic
 from reports.evidence.verdicts import verdicts
 from reports.figures.figure import Numbers
@@ -84,11 +84,11 @@ def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
 
 
 def provenance() -> dict[str, str]:
-    """Where the report comes from: the facts of every result, all seeds, and the packages it was compared with."""
+    """Where the report comes from: the facts of every result, all seeds, the sources, and what is compared with."""
     from importlib import import_module
 
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
-    return collect_provenance(seeds=seeds, packages=PEERS)
+    return collect_provenance(seeds=seeds, packages=PEERS) | {"sources": evidence_version()}
 
 
 def _with_verdicts(evidence: Evidence) -> Evidence:

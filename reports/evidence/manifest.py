@@ -11,6 +11,7 @@ from reports.store_read import opened
 from reports.uses import UsedRun
 
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
+UNNAMED = "the report"  # uses a run that nothing in particular asked for
 TABLE_COMMAND = "iapb reproduce"
 
 
@@ -23,8 +24,8 @@ def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) ->
 def _run(run: UsedRun, out: Path) -> StoredFile:
     path = out / "runs" / run.file
     status = run.status if path.is_file() else ABSENT
-    place = f"runs/{run.file}"
-    return StoredFile(run.name, place, run.key, run.content_hash, run.command, run.size, run.used_by, status)
+    place, users = f"runs/{run.file}", run.used_by or (UNNAMED,)
+    return StoredFile(run.name, place, run.key, run.content_hash, run.command, run.size, users, status)
 
 
 def _table(stage: Stage, out: Path) -> StoredFile:

@@ -101,7 +101,7 @@ def test_sentences_count_everything():
 
 def test_what_keeps_runs_from_repeating_is_named():
     assert unlike(REPORT.provenance, REPORT.provenance) == ()
-    assert unlike({"cpu": "a", "dirty": "true"}, {"cpu": "b"}) == ("cpu", "uncommitted changes")
+    assert unlike({"cpu": "a", "sources": "x", "commit": "1"}, {"cpu": "b", "sources": "y"}) == ("cpu", "sources")
 
 
 def test_the_command_ends_with_1_only_where_results_differ(tmp_path, capsys):
