@@ -17,6 +17,9 @@ _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
 _TOLD = re.compile(r'\sid="(curve|axis|label)=([^"]*)"')  # what a gid tells the page's script, see traces.py
+_TURNED_BY_NOTHING = re.compile(r'\stransform="rotate\(-?0 [^)]*\)"')
+_COMMAND = re.compile(r"\s*([MLCQz])\s*")  # of a path's data; the letters part the numbers by themselves
+_PATH = re.compile(r'\sd="[^"]*"')
 _FONT = re.compile(r"'DejaVu Sans'[^;\"]*")
 _HEX = re.compile("|".join(VARIABLES))
 
@@ -33,7 +36,14 @@ def to_svg(drawing: Any, key: str, decimals: int = 2) -> str:
     text = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", text, flags=re.S)  # would leak into the page
     text = _TOLD.sub(r' data-\1="\2"', text)
     text = _TAG.sub(lambda tag: _NUMBER.sub(lambda number: _rounded(number.group(), decimals), tag.group()), text)
-    return _themed(_fitted(_own_identifiers(text, key))).strip()
+    return _themed(_fitted(_own_identifiers(_without_waste(text), key))).strip()
+
+
+def _without_waste(text: str) -> str:
+    """Drop what draws nothing: turns by zero, blanks in paths and between tags (a third of the bytes)."""
+    text = _TURNED_BY_NOTHING.sub("", text)
+    text = _PATH.sub(lambda path: " " + _COMMAND.sub(r"\1", path.group().strip()), text)
+    return re.sub(r">\s+<", "><", text)
 
 
 def _rounded(number: str, decimals: int) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from reports.figures.svg import to_svg
 
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
-DECIMALS = 3  # of points
+DECIMALS = 2  # of points
 TIME, PATH = "time", "path"  # a curve over time may be zoomed along t alone; a path in the plane both ways
 
 
