@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from tools.mutants.clones import REPOSITORY, Clone, git
+from tools.mutants.clones import REPOSITORY, Clone, git, prepare
 from tools.mutants.explained import explanations
 from tools.mutants.judge import Judgement, Kept, code_version, judge_all
 from tools.mutants.report import WANTED, score, sentences, unexplained, write
@@ -22,6 +22,7 @@ def main() -> int:
     if git("status", "--porcelain", "--", "iapb", "tests"):
         print("Changes that are not committed are not judged: the clones hold the last commit.")
     os.nice(asked.nice)
+    prepare()
     clones = [Clone() for _ in range(asked.workers)]
     try:
         root = clones[0].root

@@ -1,7 +1,11 @@
-"""Throw-away clones of the last commit, and pytest in them with interpreted kernels under a limit of CPU time."""
+"""Throw-away clones of the last commit, and pytest in them with interpreted kernels under a limit of CPU time.
+
+Every run of pytest is a process of its own, forked from a server that has loaded the big libraries once.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import queue
 import re
@@ -11,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +28,11 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 PASSED, FAILED, TIMED_OUT, NO_TESTS = "passed", "failed", "timed out", "no tests"
 _FIRST_FAILURE = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 _NO_TESTS_COLLECTED = 5  # exit code of pytest
+_PROCESSES = multiprocessing.get_context("forkserver")
+_LOADED_ONCE = [
+    "tools.mutants.__main__", "pytest", "hypothesis.strategies", "hypothesis.extra.numpy", "numba.extending",
+    "scipy.linalg", "scipy.spatial.transform", "pydantic", "ruamel.yaml",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -53,19 +62,51 @@ class Clone:
 
     def pytest(self, arguments: Sequence[str], seconds: int, **environment: str) -> Outcome:
         """Run pytest on some tests, at most so many seconds of CPU."""
-        command = [sys.executable, "-m", "pytest", "-q", "--tb=no", "-p", "no:cacheprovider", *arguments]
-        done = subprocess.run(
-            command, cwd=self.root, capture_output=True, text=True, check=False,
-            env={**_environment(), **environment}, preexec_fn=lambda: _limit(seconds),
-        )  # fmt: skip
-        if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        said = self.root / "said.txt"
+        options = ["-q", "--tb=no", "-p", "no:cacheprovider", *arguments]
+        process = _PROCESSES.Process(target=_run_pytest, args=(self.root, options, seconds, environment, said))
+        process.start()
+        process.join()
+        if process.exitcode in (-signal.SIGXCPU, -signal.SIGKILL):
             return Outcome(TIMED_OUT)
-        if done.returncode == 0:
+        if process.exitcode == 0:
             return Outcome(PASSED)
-        if done.returncode == _NO_TESTS_COLLECTED:
+        if process.exitcode == _NO_TESTS_COLLECTED:
             return Outcome(NO_TESTS)
-        first = _FIRST_FAILURE.search(done.stdout)
-        return Outcome(FAILED, first[1] if first else (done.stderr.strip().splitlines() or ["?"])[-1])
+        text = said.read_text(errors="replace")
+        first = _FIRST_FAILURE.search(text)
+        return Outcome(FAILED, first[1] if first else (text.strip().splitlines() or ["?"])[-1])
+
+
+def _run_pytest(
+    root: Path, options: Sequence[str], seconds: int, environment: Mapping[str, str], said: Path
+) -> None:  # fmt: skip
+    """In a process of its own, where all big libraries are loaded but the engine is not: pytest in a clone."""
+    import pytest
+
+    os.environ.update(environment)
+    os.chdir(root)
+    sys.path.insert(0, str(root))
+    output = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    code = int(pytest.main(list(options)))
+    sys.stdout.flush()
+    os._exit(code)
+
+
+def prepare() -> None:
+    """Settings of all test processes: interpreted kernels; one thread, so that CPU time is the time of the work.
+
+    Before the first test, in the main module. No byte code is written: of a file that changes twice within a second
+    it would be stale.
+    """
+    os.environ.update(
+        NUMBA_DISABLE_JIT="1", PYTHONDONTWRITEBYTECODE="1", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1",
+        IAPB_HYPOTHESIS_PROFILE="quick",
+    )  # fmt: skip
+    _PROCESSES.set_forkserver_preload(_LOADED_ONCE)
 
 
 def in_clones(
@@ -91,15 +132,3 @@ def in_clones(
         finally:
             for task in tasks:
                 task.cancel()
-
-
-def _limit(seconds: int) -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-
-
-def _environment() -> dict[str, str]:
-    """Interpreted kernels; one thread, so that CPU time is the time of the work; no stale byte code."""
-    return {
-        **os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(REPOSITORY),
-        "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "IAPB_HYPOTHESIS_PROFILE": "quick",
-    }  # fmt: skip
