@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -24,21 +25,17 @@ def step_progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextmanager
-def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show which stage is at work and how far it is: progress(stage, done, total)."""
+def stage_progress(parts: int = 1) -> Iterator[Callable[[str, int, int], None]]:
+    """Show which stage is at work and how far it is: progress(stage, done, total).
+
+    In a log: a line per stage as it begins, and one more after each of `parts` equal parts of it but the last.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    if not console.is_terminal:  # a log: a line per stage, as it begins
-        begun: set[str] = set()
-
-        def log(stage: str, done: int, total: int) -> None:
-            if stage not in begun:
-                console.print(f"{stage} ...", highlight=False)
-                begun.add(stage)
-
-        yield log
+    if not console.is_terminal:
+        yield _log_of_stages(lambda line: console.print(line, highlight=False), parts)
         return
     columns = (TextColumn("{task.description:<48}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
                TimeElapsedColumn())  # fmt: skip
@@ -51,3 +48,18 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
             bar.update(tasks[stage], completed=done, total=total)  # type: ignore[arg-type]
 
         yield progress
+
+
+def _log_of_stages(write: Callable[[str], None], parts: int) -> Callable[[str, int, int], None]:
+    """Return progress(stage, done, total) that writes a line when a stage begins or enters another part."""
+    began, part_of = time.monotonic(), dict[str, int]()
+
+    def log(stage: str, done: int, total: int) -> None:
+        part = min(parts * done // total if total else 0, parts - 1)
+        if stage not in part_of:
+            write(f"{stage} ...")
+        elif part > part_of[stage]:
+            write(f"{stage}: {done:,} of {total:,} after {(time.monotonic() - began) / 60.0:.1f} min")
+        part_of[stage] = part
+
+    return log
