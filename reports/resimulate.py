@@ -15,6 +15,7 @@ from iapb.scene import Scene
 # name of a law -> (module, class); a run of any other law says what is missing
 LAWS = {
     "impulse-augmented penalty": ("iapb.contact.laws", "ImpulseAugmented"),
+    "impulse-augmented penalty with impact friction": ("iapb.contact.laws", "ImpulseAugmented"),
     "penalty": ("iapb.contact.laws", "Penalty"),
     "rigid constraints": ("reference.time_stepping", "RigidConstraints"),
 }

@@ -107,9 +107,9 @@ def test_garbage_is_what_no_present_code_asks_for(filled: Path) -> None:
     assert garbage(filled) == ()
 
 
-@pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc"])
+@pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc", "IAPB-friction"])
 def test_a_run_comes_out_the_same_from_its_own_file(tmp_path: Path, world: str) -> None:
-    runner, scene = Runner(tmp_path), shipped_scene("peg_corner", {"duration": 0.2})
+    runner, scene = Runner(tmp_path), shipped_scene("peg_corner", {"duration": 0.2, "contact.friction": 0.2})
     runner(scene, world)
     repetition = repeat_run(next(tmp_path.glob("*.h5")))
     assert repetition.same and repetition.differs == ()
