@@ -102,8 +102,8 @@ def _plain_shape(shape: Any) -> dict[str, Any]:
 def urdf_path(text: str, folder: Path) -> Path:
     """Return the file that a relative path means; it must lie in the folder, links followed."""
     path, root = Path(text), folder.resolve()
-    inside = not path.is_absolute() and ".." not in path.parts and (root / path).resolve().is_relative_to(root)
-    if not inside:
+    leads_out = "\0" in text or path.is_absolute() or ".." in path.parts
+    if leads_out or not (root / path).resolve().is_relative_to(root):
         raise ArgumentError("urdf", text, "a relative path inside the scene's folder")
     return root / path
 

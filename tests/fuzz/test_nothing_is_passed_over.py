@@ -1,0 +1,131 @@
+"""What is misspelt is refused, never replaced by a default in silence; paths stay inside; sizes are bounded."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iapb.errors import ArgumentError, IapbError, SceneError
+from iapb.mechanics.urdf import read_urdf
+from iapb.mechanics.urdf_collision import read_collisions
+from iapb.scene import load_scene
+from iapb.scene.document import read_document
+from iapb.scene_files import scene_folder
+from reference.datasets import DatasetError, read_problem
+from reports.sweeps.files import find_study, scene_of
+from reports.sweeps.study import study_from_text
+
+SCENES = sorted(scene_folder().glob("*.yaml"))
+ROBOT = scene_folder() / "robots" / "seven_axis_arm.urdf"  # it has collision elements
+READ = ("link", "joint", "inertial", "collision", "origin", "mass", "inertia", "axis", "parent", "child", "geometry")
+
+
+def renamed(plain: Any) -> Iterator[tuple[str, Any]]:
+    """Yield (field, the document with its name misspelt) for every field, one at a time."""
+    if isinstance(plain, dict):
+        for key in plain:
+            yield key, {(f"{k}x" if k == key else k): value for k, value in plain.items()}
+            yield from ((path, {**plain, key: inner}) for path, inner in renamed(plain[key]))
+    elif isinstance(plain, list):
+        for i, item in enumerate(plain):
+            yield from ((path, [*plain[:i], inner, *plain[i + 1 :]]) for path, inner in renamed(item))
+
+
+@pytest.mark.parametrize("path", SCENES[:: max(1, len(SCENES) // 4)], ids=lambda path: path.stem)
+def test_no_field_of_a_scene_can_be_misspelt(path: Path, tmp_path: Path) -> None:
+    plain = read_document(path.read_text())[0].value
+    shutil.copytree(scene_folder() / "robots", tmp_path / "robots")
+    for field, damaged in list(renamed(plain))[::4]:
+        (tmp_path / "scene.yaml").write_text(json.dumps(damaged))
+        with pytest.raises(SceneError, match=re.escape(field)):
+            load_scene(tmp_path / "scene.yaml")
+
+
+@pytest.mark.parametrize("field", ["title", "worlds", "values", "grid", "random", "count", "seed", "from", "to"])
+def test_no_field_of_a_study_can_be_misspelt(field: str) -> None:
+    text = (scene_folder() / "sweeps/struck_discs.yaml").read_text()
+    with pytest.raises(SceneError):
+        study_from_text(re.sub(rf"\b{field}:", f"{field}x:", text, count=1))
+
+
+@pytest.mark.parametrize("tag", READ)
+def test_no_element_of_a_robot_can_be_misspelt(tag: str, tmp_path: Path) -> None:
+    """One letter lost, anywhere in the file; alike for the two readers of it."""
+    text, wrong = ROBOT.read_text(), tag[:-2] + tag[-1]
+    places = [found.start() for found in re.finditer(rf"<{tag}\b", text)]
+    for at in places:
+        damaged = text[:at] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[at:])
+        (tmp_path / "robot.urdf").write_text(damaged)
+        with pytest.raises(ArgumentError):
+            read_urdf(tmp_path / "robot.urdf")
+            read_collisions(tmp_path / "robot.urdf")
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("<link name='a'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/>"
+     "<origin xzy='1 0 0'/></inertial></link>", "xzy"),
+    ("<link name='a'><inertial/><inertial/></link>", "twice"),
+    ("<link name='a'/>" + "<x>" * 40 + "</x>" * 40, "levels"),
+])  # fmt: skip
+def test_slips_and_endless_depth_of_a_robot_are_named(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(f"<robot name='r'>{text}</robot>")
+    with pytest.raises(ArgumentError, match=said):
+        read_urdf(tmp_path / "robot.urdf")
+
+
+def test_what_others_add_to_a_robot_is_let_through(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(
+        "<robot name='r'><gazebo/><link name='a'><contact/><visual/></link><transmission name='t'/></robot>"
+    )
+    assert len(read_urdf(tmp_path / "robot.urdf")) == 1
+
+
+@pytest.mark.parametrize("path", ["../outside.urdf", "/etc/passwd", "inside/../../outside.urdf", "link.urdf", "a\\0b"])
+def test_no_robot_leads_out_of_the_scenes_folder(path: str, tmp_path: Path) -> None:
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    (tmp_path / "outside.urdf").write_bytes(ROBOT.read_bytes())
+    (folder / "link.urdf").symlink_to(tmp_path / "outside.urdf")
+    (folder / "scene.yaml").write_text(
+        f'{{name: s, dimensions: 3, rate: 100, duration: 1, bodies: [], robots: [{{name: a, urdf: "{path}"}}]}}'
+    )
+    with pytest.raises(SceneError, match="urdf"):
+        load_scene(folder / "scene.yaml")
+
+
+@pytest.mark.parametrize("scene", ["../peg.yaml", "/etc/hostname", "a/../../peg.yaml", "link.yaml"])
+def test_no_study_leads_out_of_its_folder(scene: str, tmp_path: Path) -> None:
+    folder = tmp_path / "studies"
+    folder.mkdir()
+    (tmp_path / "peg.yaml").write_bytes((scene_folder() / "peg_corner.yaml").read_bytes())
+    (folder / "link.yaml").symlink_to(tmp_path / "peg.yaml")
+    study = study_from_text(f"name: s\nscene: {scene}\n")
+    with pytest.raises(ArgumentError, match="scene"):
+        scene_of(study, folder / "study.yaml")
+
+
+def test_the_scenes_of_our_studies_are_found() -> None:
+    for name in ("corner_tilt", "struck_discs"):
+        path = find_study(name)
+        assert scene_of(study_from_text(path.read_text()), path).is_file()
+
+
+def test_a_few_packed_bytes_cannot_ask_for_any_memory(tmp_path: Path) -> None:
+    (tmp_path / "bomb.lcp.gz").write_bytes(gzip.compress(b"0 " * (40 << 20), 1))
+    with pytest.raises(DatasetError, match="MB"):
+        read_problem(tmp_path / "bomb.lcp.gz")
+
+
+def test_many_robots_are_refused_before_one_is_read(tmp_path: Path) -> None:
+    robots = [{"name": f"r{k}", "urdf": "absent.urdf"} for k in range(1000)]
+    scene = {"name": "s", "dimensions": 3, "rate": 100, "duration": 1, "bodies": [], "robots": robots}
+    (tmp_path / "s.yaml").write_text(json.dumps(scene))
+    with pytest.raises(IapbError, match="at most 100 robots"):
+        load_scene(tmp_path / "s.yaml")
