@@ -84,7 +84,7 @@ def fastest_of_theirs(races: Sequence[StepRace]) -> tuple[StepRace, ...]:
 def _race(scene: RestingScene, rounds: int, steps: int) -> list[StepRace]:
     ours = OwnLoop(scene, steps)
     theirs = {(form, solver): _Theirs(scene, form, solver, steps) for form in scene.models for solver in SOLVERS}
-    runners = [ours, *theirs.values()]
+    runners: list[OwnLoop | _Theirs] = [ours, *theirs.values()]
     for runner in runners:  # warm
         runner.sample()
     for turn in range(rounds):
