@@ -56,25 +56,30 @@ def _options(arguments: list[str] | None) -> Any:
 
 
 def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzRecord]:
-    """Yield a record per batch; a batch whose process died is cut at the case that killed it."""
-    context = get_context("fork")
+    """Yield a record per batch; where a process died, one for that case, and the rest of its batch is tried again."""
     kinds()[kind].samples()  # made once, here
-    left = numbers
-    while left:
-        batch, at = left[:_BATCH], context.Value("q", left[0])
-        receiver, sender = context.Pipe(duplex=False)
-        child = context.Process(target=_try, args=(kind, batch, seed, keep, sender, at))
-        child.start()
-        sender.close()
-        record = _received(receiver)
-        child.join()
+    batches = [numbers[at : at + _BATCH] for at in range(0, len(numbers), _BATCH)]
+    while batches:
+        batch = batches.pop(0)
+        record, last, status = _in_child(kind, batch, seed, keep)
         if record is None:
-            last = at.value
-            record = _died(kind, last, seed, keep, batch.index(last) + 1, child.exitcode)
-            left = left[batch.index(last) + 1 :]
-        else:
-            left = left[len(batch) :]
+            at = batch.index(last)
+            batches[:0] = [part for part in (batch[:at], batch[at + 1 :]) if part]
+            record = _died(kind, last, seed, keep, status)
         yield record
+
+
+def _in_child(kind: str, batch: range, seed: int, keep: Path) -> tuple[FuzzRecord | None, int, int | None]:
+    """Try a batch in a process; return its record (None: it died), the last case that it began, and how it ended."""
+    context = get_context("fork")
+    at = context.Value("q", batch[0])
+    receiver, sender = context.Pipe(duplex=False)
+    child = context.Process(target=_try, args=(kind, batch, seed, keep, sender, at))
+    child.start()
+    sender.close()
+    record = _received(receiver)
+    child.join()
+    return record, at.value, child.exitcode
 
 
 def _try(kind: str, batch: range, seed: int, keep: Path, sender: Any, at: Any) -> None:
@@ -93,12 +98,11 @@ def _received(receiver: Any) -> FuzzRecord | None:
     return found
 
 
-def _died(kind: str, number: int, seed: int, keep: Path, tried: int, status: int | None) -> FuzzRecord:
-    """The record of a batch that ended with its process: what came before the last case was in order."""
+def _died(kind: str, number: int, seed: int, keep: Path, status: int | None) -> FuzzRecord:
     name, content = case(kinds()[kind], seed, number)
     how = f"the process ended with {status}"
     broken = Broken(kind, number, seed, how, kept(keep, kind, number, name, content, how))
-    return FuzzRecord(kind, tried, 0, tried - 1, (broken,), how)
+    return FuzzRecord(kind, 1, 0, 0, (broken,), how)
 
 
 _say: Callable[[str], None] = (
