@@ -99,17 +99,20 @@ class Campaign:
         if self.request.workers == 1 or len(batches) < 2:
             yield from ((batch, outcome_of(self.request, batch)) for batch in batches)
             return
-        left = iter(batches)
-        with ProcessPoolExecutor(self.request.workers, mp_context=get_context("spawn")) as pool:
-            def begin(count: int) -> dict[Future[BatchOutcome], Batch]:
-                return {pool.submit(outcome_of, self.request, batch): batch for batch in islice(left, count)}
+        left, pool = iter(batches), ProcessPoolExecutor(self.request.workers, mp_context=get_context("spawn"))
 
+        def begin(count: int) -> dict[Future[BatchOutcome], Batch]:
+            return {pool.submit(outcome_of, self.request, batch): batch for batch in islice(left, count)}
+
+        try:
             running = begin(2 * self.request.workers)
             while running:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     yield running.pop(future), future.result()
                 running |= begin(len(finished))
+        finally:  # stopped: what waits is not begun
+            pool.shutdown(cancel_futures=True)
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
         """Counterexamples first: a batch that is there has all of its own."""

@@ -27,8 +27,13 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
     batches, campaign = plan(impacts, trajectories, PARTS if ours else (IMPACTS,)), Campaign(out, request)
     there = sum(campaign.path_of(batch).is_file() for batch in batches)
     print(f"{len(batches)} batches in {campaign.folder}, {there} of them done before.", flush=True)
-    with stage_progress(parts=20) as progress:
-        campaign.run(batches, progress)
+    try:
+        with stage_progress(parts=20) as progress:
+            campaign.run(batches, progress)
+    except KeyboardInterrupt:
+        print("Stopped; the same command goes on from here. So far:")
+        _print_counts(campaign, batches)
+        raise
     kept = _print_counts(campaign, batches)
     print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
     for path in campaign.counterexamples()[:_SHOWN]:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -141,3 +142,21 @@ def test_a_log_tells_how_far_the_work_is() -> None:
     assert lines[0] == "impacts ..." and lines[-1] == "trajectories ..." and len(lines) == 5
     told = [line.split(" after ")[0] for line in lines[1:4]]
     assert told == [f"impacts: {done} of 1,000" for done in (250, 500, 750)]
+
+
+def test_what_is_stopped_tells_what_there_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = Campaign.run
+
+    def interrupted(self: Campaign, batches: Iterable[Batch], progress: Callable[[str, int, int], None]) -> None:
+        whole(self, [Batch(IMPACTS, 0, 30)], progress)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Campaign, "run", interrupted)
+    full = ["verify", "--full", "--resolver", SOUND.resolver, "--impacts", "30", "--out", str(tmp_path)]
+    assert main(full) == 130
+    assert "kinetic_energy: 0 of 30 break it" in capsys.readouterr().out
+    monkeypatch.undo()
+    assert main(full) == 0
+    assert "1 of them done before" in capsys.readouterr().out
