@@ -36,7 +36,9 @@ _SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0
 _GROUPS_PER_TRAJECTORY = 0.2
 BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, "group_splitting": 20}
 _BATCH = 2000
-STORED_PER_LAW = 3  # counterexamples kept of each law and batch; all are counted
+# Counterexamples kept of each law and batch. All are counted, and all are kept unless a resolver breaks the law in more
+# than one case in forty: then the first say what is wrong with it, and a million files would say no more.
+STORED_PER_LAW = 100
 
 
 @dataclass(frozen=True)
