@@ -120,7 +120,8 @@ def read_values(group: Any, name: str, path: str) -> Any:
     """
     import h5py
 
-    if name not in group or not isinstance(group[name], h5py.Dataset):
+    within = isinstance(group, h5py.Group)  # "in" would read a dataset through, however long it says it is
+    if not within or name not in group or not isinstance(group[name], h5py.Dataset):
         raise RunFileError(f"{path}: {group.name}/{name} is missing")
     dataset = group[name]
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():

@@ -18,6 +18,8 @@ from reports.store_keys import content_hash
 from reports.store_layout import FORMAT, FORMAT_VERSION, GROUPS, JSON_TEXTS, TEXTS
 from reports.store_seal import check_seal
 
+_HEAD = ("title", "status", "run_key", "content_hash", "dt")
+
 
 @contextmanager
 def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
@@ -101,9 +103,19 @@ def _group(file: Any, name: str, path: Path | str) -> Any:
 
 
 def read_head(path: Path | str) -> dict[str, Any]:
-    """Return a run file's attributes: title, status, run_key, content_hash, dt. Reads no array."""
+    """Return a run file's attributes: title, status, run_key, content_hash, dt. Reads no array.
+
+    Raises
+    ------
+    RunFileError
+        If the file is absent, damaged, no run, or lacks one of them.
+    """
     with opened(path) as file:
-        return dict(file.attrs)
+        head = dict(file.attrs)
+    absent = [name for name in _HEAD if name not in head]
+    if absent:
+        raise RunFileError(f"{path}: {', '.join(absent)} missing among its attributes")
+    return head
 
 
 def _texts(file: Any, path: Path | str) -> dict[str, Any]:
@@ -114,8 +126,13 @@ def _texts(file: Any, path: Path | str) -> dict[str, Any]:
     return texts
 
 
+def _range(ends: Any) -> tuple[int, int]:
+    start, stop = ends
+    return index(start), index(stop)
+
+
 def _head(file: Any) -> dict[str, Any]:
-    ranges = {name: tuple(index(end) for end in file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
+    ranges = {name: _range(file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
     return {
         "dt": float(file.attrs["dt"]),
         "complete": file.attrs["status"] == "complete",
