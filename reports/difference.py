@@ -23,9 +23,11 @@ ROUNDING = 1e-12
 
 _TIME_UNIT = re.compile(r"\[(?:log₁₀ ?)?(?:s|ms|µs|us|ns|min|h)(?:\]| per | a |/)")
 _TIME_WORD = re.compile(r"\b(?:times?|timed|seconds|faster|slower|speed-up|real-time)\b", re.IGNORECASE)
-# Tables whose other columns are made from times as well: ratios, late calls, shares solved within a factor of the best.
-_FROM_TIMES = re.compile(r"^(?:haptic-rate/|claims/C(?:19|22)$|complementarity/(?:time per|.*profile)|inputs/work_prec|"
-                         r"figures/.*(?:profile|cost|precision|haptic|budget))")  # fmt: skip
+# Tables, and rows of the tables of outcomes, that are made from times as well: ratios, late calls, verdicts on cost.
+_FROM_TIMES = re.compile(
+    r"^(?:haptic-rate(?:/|$)|claims/C(?:19|22)$|claims/\d+: C(?:19|22)$|verdicts/\d+: The haptic rate$"
+    r"|complementarity/(?:time per|.*profile)|inputs/work_prec|figures/.*(?:profile|cost|precision|haptic|budget))"
+)
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
@@ -94,9 +96,10 @@ def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...
     return tuple(name for name in first if name not in second)
 
 
-def is_timing(table: str, column: str) -> bool:
-    """Whether a column holds times, or what was made from times."""
-    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or _FROM_TIMES.search(table))
+def is_timing(table: str, row: str, column: str) -> bool:
+    """Whether a cell holds a time, or what was made from times."""
+    made_from = _FROM_TIMES.search(table) or _FROM_TIMES.search(f"{table}/{row}")
+    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or made_from)
 
 
 def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
@@ -108,7 +111,7 @@ def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator
                 state, gap = (ONLY_OLD if column in first else ONLY_NEW), 0.0
             else:
                 state, gap = compare_values(first[column], second[column], tolerance)
-            if is_timing(table, column) and state != EXACT:
+            if is_timing(table, row, column) and state != EXACT:
                 state = TIMING
             yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
 

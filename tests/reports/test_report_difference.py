@@ -19,6 +19,7 @@ from reports.difference import (
     TIMING,
     compare_reports,
     compare_values,
+    is_timing,
 )
 from reports.difference_text import SHOWN, sentences, table, unlike
 from reports.figures.figure import Numbers
@@ -61,6 +62,20 @@ def test_a_planted_change_is_found_and_named(row, column, value, state):
     [cell] = [cell for cell in found.cells if cell.state != EXACT]
     assert (cell.state, cell.table, cell.column) == (state, "claims/C07", column)
     assert cell.row.startswith(f"{row + 1}: ")
+
+
+@pytest.mark.parametrize(
+    ("table", "row", "column", "timing"),
+    [
+        ("claims/C10", "1: a", "median [µs]", True), ("claims/C21", "1: a", "settles after [s]", True),
+        ("claims/C19", "1: a", "late calls [of 1000]", True), ("claims", "19: C19", "outcome", True),
+        ("claims", "1: C01", "outcome", False), ("claims/C10", "1: a", "approach_velocity [m/s]", False),
+        ("scene-ledger/books over time", "1: a", "impact loss [J]", False), ("haptic-rate", "2: 2", "outcome", True),
+        ("claims/C01", "1: a", "largest ratio", False), ("claims/C20", "1: a", "damping [N s/m]", False),
+    ],
+)  # fmt: skip
+def test_times_and_what_is_made_from_them_are_known(table, row, column, timing):
+    assert is_timing(table, row, column) is timing
 
 
 def test_what_is_rounding_itself_need_not_repeat():
