@@ -35,17 +35,25 @@ class Recorder:
 
     def chunk(self, total: int) -> BaseException | None:
         """Do and keep the next chunk; return what stopped it before its end."""
+        record, size = self.blank(total)
+        started = time.perf_counter()
+        done, stop = self.simulation.advance_chunk(record, size)
+        self.keep(record, done, time.perf_counter() - started)
+        return stop
+
+    def blank(self, total: int) -> tuple[Record, int]:
+        """Return an empty record for the next chunk and its number of steps; the whole run has `total`."""
         system, port = self.simulation.system, self.simulation.port
         size = chunk_steps(system.capacity, total - self.steps)
         coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
-        record = make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs))
-        started = time.perf_counter()
-        done, stop = self.simulation.advance_chunk(record, size)
-        self.seconds.append(time.perf_counter() - started)
+        return make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs)), size
+
+    def keep(self, record: Record, steps: int, seconds: float) -> None:
+        """Take a chunk of which `steps` lines are written, in `seconds` of work."""
         self.records.append(record)
-        self.sizes.append(done)
-        self.steps += done
-        return stop
+        self.sizes.append(steps)
+        self.seconds.append(seconds)
+        self.steps += steps
 
     def run(self, world: str, stopped: str) -> Run:
         """Everything recorded so far as a Run; `stopped` says why it is not complete."""

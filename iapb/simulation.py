@@ -15,16 +15,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import kernel
-from iapb.contact.kernels.step import STATUS_TEXT, advance
-from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult
+from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
-from iapb.haptics.kernels import couple, drive_device
+from iapb.haptics.device import Device
+from iapb.haptics.external import DeviceLink
 from iapb.recorder import Recorder
-from iapb.recording import Record, write_step
+from iapb.recording import Record
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, load_scene
+from iapb.stepping import FAILURES, Stepper, compiled_steps
 from iapb.system import System
 
 Floats = NDArray[np.float64]
@@ -32,9 +32,6 @@ Floats = NDArray[np.float64]
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
 INTERRUPTED = "interrupted"  # what `Run.stopped` says after Ctrl-C
-DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
-_FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
-                                              "for this coupling and delay"}
 
 
 class Checkpoint(Protocol):
@@ -50,22 +47,6 @@ class Checkpoint(Protocol):
         ...
 
 
-@kernel
-def compiled_steps(  # type: ignore[no-untyped-def]
-    world, state, port, record, first, steps
-):
-    """Do `steps` steps of an engine law; return (steps done, status)."""
-    for k in range(steps):
-        couple(world, state, port)
-        status = advance(world, state, port.applied)
-        if status:
-            return k, status
-        if not drive_device(world, state, port):
-            return k, DEVICE_NOT_FINITE
-        write_step(record, k, first + k, state, port)
-    return steps, 0
-
-
 class Simulation:
     """A scene under a contact law and a coupling, stepped one step at a time or all at once.
 
@@ -74,6 +55,7 @@ class Simulation:
     scene : Scene, or the path of a scene file.
     law : contact law; default `ImpulseAugmented()`.
     coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
+    device : one that moves by itself (`iapb.haptics.device.Device`); default: the compiled device.
 
     Examples
     --------
@@ -82,7 +64,7 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene | str | Path, law: ContactLaw | None = None,
-                 coupling: Coupling | None = None) -> None:
+                 coupling: Coupling | None = None, device: Device | None = None) -> None:
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         self.law: Any = ImpulseAugmented() if law is None else _checked_law(law)
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
@@ -93,7 +75,10 @@ class Simulation:
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.world = self.system.world_under(self.law if self.compiled else Penalty())
         self.port = self.system.make_port(self.coupling, getattr(self.law, "rendering", "full"),
-                                          getattr(self.law, "impulses", False))
+                                          getattr(self.law, "impulses", False), external=device is not None)
+        blocks = (self.world, self.state, self.port)
+        self.link = None if device is None else DeviceLink(device, *blocks)
+        self.stepper = Stepper(*blocks, self.link)
         self.steps_done = 0
 
     @property
@@ -118,14 +103,23 @@ class Simulation:
         """
         if hand_force is not None:
             self._grip(hand_force)
-        couple(self.world, self.state, self.port)
-        result: StepResult = self.law.advance(self.system, self.state, self.port.applied, self.system.dt)
-        if not self.compiled:
-            self._take(result)
-        if not drive_device(self.world, self.state, self.port):
-            raise IapbError(_FAILURES[DEVICE_NOT_FINITE])
+        self.begin_step()
+        self.end_step()
+        return copied_step(self.system, self.state)
+
+    def begin_step(self) -> None:
+        """Do the first half of a step: hand and coupling, the law, and the device is told its force."""
+        self.stepper.couple()
+        if self.compiled:
+            self.stepper.advance()
+        else:
+            self._take(self.law.advance(self.system, self.state, self.port.applied, self.system.dt))
+        self.stepper.render()
+
+    def end_step(self) -> None:
+        """Do the second half of a step: the device has moved."""
+        self.stepper.finish()
         self.steps_done += 1
-        return result._replace(q=self.state.q.copy(), v=self.state.v.copy())
 
     def _grip(self, hand_force: ArrayLike) -> None:
         force = np.asarray(hand_force, dtype=np.float64)
@@ -156,16 +150,16 @@ class Simulation:
 
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
         """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
-        if self.compiled:
+        if self.compiled and self.link is None:
             done, status = compiled_steps(self.world, self.state, self.port, record, self.steps_done, steps)
             self.steps_done += done
-            return done, IapbError(_FAILURES[status]) if status else None
+            return done, IapbError(FAILURES[status]) if status else None
         for k in range(steps):
             try:
                 self.step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
-            write_step(record, k, self.steps_done - 1, self.state, self.port)
+            self.stepper.write(record, k, self.steps_done - 1)
         return steps, None
 
 

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.compiled import block
+from iapb.compiled import Entry, block
 from iapb.contact.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import make_friction_work
+from iapb.contact.kernels.step import advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
 from iapb.errors import ArgumentError
@@ -54,6 +55,7 @@ class System:
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
         self._worlds: dict[Any, World] = {}
+        self._advances: dict[Any, Entry] = {}
 
     def _held_body(self) -> int:
         if self.scene.hand is None:
@@ -76,7 +78,7 @@ class System:
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""
-        key = (law.impulses, law.integrator, law.rendering, law.friction_in_impacts)
+        key = _key(law)
         if key not in self._worlds:
             self._worlds[key] = make_world(self, law)
         return self._worlds[key]
@@ -85,9 +87,19 @@ class System:
         """A fresh state at the scene's start."""
         return make_state(self)
 
-    def make_port(self, coupling: Coupling, rendering: str = "full", impulses: bool = True) -> Port:
-        """Hand, coupling and device at the scene's start."""
-        return make_port(self, coupling, rendering, impulses)
+    def advance_under(self, law: Any) -> Entry:
+        """The compiled step of one of the engine's laws, to be called again and again (cached)."""
+        return self._advances.setdefault(_key(law), Entry(advance))
+
+    def make_port(self, coupling: Coupling, rendering: str = "full", impulses: bool = True,
+                  external: bool = False) -> Port:
+        """Hand, coupling and device at the scene's start; `external`: the device moves by itself."""
+        return make_port(self, coupling, rendering, impulses, external)
+
+
+def _key(law: Any) -> tuple[Any, ...]:
+    """What a world depends on besides the scene."""
+    return law.impulses, law.integrator, law.rendering, law.friction_in_impacts
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:

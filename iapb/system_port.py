@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def make_port(system: System, coupling: Coupling, rendering: str = "full", impulses: bool = True) -> Port:
+def make_port(system: System, coupling: Coupling, rendering: str = "full", impulses: bool = True,
+              external: bool = False) -> Port:
     """Allocate the hand's side: the device starts where the tool does, with its velocity.
 
-    `impulses` says whether the law has impulses, which the device's waveform then shapes.
+    `impulses` says whether the law has impulses, which the device's waveform then shapes; `external` that the device
+    moves by itself: it is late and coarse by itself, so the port adds neither delay nor sensors.
     """
     scene, d = system.scene, system.mechanism.nv
     held = system.tool_tree >= 0
@@ -46,7 +48,7 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full", impul
         varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
         device_lower=lower, sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_),
         clock=np.zeros(1, np.int64), **_hand(system, device), **_gains(coupling, v_stop - v_start),
-        **_actuators(scene, rendering, (q_stop - q_start, v_stop - v_start)),
+        **_actuators(scene, rendering, (q_stop - q_start, v_stop - v_start), external),
         **_pulses(scene, system.dt, v_stop - v_start, impulses and coupling.kind == FOUR_CHANNEL),
         **zeros, **tool_zeros,
     ))  # fmt: skip
@@ -76,12 +78,12 @@ def _gains(coupling: Coupling, size: int) -> dict[str, Any]:
     return {name: _per_coordinate(gains.get(name), size) for name in ("stiffness", "damping")}
 
 
-def _actuators(scene: Scene, rendering: str, sizes: tuple[int, int]) -> dict[str, Any]:
+def _actuators(scene: Scene, rendering: str, sizes: tuple[int, int], external: bool) -> dict[str, Any]:
     """What the device adds: limits, damping, sensors, delay."""
     (nq, size), settings, limit = sizes, scene.device, force_limit(scene)
-    resolution = settings.position_resolution if settings is not None else None
+    resolution = settings.position_resolution if settings is not None and not external else None
     damping = settings.damping if settings is not None else None
-    slots = 1 + (settings.delay if settings is not None else 0)
+    slots = 1 + (settings.delay if settings is not None and not external else 0)
     return {
         "device_damping": _per_coordinate(damping, size), "damped": any(damping or ()),
         "force_limit": _per_coordinate(limit, size, np.inf), "limited": limit is not None and rendering != "full",

@@ -12,8 +12,8 @@ import typer
 from iapb.errors import IapbError
 
 # command -> module of reports.commands that holds a function of the same name
-COMMANDS = ("run", "effects", "inspect", "schema", "prove", "verify", "compare", "bench", "sweep", "store", "reproduce",
-            "report")
+COMMANDS = ("run", "live", "effects", "inspect", "schema", "prove", "verify", "compare", "bench", "sweep", "store",
+            "reproduce", "report")
 
 app = typer.Typer(
     name="iapb", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,

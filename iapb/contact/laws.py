@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
+from iapb.run import COLLIDING, FREE, RESTING
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +34,22 @@ class StepResult(NamedTuple):
     friction_force: Floats  # (d,)
     impulse: Floats  # (d,) generalized collision impulse [N s, N m s], on top of the forces
     state: int  # FREE, COLLIDING or RESTING: the tool's contact state (see iapb.run)
+
+
+def copied_step(system: Any, state: State) -> StepResult:
+    """The step that a state has just done, as copies."""
+    return StepResult(
+        q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
+        friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
+        state=_contact_state(state.state_of_tree, system.tool_tree),
+    )  # fmt: skip
+
+
+def _contact_state(states: NDArray[np.int8], tool_tree: int) -> int:
+    """`iapb.contact.kernels.step.contact_state`, from Python faster without numba's look-up of types."""
+    if tool_tree >= 0:
+        return int(states[tool_tree])
+    return next((state for state in (COLLIDING, RESTING) if state in states), FREE)
 
 
 class ContactLaw(Protocol):
@@ -69,19 +86,15 @@ class _EngineLaw:
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
         """One step by the compiled kernel, from Python (see `ContactLaw`)."""
-        from iapb.contact.kernels.step import STATUS_TEXT, advance, contact_state
+        from iapb.contact.kernels.step import STATUS_TEXT
 
         world = system.world_under(self)
         if dt != world.dt:
             raise ArgumentError("dt", dt, f"the scene's step {world.dt!r} s: the engine's laws keep a fixed step")
-        status = advance(world, state, applied_force)
+        status = system.advance_under(self)(world, state, np.ascontiguousarray(applied_force, np.float64))
         if status:
             raise IapbError(STATUS_TEXT[status])
-        return StepResult(
-            q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
-            friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
-            state=int(contact_state(state, system.tool_tree)),
-        )  # fmt: skip
+        return copied_step(system, state)
 
     @classmethod
     def runs_compiled(cls) -> bool:

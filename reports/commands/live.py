@@ -1,0 +1,104 @@
+"""`iapb live SCENE`: simulate a scene in real time, with a device, a mouse and eyes on it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from iapb.simulation import Simulation
+    from reports.live.loop import LiveRun
+    from reports.live.measure import Pace
+
+
+def live(
+    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    rate: Annotated[float, typer.Option(help="Steps per second; replaces the scene's own.")] = 1000.0,
+    seconds: Annotated[float, typer.Option(help="How long, of real time; Ctrl-C ends it before.")] = 60.0,
+    world: Annotated[str, typer.Option(help="Contact law and coupling, as in `iapb run`.")] = "IAPB",
+    rendering: Annotated[str, typer.Option(
+        help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")] = "full",
+    device: Annotated[str, typer.Option(
+        help="module:factory of a device of your own (factory(scene) -> iapb.haptics.device.Device), or: simulated. "
+             "Default: the device compiled into the loop.")] = "",
+    view: Annotated[bool, typer.Option("--view", help="Show it in a browser, with the mouse as the hand.")] = False,
+    port: Annotated[int, typer.Option(help="Of the viewer's web page, on this machine only.")] = 8080,
+    budget: Annotated[bool, typer.Option(help="Give impacts the rows that the time left allows, or all.")] = True,
+    set_: Annotated[list[str] | None, typer.Option(
+        "--set", help="Change a value, as in `iapb run`. Repeatable.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
+) -> None:
+    """Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable."""
+    from datetime import UTC, datetime
+
+    from iapb import find_scene, load_scene
+    from iapb.errors import ArgumentError
+    from iapb.simulation import INTERRUPTED
+    from reference.worlds import find_world
+    from reports.commands.run import parsed
+    from reports.live.files import write_live
+    from reports.live.measure import summary
+    from reports.live.setup import live_simulation
+
+    if not seconds * rate >= 1.0:
+        raise ArgumentError("--seconds", seconds, f"at least one step of {1.0 / rate:g} s")
+    source = load_scene(find_scene(scene))
+    source = source.with_values(parsed(set_)) if set_ else source
+    print("Getting ready (the first time, some minutes of compiling).", flush=True)
+    simulation = live_simulation(source, find_world(world, rendering), rate, device)
+    name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
+    result = _held(simulation, round(seconds * rate), world, budget, port if view else None)
+    describe(summary(result), result)
+    files = write_live(out, result, name)
+    print(f"Run: {files[0]}\nTimetable: {files[1]}")
+    if not result.run.complete:
+        print(f"Stopped: {result.run.stopped}. What was done is in the files.")
+        raise typer.Exit(130 if result.run.stopped == INTERRUPTED else 1)
+
+
+def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: int | None) -> LiveRun:
+    """Do the ticks, with a viewer where there is a port for it."""
+    from reports.live.budget import calibrated
+    from reports.live.loop import Loop
+    from reports.live.viewer import Viewer
+
+    rows = calibrated(simulation, simulation.system.dt) if budget else None
+    if port is None:
+        return Loop(simulation, ticks, budget=rows).run(world)
+    viewer = Viewer(simulation, port)
+    try:
+        print(f"See it, and drag the handle, at {viewer.start()}", flush=True)
+        return Loop(simulation, ticks, budget=rows, audience=viewer).run(world)
+    finally:
+        viewer.stop()
+
+
+def describe(pace: Pace, live: LiveRun) -> None:
+    """Say in sentences how the loop kept to the clock."""
+    print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
+    for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
+        half, ninety, hundredth, thousandth, worst = (1e6 * seconds for seconds in times)
+        print(f"{what} {half:.3g} µs in the median; {ninety:.3g} µs at 90 %, {hundredth:.3g} µs at 99 %, "
+              f"{thousandth:.3g} µs at 99.9 %, {worst:.3g} µs at worst.")
+    print(_misses(pace))
+    print(_rows(pace, live))
+
+
+def _misses(pace: Pace) -> str:
+    if not pace.missed:
+        return "No deadline was missed: simulated time is the clock's."
+    share = 100.0 * pace.missed / pace.ticks
+    return (f"{pace.missed} deadlines were missed ({share:.3g} %). No step was left out: what came after was done "
+            f"that much later, and simulated time is {1e3 * pace.behind:.3g} ms behind the clock.")
+
+
+def _rows(pace: Pace, live: LiveRun) -> str:
+    if not pace.collisions:
+        return "No collision was resolved by an impulse."
+    least = int(live.timetable.budget[live.run.impacts.step].min())
+    if not pace.rows_left_out:
+        return f"{pace.collisions} collisions, each with all the rows it needed (the least budget was {least})."
+    return (f"{pace.collisions} collisions; the time left gave them {least} rows at the least, and "
+            f"{pace.rows_left_out} rows that still approached were left to the next steps.")

@@ -1,0 +1,112 @@
+"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse. It imports no engine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.figures.canvas import is_turned
+from reports.live.picture import extent, held_point, is_planar, pieces, placements
+from reports.live.window import Window
+
+Floats = NDArray[np.float64]
+
+HOST = "127.0.0.1"
+FRAMES_PER_SECOND = 30.0
+
+_POLITENESS = 10  # niceness: the loop comes first
+_BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (205, 205, 200)
+_DISTANCE = 2.2  # of the camera, in sizes of the scene
+_HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
+
+
+def show_in_browser(name: str, coordinates: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
+    """What the viewer's process does: serve the page of memory `name` until the loop's process is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the loop's, which then ends this process
+    os.nice(_POLITENESS)
+    parent = os.getppid()
+    show(Window.opened(name, coordinates), scene, port, ready, lambda: os.getppid() == parent)
+
+
+def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection, wanted: Callable[[], bool]) -> None:
+    """Serve the scene until nobody wants it any more; send the port when a browser can come."""
+    import viser
+
+    server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
+    frames = _draw(server, scene)
+    mouse = _Mouse(server, scene)
+    ready.send(server.get_port())
+    while wanted():
+        started = time.monotonic()
+        q = window.shown()
+        if q is not None and np.all(np.isfinite(q)):
+            with server.atomic():
+                for name, (quaternion, position) in placements(scene, q).items():
+                    frames[name].wxyz, frames[name].position = quaternion, position
+                mouse.follow(q)
+        window.want(mouse.target, time.monotonic())
+        time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
+    server.stop()
+
+
+def _draw(server: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
+    """Add every shape below the frame of its body; return the frames."""
+    frames = {body["name"]: server.scene.add_frame(f"/{body['name']}", show_axes=False) for body in scene["bodies"]}
+    held = (scene.get("hand") or {}).get("body")
+    for number, piece in enumerate(pieces(scene)):
+        color = _WALL if not piece.body else _TOOL if piece.body == held else _BODY
+        server.scene.add_mesh_simple(f"/{piece.body or 'world'}/shape{number}", piece.vertices.astype(np.float32),
+                                     piece.faces.astype(np.uint32), color=color, flat_shading=True, side="double")
+    _look(server, scene)
+    return frames
+
+
+def _look(server: Any, scene: Mapping[str, Any]) -> None:
+    """Planar scenes from the front, scenes in space from aside; up is against gravity."""
+    low, high = extent(scene)
+    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    up = np.array([0.0, -1.0, 0.0] if is_turned(scene) else [0.0, 1.0, 0.0])
+    towards = np.array([0.0, 0.0, 1.0])
+    if not is_planar(scene):
+        gravity = np.asarray(scene.get("gravity") or (0.0, 0.0, -1.0), dtype=float)
+        up = -gravity / max(float(np.linalg.norm(gravity)), np.finfo(float).tiny)
+        towards = np.array([0.62, -0.72, 0.31])
+    camera = server.initial_camera
+    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE * size * towards
+    camera.near = 0.01 * size
+    server.scene.set_up_direction(up)
+
+
+class _Mouse:
+    """The handle: it stays with the tool until the mouse takes it, and then the tool is pulled after it."""
+
+    def __init__(self, server: Any, scene: Mapping[str, Any]) -> None:
+        self.target: Floats | None = None
+        self._scene, self._handle = scene, None
+        if scene.get("hand") is None:
+            return
+        low, high = extent(scene)
+        size = _HANDLE_SIZE * float(np.linalg.norm(high - low))
+        self._handle = server.scene.add_transform_controls(
+            "/hand", scale=size, disable_rotations=True, active_axes=(True, True, not is_planar(scene)),
+            depth_test=False)
+        self._handle.on_update(self._moved)
+        server.on_client_disconnect(self._gone)
+
+    def _moved(self, event: Any) -> None:
+        self.target = None if event.phase == "end" else np.array(event.target.position, dtype=float)
+
+    def _gone(self, client: Any) -> None:
+        self.target = None  # a mouse that nobody moves any more holds nothing
+
+    def follow(self, q: Floats) -> None:
+        """Put the handle where the hand holds the tool, unless the mouse has it."""
+        if self._handle is not None and self.target is None:
+            self._handle.position = held_point(self._scene, q)

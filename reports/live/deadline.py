@@ -1,0 +1,92 @@
+"""Deadlines of a loop at a fixed rate: when each tick was due, began and ended, and what a miss did.
+
+A tick that ends after the next one was due has missed its deadline. Then the next tick begins at once and all later
+ones are due that much later: simulated time never jumps and never hurries, so that no step is left out and no two are
+crammed into the time of one, which the hand would feel as a blow. It falls behind the clock instead, and this is
+recorded: `Timetable.behind`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
+
+
+class Timetable(NamedTuple):
+    """What happened at n ticks; times in seconds since the first was due."""
+
+    period: float
+    due: Floats  # (n,)
+    start: Floats  # (n,) when the tick began, never before it was due
+    end: Floats  # (n,) when its work was done
+    budget: NDArray[np.int64]  # (n,) rows that an impact of the step could use
+    wrench: Floats  # (n, 6) of the hand [N, N m]
+
+    @property
+    def work(self) -> Floats:
+        """(n,) Time that each tick's work took."""
+        return self.end - self.start
+
+    @property
+    def lateness(self) -> Floats:
+        """(n,) Time from due to begun: what the operating system and other programs cost."""
+        return self.start - self.due
+
+    @property
+    def missed(self) -> NDArray[np.bool_]:
+        """(n,) Whether the tick ended after the next one was due."""
+        return self.end > self.due + self.period
+
+    @property
+    def behind(self) -> float:
+        """Seconds by which simulated time fell behind the clock in all."""
+        late = self.end - (self.due + self.period)
+        return float(late[self.missed].sum())
+
+
+class Deadlines:
+    """The timetable in the making, written without allocating anything.
+
+    Parameters
+    ----------
+    period : float [s]
+    ticks : how many there can be.
+    first : float [s], the clock's time when the first one is due.
+    """
+
+    def __init__(self, period: float, ticks: int, first: float) -> None:
+        self.period, self.first, self.done = period, first, 0
+        self.due = first
+        self._instants = np.zeros((3, ticks))
+        self._budget = np.zeros(ticks, np.int64)
+        self._wrench = np.zeros((ticks, 6))
+
+    def left(self, now: float) -> float:
+        """Time that the tick at hand may still take [s]."""
+        return self.due + self.period - now
+
+    def note(self, budget: int, wrench: Floats) -> None:
+        """Keep what the step at hand was given: with this it can be done again."""
+        self._budget[self.done], self._wrench[self.done] = budget, wrench
+
+    def close(self, start: float, end: float) -> None:
+        """Enter a tick; the next one is due a period later or, after a miss, now."""
+        instants = self._instants
+        instants[0, self.done], instants[1, self.done], instants[2, self.done] = self.due, start, end
+        self.done += 1
+        self.due = max(self.due + self.period, end)
+
+    def timetable(self, ticks: int) -> Timetable:
+        """The first `ticks` ticks."""
+        due, start, end = self._instants[:, :ticks] - self.first
+        return Timetable(self.period, due, start, end, self._budget[:ticks].copy(), self._wrench[:ticks].copy())
+
+
+def percentiles(seconds: Floats) -> Floats:
+    """Return the times [s] at `PERCENTILES`; the last is the worst."""
+    return np.asarray(np.percentile(seconds, PERCENTILES), np.float64)

@@ -1,0 +1,180 @@
+"""The haptic loop: one step of the simulation at each tick of a clock.
+
+    wait for the tick
+        the device has moved meanwhile: read it, write the step that ends here
+        rows that the next step's impact may use, from the time left; where the hand pulls
+        begin the next step: coupling, contact law, the force goes to the device
+        publish where everything is, for whoever looks
+
+Nothing in it waits for anybody: no lock, no file, no viewer, and Python's collector of garbage rests.
+"""
+
+from __future__ import annotations
+
+import gc
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import IapbError
+from iapb.run import Run
+from iapb.simulation import INTERRUPTED, Simulation
+from reports.live.budget import RowBudget
+from reports.live.clock import Clock, MonotonicClock
+from reports.live.deadline import Deadlines, Timetable
+from reports.live.tape import Tape
+
+Floats = NDArray[np.float64]
+
+_SPARE_SECONDS = 4e-4  # a chunk is made only where this much is left of the period, or nothing is left anyway
+
+
+class Audience(Protocol):
+    """Who looks on and may pull: must answer at once, whatever happens to the one behind it."""
+
+    def publish(self, q: Floats) -> None:
+        """Say where everything is."""
+        ...
+
+    def pull(self, now: float) -> Floats:
+        """Return the wrench (6,) [N, N m] of the hand, world axes, at the held point."""
+        ...
+
+
+@dataclass(frozen=True)
+class LiveRun:
+    """A run in real time, and its timetable; `device` says what device it had, empty = the compiled one."""
+
+    run: Run
+    timetable: Timetable
+    device: str = ""
+
+
+class Loop:
+    """A simulation, paced.
+
+    Parameters
+    ----------
+    simulation : at its start; its step is the period of the ticks.
+    ticks : at most this many.
+    clock : default: this machine's.
+    budget : rows from the time left; None: always all.
+    audience : who looks on; None: nobody.
+    """
+
+    def __init__(self, simulation: Simulation, ticks: int, clock: Clock | None = None,
+                 budget: RowBudget | None = None, audience: Audience | None = None) -> None:
+        self.simulation, self.ticks, self.audience = simulation, ticks, audience
+        self.clock: Clock = MonotonicClock() if clock is None else clock
+        self.budget, self._rows = budget, int(simulation.state.row_budget[0])
+        self._tape = Tape(simulation, ticks)
+        self._under_way = False  # between the two halves of a step
+        self._interrupted = False
+
+    def run(self, world: str = "") -> LiveRun:
+        """Do all ticks, or as many as there are before Ctrl-C or a failure: ``run.stopped`` says which.
+
+        Raises
+        ------
+        IapbError, KeyboardInterrupt
+            Stopped before the first step was done: there is nothing to return.
+        """
+        stopped = ""
+        with self._until_interrupted(), _without_collector():
+            deadlines = Deadlines(self.simulation.system.dt, self.ticks, self.clock.now() + self.simulation.system.dt)
+            try:
+                while deadlines.done < self.ticks and not self._interrupted:
+                    self._tick(deadlines)
+                self.clock.wait_until(deadlines.due)
+                self._finish()
+            except IapbError as error:
+                stopped = str(error)
+            except Exception as error:  # a device of somebody's own: whatever it does, what was done is kept
+                stopped = f"the device failed: {type(error).__name__}: {error}"
+            self._release()
+        steps = self._tape.steps
+        if steps == 0:
+            raise IapbError(stopped) if stopped else KeyboardInterrupt
+        stopped = "" if steps == self.ticks else stopped or INTERRUPTED
+        return LiveRun(self._tape.run(world, stopped), deadlines.timetable(steps), _name_of(self.simulation.link))
+
+    def _tick(self, deadlines: Deadlines) -> None:
+        self.clock.wait_until(deadlines.due)
+        start = self.clock.now()
+        self._finish()
+        self._give(deadlines)
+        self.simulation.begin_step()
+        self._under_way = True
+        if self.audience is not None:
+            self.audience.publish(self.simulation.state.q)
+        end = self.clock.now()
+        deadlines.close(start, end)
+        self._tape.add_time(end - start)
+        if self.budget is not None:
+            self.budget.learn(end - start, self._rows_used())
+        if self._tape.wants_spare and self.clock.now() + _SPARE_SECONDS < deadlines.due:
+            self._tape.make_spare()
+
+    def _finish(self) -> None:
+        """End the step that is under way, and write it."""
+        if self._under_way:
+            self._under_way = False
+            self.simulation.end_step()
+            self._tape.write()
+
+    def _give(self, deadlines: Deadlines) -> None:
+        """Rows and hand of the next step; both are noted, so that the step can be done again."""
+        simulation, now = self.simulation, self.clock.now()
+        if self.budget is not None:
+            self._rows = self.budget.rows(deadlines.left(now))
+            simulation.state.row_budget[0] = self._rows
+        if self.audience is not None:
+            simulation.port.wrench[:] = self.audience.pull(now)
+        deadlines.note(self._rows, simulation.port.wrench)
+
+    def _rows_used(self) -> int:
+        log = self.simulation.state.impacts
+        return int(log.rank[: log.logged[0]].sum()) if log.logged[0] else 0
+
+    def _release(self) -> None:
+        if self.simulation.link is not None:
+            with suppress(Exception):  # it may be what failed
+                self.simulation.link.release()
+
+    @contextmanager
+    def _until_interrupted(self) -> Iterator[None]:
+        """Ctrl-C ends the loop after the tick at hand; a step is never left half written."""
+        def stop(*_: Any) -> None:
+            self._interrupted = True
+
+        try:
+            before = signal.signal(signal.SIGINT, stop)
+        except ValueError:  # not the main thread: nobody's Ctrl-C arrives here
+            yield
+            return
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """Garbage is collected before and after, not in the middle of a step."""
+    was_on = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+def _name_of(link: Any) -> str:
+    return "" if link is None else f"{type(link.device).__module__}:{type(link.device).__qualname__}"

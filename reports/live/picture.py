@@ -1,0 +1,175 @@
+"""A scene as triangles for a browser, and where its bodies are at a configuration; from its resolved values alone.
+
+Planar scenes are drawn in the plane z = 0, their shapes as thick as a tenth of the scene. Quaternions here are w, x,
+y, z, as the viewer has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.figures import planar, spatial
+
+Floats = NDArray[np.float64]
+
+_THICKNESS = 0.1  # of planar shapes, as a share of the scene's size
+_REACH = 3.0  # of walls without end, as a multiple of the scene's size
+_CUBE = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+                  [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # of corners in order of x, y, z
+_RINGS = 12
+
+
+class Piece(NamedTuple):
+    """Triangles of one shape, in the frame of its body; ``""``: the world's."""
+
+    body: str
+    vertices: Floats  # (n, 3) [m]
+    faces: NDArray[np.int64]  # (m, 3) counter-clockwise from outside
+
+
+def is_planar(scene: Mapping[str, Any]) -> bool:
+    """Whether a resolved scene is planar."""
+    return scene.get("dimensions") != 3
+
+
+def pieces(scene: Mapping[str, Any]) -> list[Piece]:
+    """Return every shape of a resolved scene."""
+    low, high = extent(scene)
+    size = float(np.linalg.norm(high - low))
+    made = _planar_pieces if is_planar(scene) else _spatial_pieces
+    return list(made(scene, size))
+
+
+def placements(scene: Mapping[str, Any], q: Floats) -> dict[str, tuple[Floats, Floats]]:
+    """Return (quaternion, position) of every body at a configuration (nq,)."""
+    if is_planar(scene):
+        return {
+            name: (_quaternion(_raised(pose.rotation)), np.array([*pose.origin, 0.0]))
+            for name, pose in planar.body_poses(scene, q).items()
+        }
+    found = spatial.body_placements(scene, q)
+    return {name: (_quaternion(place.rotation), place.origin) for name, place in found.items()}
+
+
+def held_point(scene: Mapping[str, Any], q: Floats) -> Floats | None:
+    """Return where the hand holds the tool (3,) [m]; None in a scene without a hand."""
+    hand = scene.get("hand")
+    if hand is None:
+        return None
+    if is_planar(scene):
+        return np.array([*planar.body_poses(scene, q)[hand["body"]].of(hand["point"]), 0.0])
+    return spatial.body_placements(scene, q)[hand["body"]].of(hand["point"])
+
+
+def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Return the lower and upper corner (3,) of everything that has an end, at the start."""
+    start = np.array([x for body in scene["bodies"] for x in body["position"]], dtype=float)
+    made = _planar_pieces if is_planar(scene) else _spatial_pieces
+    places = {"": (np.array([1.0, 0, 0, 0]), np.zeros(3))} | placements(scene, start)
+    points = [origin[None] for name, (_, origin) in places.items() if name]
+    for piece in made({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0):
+        quaternion, origin = places[piece.body]
+        points.append(origin + piece.vertices @ _matrix(quaternion).T)
+    every = np.vstack(points)
+    return every.min(axis=0), every.max(axis=0)
+
+
+def _planar_pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
+    owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
+    for name, shape in owned + [("", wall) for wall in scene["walls"]]:
+        endless = shape["kind"] == "half_plane"
+        corners = planar.half_plane(shape, _REACH * size) if endless else planar.outline(shape)
+        yield _extruded(name, corners, _THICKNESS * size * (0.9 if endless else 1.0))
+
+
+def _extruded(name: str, corners: Floats, thickness: float) -> Piece:
+    """A prism over a convex outline, its middle at z = 0."""
+    x, y = corners[:, 0], corners[:, 1]
+    if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
+        corners = corners[::-1]
+    n, heights = len(corners), np.full((len(corners), 1), 0.5 * thickness)
+    vertices = np.vstack([np.hstack([corners, -heights]), np.hstack([corners, heights])])
+    faces = [[n, n + i, n + i + 1] for i in range(1, n - 1)] + [[0, i + 1, i] for i in range(1, n - 1)]
+    for i in range(n):
+        j = (i + 1) % n
+        faces += [[i, j, n + j], [i, n + j, n + i]]
+    return Piece(name, vertices, np.array(faces))
+
+
+def _spatial_pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
+    owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
+    for name, shape in owned + [("", wall) for wall in scene["walls"]]:
+        if shape["kind"] == "half_space":
+            yield _slab(shape, _REACH * size)
+        elif shape["kind"] == "sphere":
+            yield _ball(name, np.asarray(shape["center"], dtype=float), shape["radius"])
+        else:
+            frame = spatial.placement(shape["center"], shape["rpy"])
+            yield Piece(name, frame.of(_corners(shape["size"])), _CUBE)
+
+
+def _corners(size: Any) -> Floats:
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    return 0.5 * signs * np.asarray(size, dtype=float)
+
+
+def _slab(wall: Mapping[str, Any], reach: float) -> Piece:
+    """What stands for everything behind a plane: a plate under it."""
+    normal = np.asarray(wall["normal"], dtype=float)
+    normal = normal / np.linalg.norm(normal)
+    along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    along = along / np.linalg.norm(along)
+    frame = spatial.Placement(np.column_stack([along, np.cross(normal, along), normal]),
+                              np.asarray(wall["point"], dtype=float))
+    depth = 0.02 * reach
+    return Piece("", frame.of(_corners((reach, reach, depth)) - [0.0, 0.0, 0.5 * depth]), _CUBE)
+
+
+def _ball(name: str, center: Floats, radius: float) -> Piece:
+    """A globe of latitudes and longitudes."""
+    latitude, longitude = np.linspace(0.0, np.pi, _RINGS + 1), np.linspace(0.0, 2.0 * np.pi, 2 * _RINGS + 1)[:-1]
+    t, p = np.meshgrid(latitude, longitude, indexing="ij")
+    vertices = center + radius * np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    columns, faces = 2 * _RINGS, []
+    for i in range(_RINGS):
+        for j in range(columns):
+            a, b = i * columns + j, i * columns + (j + 1) % columns
+            faces += [[a, a + columns, b + columns], [a, b + columns, b]]
+    return Piece(name, vertices, np.array(faces))
+
+
+def _raised(rotation: Floats) -> Floats:
+    raised = np.eye(3)
+    raised[:2, :2] = rotation
+    return raised
+
+
+def _quaternion(rotation: Floats) -> Floats:
+    """Quaternion w, x, y, z of a rotation matrix, by the largest of its four squares."""
+    m = rotation
+    squares = np.array([
+        1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2],
+        1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2],
+    ])  # fmt: skip
+    table = np.array([
+        [squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+        [m[2, 1] - m[1, 2], squares[1], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+        [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], squares[2], m[1, 2] + m[2, 1]],
+        [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[3]],
+    ])  # fmt: skip
+    row = table[int(np.argmax(squares))]
+    found: Floats = row / np.linalg.norm(row)
+    return found
+
+
+def _matrix(quaternion: Floats) -> Floats:
+    w, x, y, z = quaternion
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
