@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+LONGEST = 1e8  # ticks: what is recorded is held in memory until the end
+
 if TYPE_CHECKING:
     from iapb.simulation import Simulation
     from reports.live.loop import LiveRun
@@ -42,8 +44,10 @@ def live(
     from reports.live.measure import summary
     from reports.live.setup import live_simulation
 
-    if not seconds * rate >= 1.0:
-        raise ArgumentError("--seconds", seconds, f"at least one step of {1.0 / rate:g} s")
+    if not rate > 0.0:
+        raise ArgumentError("--rate", rate, "a number of steps per second > 0")
+    if not 1.0 <= seconds * rate < LONGEST:
+        raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
     source = load_scene(find_scene(scene))
     source = source.with_values(parsed(set_)) if set_ else source
     print("Getting ready (the first time, some minutes of compiling).", flush=True)
@@ -77,21 +81,25 @@ def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: in
 
 def describe(pace: Pace, live: LiveRun) -> None:
     """Say in sentences how the loop kept to the clock."""
+    from reports.commands.run import duration
+
     print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
     for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
-        half, ninety, hundredth, thousandth, worst = (1e6 * seconds for seconds in times)
-        print(f"{what} {half:.3g} µs in the median; {ninety:.3g} µs at 90 %, {hundredth:.3g} µs at 99 %, "
-              f"{thousandth:.3g} µs at 99.9 %, {worst:.3g} µs at worst.")
+        half, ninety, hundredth, thousandth, worst = map(duration, times)
+        print(f"{what} {half} in the median; {ninety} at 90 %, {hundredth} at 99 %, {thousandth} at 99.9 %, "
+              f"{worst} at worst.")
     print(_misses(pace))
     print(_rows(pace, live))
 
 
 def _misses(pace: Pace) -> str:
+    from reports.commands.run import duration
+
     if not pace.missed:
         return "No deadline was missed: simulated time is the clock's."
     share = 100.0 * pace.missed / pace.ticks
     return (f"{pace.missed} deadlines were missed ({share:.3g} %). No step was left out: what came after was done "
-            f"that much later, and simulated time is {1e3 * pace.behind:.3g} ms behind the clock.")
+            f"that much later, and simulated time is {duration(pace.behind)} behind the clock.")
 
 
 def _rows(pace: Pace, live: LiveRun) -> str:

@@ -69,8 +69,8 @@ def describe(run: Run, existed: bool) -> None:
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}.")
-    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {_duration(seconds)} "
-          f"({_duration(seconds / steps)} a step).")
+    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
+          f"({duration(seconds / steps)} a step).")
     impacts = run.impacts
     if len(impacts.step):
         lost = float(np.sum(impacts.energy_lost))
@@ -93,7 +93,8 @@ def _end_of(run: Run) -> str:
     return words + (f" (and {more} more coordinates in the run's file)" if more else "")
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Say a time in the unit that suits it."""
     for unit, factor in (("s", 1.0), ("ms", 1e3)):
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.3g} {unit}"

@@ -18,6 +18,7 @@ _RESERVE = 0.1  # share of the period that is kept back: for the clock, and for 
 _FORGETTING = 0.01  # share by which the largest fixed cost seen fades per step: gone after a few hundred
 _ROWS = 200  # most rows of the calibrating impact
 _REPEATS = 15
+_CHEAPEST_ROW = 1e-8  # [s] a few dozen operations: less is what is left of noise where an impact has few rows
 
 
 class RowCost(NamedTuple):
@@ -79,4 +80,4 @@ def _seconds_per_row(dofs: int, count: int) -> float:
             taken.append(time.perf_counter() - started)
         times.append(min(taken))
     slope = (times[-1] - times[0]) / max(budgets[-1] - budgets[0], 1)
-    return max(float(slope), np.finfo(np.float64).tiny)  # one row alone: it costs what a step costs anyway
+    return max(float(slope), _CHEAPEST_ROW)

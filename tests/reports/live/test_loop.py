@@ -1,0 +1,150 @@
+"""The paced loop under a clock of the tests' own: order of ticks, misses, budgets, and the run done again."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from iapb.errors import IapbError
+from reference.worlds import run_world
+from reports.live.budget import RowBudget, RowCost, calibrated
+from reports.live.loop import Loop
+from reports.live.measure import rows_left_out, summary
+from reports.live.replay import replay
+from reports.live.setup import made_device
+from reports.store_keys import content_hash
+
+PERIOD = 1e-3
+TICKS = 700  # more than one chunk of the record
+
+
+def test_a_paced_run_is_the_run_that_nobody_paces(peg, fake_clock):
+    live = Loop(peg(), TICKS, fake_clock()).run("IAPB")
+    unpaced = run_world(peg().scene.with_values({"duration": TICKS * PERIOD}), "IAPB")
+    assert live.run.steps == TICKS and live.run.complete and len(live.run.impacts.step)
+    assert content_hash(live.run) == content_hash(unpaced)
+    assert live.run.chunk_steps.sum() == TICKS
+
+
+def test_ticks_come_in_order_and_never_early(peg, fake_clock):
+    table = Loop(peg(), TICKS, fake_clock({7: 0.4e-3, 90: 3.3e-3})).run().timetable
+    assert np.all(table.start >= table.due) and np.all(table.end > table.start)
+    assert np.all(table.due[1:] >= table.due[:-1] + PERIOD - 1e-12)  # a miss delays, and nothing is hurried
+    assert np.all(table.start[1:] >= table.end[:-1])
+
+
+def test_a_miss_is_counted_and_delays_what_comes_after_by_what_it_was_late(peg, fake_clock):
+    jumps = {7: 0.4e-3, 50: 2.5e-3, 90: 3.3e-3}  # the first is late, but done in time
+    table = Loop(peg(), TICKS, fake_clock(jumps)).run().timetable
+    assert np.flatnonzero(table.missed).tolist() == [50, 90]
+    assert table.lateness[[7, 50, 90]] == pytest.approx([0.4e-3, 2.5e-3, 3.3e-3], abs=1e-4)
+    assert table.behind == pytest.approx(1.5e-3 + 2.3e-3, abs=1e-4)
+    assert table.due[-1] == pytest.approx((TICKS - 1) * PERIOD + table.behind, abs=1e-9)
+    assert not Loop(peg(), TICKS, fake_clock()).run().timetable.missed.any()
+
+
+def test_a_miss_changes_nothing_of_the_run(peg, fake_clock):
+    late = Loop(peg(), TICKS, fake_clock({50: 2.5e-3})).run("IAPB")
+    assert content_hash(late.run) == content_hash(Loop(peg(), TICKS, fake_clock()).run("IAPB").run)
+
+
+def scarce(simulation):
+    """A row is said to take longer than there is time: one row for every impact."""
+    return RowBudget(RowCost(0.0, 1.0), PERIOD, simulation.system.mechanism.nv, 1)
+
+
+@pytest.mark.parametrize("device", ["", "simulated"])
+def test_a_run_short_of_time_keeps_to_its_budgets_is_passive_and_repeats_exactly(peg, fake_clock, device):
+    simulation = peg(device)
+    live = Loop(simulation, TICKS, fake_clock({40: 5e-3}), scarce(simulation)).run("IAPB")
+    impacts = live.run.impacts
+    assert np.all(live.timetable.budget == 1) and len(impacts.step)
+    assert np.all(impacts.rank <= live.timetable.budget[impacts.step])
+    assert impacts.rows.max() > 1 and rows_left_out(live) > 0
+    assert impacts.energy_lost.min() >= 0.0
+    assert content_hash(replay(live)) == content_hash(live.run)
+
+
+def test_a_replay_with_other_budgets_is_another_run(peg, fake_clock):
+    simulation = peg()
+    live = Loop(simulation, TICKS, fake_clock(), scarce(simulation)).run("IAPB")
+    live.timetable.budget[:] = 3
+    assert content_hash(replay(live)) != content_hash(live.run)
+
+
+def test_the_budget_grows_with_the_time_left_between_one_row_and_all():
+    budget = RowBudget(RowCost(2e-4, 1e-5), PERIOD, 30, 2)
+    rows = [budget.rows(left) for left in np.linspace(-1e-3, 1e-3, 300)]
+    assert rows == sorted(rows) and rows[0] == 1 and rows[-1] == 30 and len(set(rows)) > 5
+    before = budget.rows(4e-4)
+    budget.learn(3e-4, 1)  # a step took longer than expected
+    assert budget.rows(4e-4) < before
+    for _ in range(1000):
+        budget.learn(1e-4, 0)  # of late they were quick
+    assert budget.fixed == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_with_time_enough_every_impact_gets_all_its_rows(peg, fake_clock):
+    simulation = peg()
+    dofs = simulation.system.mechanism.nv
+    live = Loop(simulation, TICKS, fake_clock(), RowBudget(RowCost(0.0, 1e-6), PERIOD, dofs, 1)).run("IAPB")
+    assert np.all(live.timetable.budget == dofs) and rows_left_out(live) == 0
+
+
+def test_a_row_is_measured_to_take_some_time(peg):
+    assert 0.0 < calibrated(peg(), PERIOD).per_row
+
+
+def test_control_c_ends_the_loop_with_what_was_done(peg, fake_clock):
+    before = signal.getsignal(signal.SIGINT)
+    live = Loop(peg(), TICKS, fake_clock(at={123: lambda: os.kill(os.getpid(), signal.SIGINT)})).run("IAPB")
+    assert live.run.steps == 124 == len(live.timetable.due)  # the tick at hand is done to its end
+    assert live.run.stopped == "interrupted" and not live.run.complete
+    assert content_hash(replay(live)) == content_hash(live.run)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+class Fails:
+    """A device that works for a while."""
+
+    def __init__(self, device, readings):
+        self.device, self.readings, self.told = device, readings, []
+
+    def read(self):
+        self.readings -= 1
+        if self.readings < 0:
+            raise ConnectionError("unplugged")
+        return self.device.read()
+
+    def apply(self, force):
+        self.told.append(np.array(force))
+        self.device.apply(force)
+
+
+def test_a_device_that_fails_ends_the_loop_with_what_was_done_and_is_released(peg, fake_clock):
+    simulation = peg("simulated")
+    device = simulation.link.device = Fails(simulation.link.device, 60)
+    live = Loop(simulation, TICKS, fake_clock()).run("IAPB")
+    assert live.run.steps == 60 and "unplugged" in live.run.stopped
+    assert np.array_equal(device.told[-1], np.zeros(3)) and np.any(device.told[-2])
+
+
+def test_a_motion_that_leaves_all_bounds_is_said(peg, fake_clock):
+    live = Loop(peg(**{"couplings.four_channel.stiffness": [1e9] * 3}), TICKS, fake_clock()).run()
+    assert "too long" in live.run.stopped and 0 < live.run.steps < TICKS
+
+
+@pytest.mark.parametrize("name", ["omega", "no_such_module:connect", "json:connect", ":connect", "json:"])
+def test_a_device_that_is_not_there_is_named(name, peg):
+    with pytest.raises(IapbError, match="device = "):
+        made_device(name, peg().scene)
+
+
+def test_the_summary_counts_what_the_timetable_says(peg, fake_clock):
+    live = Loop(peg(), TICKS, fake_clock({50: 2.5e-3})).run()
+    pace = summary(live)
+    assert (pace.ticks, pace.missed, pace.rows_left_out) == (TICKS, 1, 0)
+    assert pace.work[-1] == live.timetable.work.max() and list(pace.lateness) == sorted(pace.lateness)

@@ -1,0 +1,52 @@
+"""Triangles for the browser: closed, their outside out, and where the engine has the bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from iapb.scene import load_scene
+from iapb.scene_files import find_scene, scene_names
+from iapb.system import System
+from reports.live.picture import extent, held_point, pieces, placements
+
+
+def rotation_of(quaternion):
+    w, x, y, z = quaternion
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_piece_is_closed_and_its_outside_is_out(name):
+    scene = load_scene(find_scene(name)).resolved()
+    for piece in pieces(scene):
+        edges = {(face[i], face[i - 2]) for face in piece.faces.tolist() for i in range(3)}
+        corners = piece.vertices[piece.faces] - piece.vertices.mean(axis=0)
+        volumes = np.linalg.det(corners)
+        assert volumes.sum() > 0.0 and volumes.min() >= -1e-12 * volumes.sum()
+        if len(piece.vertices) < 100:  # the poles of a ball are many corners in one place
+            assert all((b, a) in edges for a, b in edges)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_bodies_are_where_the_engine_has_them(name):
+    scene = load_scene(find_scene(name))
+    system, random = System(scene), np.random.default_rng(4)
+    mechanism, q = system.mechanism, system.make_state().q
+    q = mechanism.integrate(q, random.normal(size=mechanism.nv), 0.7)
+    rotations, origins = mechanism.placements(q)
+    resolved = scene.resolved()
+    for name, (quaternion, position) in placements(resolved, q).items():
+        body = mechanism.index(name)
+        assert position == pytest.approx(origins[body], abs=1e-12)
+        assert rotation_of(quaternion) == pytest.approx(rotations[body], abs=1e-12)
+    if scene.hand is not None:
+        body, point = mechanism.index(scene.hand.body), np.zeros(3)
+        point[: len(scene.hand.point)] = scene.hand.point
+        assert held_point(resolved, q) == pytest.approx(origins[body] + rotations[body] @ point, abs=1e-12)
+
+
+def test_the_extent_is_of_what_has_an_end():
+    low, high = extent(load_scene(find_scene("peg_corner")).resolved())
+    assert 0.02 < np.linalg.norm(high - low) < 0.06  # the peg, not its endless walls

@@ -1,0 +1,83 @@
+"""The viewer's process: it serves, it is held, and stopped or killed it costs the loop nothing but the picture."""
+
+from __future__ import annotations
+
+import os
+import signal
+import urllib.request
+
+import numpy as np
+import pytest
+
+from reports.live.hand import SpringHand
+from reports.live.loop import Loop
+from reports.live.replay import replay
+from reports.live.viewer import Viewer
+from reports.live.window import SILENCE_SECONDS, Window
+from reports.store_keys import content_hash
+
+TICKS = 60
+
+
+@pytest.fixture(scope="module")
+def module_peg():
+    from iapb.scene import load_scene
+    from iapb.scene_files import find_scene
+    from reference.worlds import find_world
+    from reports.live.setup import live_simulation
+
+    return lambda: live_simulation(load_scene(find_scene("peg_corner")), find_world("IAPB"), 1000.0)
+
+
+@pytest.fixture(scope="module")
+def viewer(module_peg):
+    shown = Viewer(module_peg(), port=18080)
+    shown.address = shown.start()
+    yield shown
+    name = shown.window.name
+    shown.stop()
+    assert not shown.process.is_alive()
+    with pytest.raises(FileNotFoundError):
+        Window.opened(name, 3)
+
+
+def paced(viewer, simulation, clock):
+    """A loop with the viewer's process as it is, and the hand of this simulation."""
+    viewer._hand = SpringHand(simulation)
+    return Loop(simulation, TICKS, clock, audience=viewer).run("IAPB")
+
+
+def test_it_serves_a_page_on_this_machine(viewer):
+    assert viewer.address.startswith("http://127.0.0.1:")
+    with urllib.request.urlopen(viewer.address, timeout=20) as page:
+        assert page.status == 200 and b"<html" in page.read().lower()
+
+
+def test_the_loop_does_not_wait_for_a_viewer_that_sleeps_and_lets_go_for_one_that_is_silent(
+    viewer, module_peg, fake_clock
+):
+    os.kill(viewer.process.pid, signal.SIGSTOP)
+    try:
+        target = np.array([0.0, -0.013, 0.0])
+        viewer.window._sequence[1] = 0  # it may have been stopped while writing
+        viewer.window.want(target, 100.0)  # in the sleeper's place: the mouse pulls the peg to the wall
+        clock = fake_clock()
+        pulled = paced(viewer, module_peg(), clock)
+        assert pulled.run.steps == TICKS and not pulled.timetable.missed.any()
+        assert np.all(pulled.timetable.wrench[:, 0] < pulled.run.hand_force[0, 0] + 1e-12)
+        assert content_hash(replay(pulled)) == content_hash(pulled.run)
+        clock = fake_clock()
+        clock.time += 2.0 * SILENCE_SECONDS
+        alone = paced(viewer, module_peg(), clock)
+        assert np.array_equal(alone.timetable.wrench, np.tile(alone.timetable.wrench[0], (TICKS, 1)))
+        assert np.any(alone.timetable.wrench != pulled.timetable.wrench)
+        assert np.array_equal(viewer.window.shown(), alone.run.q[-1])
+    finally:
+        os.kill(viewer.process.pid, signal.SIGCONT)
+
+
+def test_the_loop_does_not_notice_that_the_viewer_has_died(viewer, module_peg, fake_clock):
+    os.kill(viewer.process.pid, signal.SIGKILL)
+    viewer.process.join(10.0)
+    live = paced(viewer, module_peg(), fake_clock())
+    assert live.run.complete and not live.timetable.missed.any()
