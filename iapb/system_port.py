@@ -39,8 +39,9 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full", impul
     mass = device.mass_matrix(q) if held else np.zeros((0, 0))
     lower = np.zeros_like(mass)
     cholesky(mass, lower)
-    zeros = {name: np.zeros(d) for name in ("hand_force", "coupling_force", "environment_force", "applied")}
-    tool_zeros = {name: np.zeros(v_stop - v_start) for name in (
+    zeros: dict[str, Any] = {name: np.zeros(d) for name in (
+        "hand_force", "coupling_force", "environment_force", "applied")}
+    tool_zeros: dict[str, Any] = {name: np.zeros(v_stop - v_start) for name in (
         "device_hand_force", "device_force", "pulse_force", "error", "acceleration", "measured_v")}
     return block(Port(
         coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,

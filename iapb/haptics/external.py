@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,6 @@ from iapb.haptics.device import Device, SimulatedDevice
 from iapb.haptics.kernels.device import engage
 from iapb.haptics.kernels.port import NO_COUPLING, UNILATERAL
 from iapb.haptics.kernels.pulse import observe_work
-
-if TYPE_CHECKING:
-    from iapb.scene import Scene
 
 
 class DeviceLink:
@@ -72,28 +69,3 @@ def _put(name: str, values: ArrayLike, target: Any) -> None:
     if read.shape != target.shape or not np.all(np.isfinite(read)):
         raise IapbError(f"the device read {name} = {values!r}: expected {len(target)} finite numbers")
     target[:] = read
-
-
-def simulated_device(scene: Scene) -> SimulatedDevice:
-    """Return the device of a scene as one that moves by itself: its inertia, damping, delay, sensors and limits.
-
-    Raises
-    ------
-    ArgumentError
-        A scene without a hand, or a tool whose mass matrix is not constant: only the compiled device has such.
-    """
-    from iapb.system import System
-
-    system = System(scene)
-    if system.tool_tree < 0:
-        raise ArgumentError("scene", scene.name, "a scene with a hand")
-    tool, state = system.device_mechanism(), system.make_state()
-    q, v = state.q[slice(*system.tool_coordinates)], state.v[slice(*system.tool_dofs)]
-    if not tool.has_constant_mass_matrix or len(q) != len(v):
-        raise ArgumentError("scene", scene.name, "a tool of constant inertia, with as many velocities as coordinates")
-    given = scene.device
-    settings: dict[str, Any] = {} if given is None else {
-        "damping": given.damping, "force_limit": given.force_limit, "delay": given.delay,
-        "resolution": given.position_resolution,
-    }  # fmt: skip
-    return SimulatedDevice(tool.mass_matrix(q), q, v, dt=system.dt, **settings)

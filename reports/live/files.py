@@ -31,8 +31,9 @@ def read_live(path: Path | str) -> LiveRun:
     tables = read_tables(path.with_name(path.stem + _SUFFIX))
     ticks, session = tables["ticks"], tables["session"]
     wrench = np.column_stack([ticks[name] for name in _WRENCH])
-    columns = (np.asarray(ticks[name]) for name in ("due", "start", "end", "budget"))
-    return LiveRun(read_run(path), Timetable(float(session["period"][0]), *columns, wrench), _device_in(session))
+    due, start, end, budget = (np.asarray(ticks[name]) for name in ("due", "start", "end", "budget"))
+    timetable = Timetable(float(session["period"][0]), due, start, end, budget, wrench)
+    return LiveRun(read_run(path), timetable, _device_in(session))
 
 
 def ticks_table(timetable: Timetable, run: str = "") -> Table:

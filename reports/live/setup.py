@@ -11,7 +11,7 @@ from iapb.scene import Scene
 from iapb.simulation import Simulation
 from reference.worlds import World
 
-_SIMULATED = "simulated"  # the word for the device of `iapb.haptics.external.simulated_device`
+_SIMULATED = "simulated"  # the word for the device of `iapb.scene_device.simulated_device`
 
 
 def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -> Simulation:
@@ -39,7 +39,7 @@ def made_device(name: str, scene: Scene) -> Device | None:
     if not name:
         return None
     if name == _SIMULATED:
-        name = "iapb.haptics.external:simulated_device"
+        name = "iapb.scene_device:simulated_device"
     module, colon, factory = name.partition(":")
     if not colon or not module or not factory:
         raise ArgumentError("device", name, "module:factory, such as my_lab.omega:connect, or simulated")

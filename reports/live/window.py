@@ -31,8 +31,8 @@ class Window:
 
     def __init__(self, memory: SharedMemory, coordinates: int, owner: bool) -> None:
         self._memory, self._owner, self.coordinates = memory, owner, coordinates
-        self._sequence = np.frombuffer(memory.buf, np.int64, _HEAD)
-        numbers = np.frombuffer(memory.buf, np.float64, _WISHES + coordinates, offset=_HEAD * _WORD)
+        self._sequence = np.ndarray(_HEAD, np.int64, memory.buf)
+        numbers = np.ndarray(_WISHES + coordinates, np.float64, memory.buf, _HEAD * _WORD)
         self._wishes, self._q = numbers[:_WISHES], numbers[_WISHES:]
 
     @classmethod

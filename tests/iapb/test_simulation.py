@@ -32,7 +32,7 @@ STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
 
 def name_of(law):
-    return "-".join([law.name.split(" ")[0], *law.settings.values()])
+    return "-".join([law.name.split(" ")[0], *map(str, law.settings.values())])
 
 
 def results_of(record, place="run"):

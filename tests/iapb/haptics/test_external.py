@@ -8,9 +8,9 @@ import pytest
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import DeviceReading
-from iapb.haptics.external import simulated_device
 from iapb.recorder import Recorder
 from iapb.scene import load_scene
+from iapb.scene_device import simulated_device
 from iapb.scene_files import find_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
