@@ -66,6 +66,25 @@ def test_the_hand_pulls_with_the_transpose_of_the_jacobian_where_it_holds():
     assert np.array_equal(port.applied, port.hand_force)
 
 
+def test_in_space_the_hand_pulls_at_its_point_of_a_turned_body():
+    """The same with six degrees of freedom, every component of arm and wrench different."""
+    from iapb.haptics.kernels import couple
+
+    system = System(load_scene(find_scene("peg_hole_space")))
+    world, state, port = system.world_under(Penalty()), system.make_state(), system.make_port(NoCoupling())
+    turn = np.zeros(system.mechanism.nv)
+    turn[:6] = [0.3, -0.2, 0.5, 0.7, -0.4, 1.1]
+    state.q[:] = system.mechanism.integrate(state.q, turn, 1.0)
+    port.hand_point[:], port.wrench[:] = [0.03, -0.05, 0.07], [2.0, -1.0, 0.5, 0.3, -0.2, 0.1]
+    couple(world, state, port)
+    rotation, origin = system.mechanism.placements(state.q)
+    body = system.mechanism.index("peg")
+    point = origin[body] + rotation[body] @ port.hand_point
+    expected = system.mechanism.point_jacobian(state.q, body, point).T @ port.wrench[:3]
+    expected += system.mechanism.frame_jacobian(state.q, body)[3:].T @ port.wrench[3:]
+    assert port.hand_force == pytest.approx(expected, abs=1e-13)
+
+
 def test_worlds_differ_by_what_a_law_sets_and_are_made_once():
     system = System(PEG)
     assert system.world_under(Penalty()) is system.world_under(Penalty())

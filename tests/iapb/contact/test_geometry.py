@@ -121,6 +121,21 @@ def test_smallest_gap_is_the_brute_force_distance(a, b, pose_a, pose_b):
     )
 
 
+@given(size, size, st.floats(-1.0, 1.0), pose)
+def test_boxes_in_line_touch_at_the_ends_of_the_edge_that_they_share(width, other_width, shift, pose):
+    """One box on the other, however far it juts out: no contact lies beside either of them."""
+    assume(abs(shift) < 0.49 * (width + other_width))
+    shapes = make_shapes([box((width, 0.2), body=0), box((other_width, 0.2), body=1)])
+    x, y, turn = pose
+    along, up = np.array([math.cos(turn), math.sin(turn)]), np.array([-math.sin(turn), math.cos(turn)])
+    above = (*(np.array([x, y]) + shift * along + (0.2 - 1e-3) * up), turn)
+    found = contacts(shapes, np.array([[0, 1]], np.int32), (pose, above))
+    places = sorted(float((point[:2] - [x, y]) @ along) for _, point, _, _ in found)
+    ends = [max(-width, 2.0 * shift - other_width) / 2.0, min(width, 2.0 * shift + other_width) / 2.0]
+    assert places == pytest.approx(ends, abs=ROUNDING)
+    assert [gap for *_, gap in found] == pytest.approx([-1e-3, -1e-3], abs=ROUNDING)
+
+
 @given(st.one_of(polygon, circle), st.one_of(polygon, circle), pose, pose)
 def test_normal_is_unit_and_a_moving_along_it_by_the_gap_just_touches(a, b, pose_a, pose_b):
     shapes, pairs = make_shapes([a, on_body(b, 1)]), np.array([[0, 1]], np.int32)

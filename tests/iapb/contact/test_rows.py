@@ -112,3 +112,18 @@ def test_a_wrong_choice_of_rows_is_named():
     found = find_contacts(mechanism, shapes, np.zeros(3), np.zeros(3))
     with pytest.raises(ArgumentError, match="self_collision_rows"):
         contact_rows(mechanism, found, np.zeros(3), self_collision_rows="both")
+
+
+TINY = 1e-200  # its square is no number any more
+
+
+@pytest.mark.parametrize("small", [0.0, TINY, 1e-9, 0.3])
+@pytest.mark.parametrize("order", [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)])
+def test_tangents_of_every_normal_are_orthonormal_to_it(small, order):
+    normal = np.array([0.0, small, 1.0])[list(order)]
+    normal /= np.linalg.norm(normal)
+    frame = np.array([normal, *(rows.tangent_of(tuple(normal), which, 2) for which in range(2))])
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-15)
+    flat = np.array([normal[0], -normal[1] - normal[2], 0.0])
+    in_plane = rows.tangent_of(tuple(flat), 0, 1)
+    assert in_plane == pytest.approx(np.cross([0.0, 0.0, 1.0], flat), abs=0.0)  # a quarter turn to the left

@@ -10,6 +10,7 @@ import pytest
 from iapb.compiled import block
 from iapb.contact import coal_geometry
 from iapb.contact.geometry import ContactBuffer, candidate_pairs, contact_capacity, make_contact_buffer
+from iapb.contact.kernels.box_faces import MOST_POINTS, keep_widest
 from iapb.contact.kernels.box_pair import EDGE_SHARE
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, SpatialShape, Sphere, make_spatial_shapes
@@ -152,3 +153,55 @@ def test_motion_along_the_normal_by_the_depth_parts_two_boxes() -> None:
             step = -found.gap.min() * (1.0 + 1e-9) + 1e-12
             moved = (poses[0][0], poses[0][1] + step * found.normal[0])
             assert len(contacts_of(shapes, [moved, poses[1]]).gap) == 0
+
+
+def test_a_corner_and_the_plane_meet_midway_between_the_two() -> None:
+    rng = np.random.default_rng(3)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    for _ in range(20):
+        size, (R, p) = rng.uniform(0.1, 0.4, 3), random_pose(rng, 0.1)
+        normal, origin = rng.normal(size=3), rng.uniform(-0.1, 0.1, 3)
+        normal /= np.linalg.norm(normal)
+        found = contacts_of([SpatialBox(size, body=0), HalfSpace(origin, normal)], [(R, p)])
+        corners = p + signs * (0.5 * size) @ R.T
+        heights = (corners - origin) @ normal
+        np.testing.assert_allclose(np.sort(found.gap), np.sort(heights[heights <= 0.0]), atol=1e-14)
+        np.testing.assert_allclose((found.point - origin) @ normal, 0.5 * found.gap, atol=1e-14)
+        to_corners = found.point[:, None] + 0.5 * (found.gap[:, None] * found.normal)[:, None] - corners
+        assert np.linalg.norm(to_corners, axis=2).min(axis=1, initial=np.inf) == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_boxes_in_line_touch_in_the_rectangle_that_they_share(axis: int, side: float) -> None:
+    """Boxes of six different sizes, one upon the other, turned together and pushed sideways."""
+    rng = np.random.default_rng(axis)
+    half_a, half_b = np.array([0.11, 0.23, 0.17]), np.array([0.19, 0.13, 0.29])
+    R, p = random_pose(rng, 1.0)
+    depth, shift = 1e-3, rng.uniform(-0.05, 0.05, 3)
+    shift[axis] = side * (half_a[axis] + half_b[axis] - depth)
+    shapes: list[SpatialShape] = [SpatialBox(2.0 * half_a, body=0), SpatialBox(2.0 * half_b, body=1)]
+    found = contacts_of(shapes, [(R, p), (R, p + R @ shift)])
+    np.testing.assert_allclose(found.gap, -depth, atol=1e-12)
+    np.testing.assert_allclose(found.normal, np.tile(-side * R[:, axis], (4, 1)), atol=1e-12)  # from b to a
+    local = (found.point - p) @ R
+    low, high = np.maximum(-half_a, shift - half_b), np.minimum(half_a, shift + half_b)
+    low[axis] = high[axis] = side * (half_a[axis] - 0.5 * depth)
+    np.testing.assert_allclose(local.min(axis=0), low, atol=1e-12)
+    np.testing.assert_allclose(local.max(axis=0), high, atol=1e-12)
+
+
+def test_of_many_points_the_deepest_the_farthest_and_the_widest_are_kept() -> None:
+    rng = np.random.default_rng(4)
+    m = np.array([0.0, 0.0, 1.0])
+    for count in range(5, 9):
+        buffer: Any = block(make_contact_buffer(count + 1))
+        points = np.column_stack([rng.uniform(-0.3, 0.3, (count, 2)), np.zeros(count)])
+        buffer.point[1 : count + 1], buffer.gap[1 : count + 1] = points, rng.uniform(-1e-3, 0.0, count)
+        first = points[np.argmin(buffer.gap[1 : count + 1])]
+        second = points[np.argmax(np.linalg.norm(points - first, axis=1))]
+        beside = (points - first) @ np.cross(m, second - first)  # the area spanned with both, signed
+        assert keep_widest(buffer, 1, count + 1, tuple(m)) == 1 + MOST_POINTS
+        expected = [first, second, points[np.argmax(beside)], points[np.argmin(beside)]]
+        if beside.min() < 0.0 < beside.max():
+            np.testing.assert_array_equal(buffer.point[1:5], expected)

@@ -118,6 +118,8 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
     np.testing.assert_allclose(
         mechanism.point_jacobian(q, body, point) @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6
     )
+    at_origin = mechanism.point_jacobian(q, body, positions[body])
+    np.testing.assert_array_equal(mechanism.frame_jacobian(q, body)[:3], at_origin)
     spin = (turned - unturned) @ rotations[body].T / (2 * STEP)
     turning = mechanism.frame_jacobian(q, body)[3:] @ v
     np.testing.assert_allclose(turning, [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-6, rtol=1e-6)
