@@ -222,3 +222,17 @@ def test_polygons_of_many_sides_fit_the_buffer():
     sides = 2.0 * np.pi * np.arange(40) / 40
     shapes = make_shapes([Polygon(np.column_stack([np.cos(sides), np.sin(sides)]), 0), FLOOR])
     assert len(find_contacts(Mechanism([free_body()]), shapes, [0.0, -5.0, 0.1], DOWN)) == 40
+
+
+def test_naming_the_pairs_finds_their_contacts_alone():
+    mechanism, shapes = free_bodies(2), make_shapes([box((1.0, 1.0), body=0), box((1.0, 1.0), body=1), FLOOR, WALL])
+    q, v = [0.4, 0.4, 0.0, 1.2, 0.3, 0.0], np.zeros(6)
+    everything = find_contacts(mechanism, shapes, q, v)
+    found = {(a, b) for a, b in zip(everything.shape_a, everything.shape_b, strict=True)}
+    assert len(found) >= 3
+    for pairs in ([[0, 1], [0, 2], [0, 3], [1, 2]], [[0, 1], [0, 2]], [[0, 2]], []):
+        some = find_contacts(mechanism, shapes, q, v, pairs=pairs)
+        chosen = [(a, b) in {tuple(sorted(pair)) for pair in pairs} for a, b in zip(
+            everything.shape_a, everything.shape_b, strict=True)]  # fmt: skip
+        assert np.array_equal(some.gap, everything.gap[chosen])
+        assert np.array_equal(some.point, everything.point[chosen])

@@ -205,3 +205,20 @@ def test_of_many_points_the_deepest_the_farthest_and_the_widest_are_kept() -> No
         expected = [first, second, points[np.argmax(beside)], points[np.argmin(beside)]]
         if beside.min() < 0.0 < beside.max():
             np.testing.assert_array_equal(buffer.point[1:5], expected)
+
+
+@pytest.mark.parametrize("sides", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, -1)])
+def test_boxes_apart_in_all_three_directions_meet_between_their_corners(sides: tuple[int, int, int]) -> None:
+    """Within the margin, but no corner of one over a face of the other."""
+    half_a, half_b = np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.1, 0.2])
+    apart = np.array(sides) * (half_a + half_b + [0.03, 0.02, 0.01])
+    shapes: list[SpatialShape] = [SpatialBox(2.0 * half_a, body=0), SpatialBox(2.0 * half_b, body=1)]
+    poses = [(np.eye(3), np.zeros(3)), (np.eye(3), apart)]
+    assert len(contacts_of(shapes, poses).gap) == 0
+    found = contacts_of(shapes, poses, margin=0.05)
+    assert found.gap == pytest.approx([0.03])  # of the direction that separates most
+    np.testing.assert_allclose(found.normal, [[-sides[0], 0.0, 0.0]], atol=1e-15)
+    corner_a, corner_b = np.array(sides) * half_a, apart - np.array(sides) * half_b
+    low, high = np.minimum(corner_a, corner_b) - 1e-15, np.maximum(corner_a, corner_b) + 1e-15
+    assert np.all((low <= found.point) & (found.point <= high))
+    assert found.point[0, 0] == pytest.approx(0.5 * (corner_a + corner_b)[0])

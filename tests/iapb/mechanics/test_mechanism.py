@@ -43,6 +43,28 @@ def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
     assert arm.kinetic_energy([np.pi / 2, 0.0], [1.0, 1.0]) == pytest.approx(7.0 / 3.0, rel=1e-15)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_mass_matrix_and_momenta_are_sums_over_the_bodies(seed):
+    """M = Σ m JᵀJ + JωᵀI Jω at the centres of mass; Σ m u and Σ I ω + (c − c̄) × m u, written out with numpy."""
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, 7, moving_kinds, trees=2)
+    q, v = random_state(rng, mechanism)
+    rotations, positions = mechanism.placements(q)
+    mass, centers, momenta, spins = np.zeros((mechanism.nv, mechanism.nv)), [], [], []
+    for b, body in enumerate(mechanism.bodies):
+        centers.append(positions[b] + rotations[b] @ body.center_of_mass)
+        moving, turning = mechanism.point_jacobian(q, b, centers[b]), mechanism.frame_jacobian(q, b)[3:]
+        inertia = rotations[b] @ body.inertia @ rotations[b].T
+        mass += body.mass * moving.T @ moving + turning.T @ inertia @ turning
+        momenta.append(body.mass * moving @ v)
+        spins.append(inertia @ turning @ v)
+    np.testing.assert_allclose(mechanism.mass_matrix(q), mass, rtol=1e-11, atol=1e-11 * np.abs(mass).max())
+    common = np.average(centers, axis=0, weights=[body.mass for body in mechanism.bodies])
+    angular = np.sum(spins, axis=0) + np.sum(np.cross(centers - common, momenta), axis=0)
+    expected = [*np.sum(momenta, axis=0), *angular]
+    np.testing.assert_allclose(mechanism.centroidal_momentum(q, v), expected, rtol=1e-10, atol=1e-10)
+
+
 @settings(max_examples=40)
 @given(seeds, st.integers(1, 12), st.integers(1, 3))
 def test_the_mass_matrix_is_symmetric_block_diagonal_and_positive(seed, joints, trees):
