@@ -144,7 +144,7 @@ def _head(file: Any) -> dict[str, Any]:
 def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
     place = str(path)
     group = {
-        name: {quantity.name: read_values(file[name], quantity.name, place) for quantity in quantities}
+        name: {quantity.name: _numbers(file[name], quantity.name, place) for quantity in quantities}
         for name, (quantities, _, _) in GROUPS.items()
     }
     for name, quantity in (("contacts", "is_new"), ("impacts", "solved")):  # truth values are stored as numbers
@@ -166,8 +166,15 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
     }
 
 
+def _numbers(group: Any, name: str, path: str) -> np.ndarray:
+    values = read_values(group, name, path)
+    if not (isinstance(values, np.ndarray) and values.dtype.kind in "biuf" and values.ndim):
+        raise RunFileError(f"{path}: {group.name}/{name} is no list of numbers")
+    return values
+
+
 def _energy(group: Any, path: str) -> dict[str, Any]:
-    return {name: read_values(group, name, path) for name in group if not group[name].is_scale}
+    return {name: _numbers(group, name, path) for name in group if not group[name].is_scale}
 
 
 def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:
