@@ -6,6 +6,8 @@ import os
 import signal
 import time
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
+from io import StringIO
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -22,8 +24,8 @@ HOST = "127.0.0.1"
 FRAMES_PER_SECOND = 30.0
 
 _POLITENESS = 10  # niceness: the loop comes first
-_BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (205, 205, 200)
-_DISTANCE = 2.2  # of the camera, in sizes of the scene
+_BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (170, 170, 165)
+_DISTANCE = {True: 2.2, False: 1.4}  # of the camera, in sizes of a scene that is planar or not
 _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
 
 
@@ -39,7 +41,9 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
     """Serve the scene until nobody wants it any more; send the port when a browser can come."""
     import viser
 
-    server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
+    with redirect_stdout(StringIO()):  # it would announce itself; the loop's own process says where to look
+        server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
+    server.gui.configure_theme(show_share_button=False)
     frames = _draw(server, scene)
     mouse = _Mouse(server, scene)
     ready.send(server.get_port())
@@ -79,7 +83,7 @@ def _look(server: Any, scene: Mapping[str, Any]) -> None:
         up = -gravity / max(float(np.linalg.norm(gravity)), np.finfo(float).tiny)
         towards = np.array([0.62, -0.72, 0.31])
     camera = server.initial_camera
-    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE * size * towards
+    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE[is_planar(scene)] * size * towards
     camera.near = 0.01 * size
     server.scene.set_up_direction(up)
 

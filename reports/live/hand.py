@@ -28,7 +28,7 @@ class SpringHand:
     def __init__(self, simulation: Simulation) -> None:
         if simulation.system.tool_tree < 0:
             raise ArgumentError("scene", simulation.scene.name, "a scene with a hand")
-        self._state, self._port, self._dt = simulation.state, simulation.port, simulation.system.dt
+        self._simulation, self._dt = simulation, simulation.system.dt
         self._own = simulation.port.wrench.copy()
         self._planar = len(simulation.scene.hand.point) == 2  # type: ignore[union-attr]
         mass = _effective_mass(simulation)
@@ -37,10 +37,8 @@ class SpringHand:
         self._last: Floats | None = None
 
     def point(self) -> Floats:
-        """Where the hand holds the tool (3,) [m], at the start of the last step."""
-        body, held = self._state.body, self._port.hand_body
-        found: Floats = body.position[held] + body.rotation[held] @ self._port.hand_point
-        return found
+        """Where the hand holds the tool (3,) [m]."""
+        return _held_point(self._simulation)
 
     def wrench(self, target: Floats | None) -> Floats:
         """Return the scene's own wrench (6,) and, where there is a target (3,) [m], the spring's force."""
@@ -59,11 +57,16 @@ class SpringHand:
         return wrench
 
 
+def _held_point(simulation: Simulation) -> Floats:
+    held, arm = simulation.port.hand_body, simulation.port.hand_point
+    rotation, position = simulation.system.mechanism.placements(simulation.state.q)
+    found: Floats = position[held] + rotation[held] @ arm
+    return found
+
+
 def _effective_mass(simulation: Simulation) -> float:
     """Smallest mass that the held point shows in any direction [kg]."""
     mechanism, q, port = simulation.system.mechanism, simulation.state.q, simulation.port
-    rotation, position = mechanism.placements(q)
-    point = position[port.hand_body] + rotation[port.hand_body] @ port.hand_point
-    jacobian = mechanism.point_jacobian(q, port.hand_body, point)
+    jacobian = mechanism.point_jacobian(q, port.hand_body, _held_point(simulation))
     mobility = jacobian @ np.linalg.solve(mechanism.mass_matrix(q), jacobian.T)
     return 1.0 / float(np.linalg.eigvalsh(mobility)[-1])

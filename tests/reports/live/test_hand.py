@@ -18,6 +18,7 @@ def test_it_brings_a_free_tool_to_the_target_with_less_than_its_limit(peg):
     simulation = peg(**FREE)
     hand = SpringHand(simulation)
     gaps, forces = [], []
+    assert hand.point() == pytest.approx([0.4, -0.4, 0.0])
     for _ in range(1500):
         simulation.port.wrench[:] = hand.wrench(TARGET)
         forces.append(simulation.port.wrench.copy())
