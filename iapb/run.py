@@ -53,9 +53,9 @@ class ImpactTable:
     energy_lost: Floats  # (k,) [J] kinetic energy before minus after
     scale: Floats  # (k,) factor by which the device limit scaled the impulse, 1 = not at all
     clamp: Floats  # (k,) factor of the final energy clamp, 1 = not active
-    friction_share: Floats  # (k,) factor by which friction was reduced so that no energy is gained, 1 = Coulomb's law
+    friction_share: Floats  # (k,) factor by which friction was reduced: no gain of energy, no cone left; 1 = not at all
     approaching: Integers  # (k,) rows that approach still afterwards, -1 = the law does not say
-    solved: NDArray[np.bool_]  # (k,) False: an iteration of the law ended early; the impact is passive all the same
+    solved: NDArray[np.bool_]  # (k,) False: the law is not met (friction reduced, no unequal e); passive all the same
 
 
 @dataclass(frozen=True)

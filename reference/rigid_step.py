@@ -10,7 +10,9 @@ One step of length dt from velocity v, with generalized force f and contact rows
     b_i = 0                 closed contact that does not; `stabilization` adds a share of −gap_i/dt where gap < 0
 
 Poisson's step adds e p to the contacts that approached, and solves once more with the same b: it has a solution where
-Newton's law has none (closed contacts that face each other, e > 0).
+Newton's law has none (closed contacts that face each other, e > 0). Each contact may have its own e_i. Over a step the
+contacts do the work ½ pᵀ(J v + J v⁺): not positive in Newton's step where all that push approached; where the e_i
+differ and it is positive, the step is Poisson's too.
 Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
 (1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
 """
@@ -60,7 +62,7 @@ def rigid_step(
     contact_jacobian: Floats,
     gap: Floats,
     gamma_minus: Floats,
-    restitution: float,
+    restitution: float | Floats,
     stabilization: float = 0.0,
     scheme: str = "automatic",
 ) -> RigidStep:
@@ -69,12 +71,13 @@ def rigid_step(
     Parameters
     ----------
     contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
-    restitution : e in [0, 1], one for all contacts
+    restitution : e in [0, 1], one for all contacts or (c,)
     stabilization : share in [0, 1] of an overlap that is removed in this step (0: none, as Moreau's step)
     scheme : "moreau" leaves open contacts alone; "stewart-trinkle" keeps them from passing, by Poisson's law where
-        e > 0; "automatic" is Stewart-Trinkle's step where e = 0 and Moreau's where e > 0
+        e > 0; "automatic" treats an open contact as Stewart-Trinkle's step where its e = 0 and as Moreau's where e > 0
 
-    Where Newton's law has no solution (closed contacts that face each other, e > 0) the step is Poisson's, and says so.
+    Where Newton's law has no solution (closed contacts that face each other, e > 0), or unequal e let it gain energy,
+    the step is Poisson's, and says so.
 
     Raises
     ------
@@ -83,17 +86,27 @@ def rigid_step(
     """
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
     v_free = velocity + dt * np.linalg.solve(mass_matrix, force)
-    poisson = scheme == "stewart-trinkle" and restitution > 0.0
+    poisson = scheme == "stewart-trinkle" and bool(np.any(np.greater(restitution, 0.0)))
     if not poisson:
         try:
-            return nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
+            newton = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
         except SolverError:
-            if restitution == 0.0 or np.count_nonzero(gap <= 0.0) < 2:
+            if not np.any(restitution) or np.count_nonzero(gap <= 0.0) < 2:
                 raise
+        else:
+            if np.unique(restitution).size <= 1 or not _gains(newton, contact_jacobian, gamma_minus):
+                return newton
     compression = velocity_bounds(gap, gamma_minus, 0.0, dt, 0.0 if not poisson else stabilization, scheme)
     compression = np.where(np.isfinite(bound), compression, -np.inf)
     returning = np.where(gamma_minus < 0.0, restitution, 0.0)
     return poisson_step(mass_matrix, v_free, contact_jacobian, compression, returning)
+
+
+def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats) -> bool:
+    """Whether the contacts did work ½ pᵀ(γ⁻ + γ⁺) above the rounding of its terms."""
+    gamma_plus = contact_jacobian @ step.velocity
+    size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_plus)))
+    return float(step.impulse @ (gamma_minus + gamma_plus)) > STEP_TOLERANCE * size
 
 
 def poisson_step(
@@ -124,19 +137,20 @@ def nearest_velocity(
 
 
 def velocity_bounds(
-    gap: Floats, gamma_minus: Floats, restitution: float, dt: float, stabilization: float = 0.0,
+    gap: Floats, gamma_minus: Floats, restitution: float | Floats, dt: float, stabilization: float = 0.0,
     scheme: str = "automatic",
 ) -> Floats:
-    """Return b (c,) of J v⁺ >= b [m/s]; −inf marks contacts that the step leaves out."""
-    if not 0.0 <= restitution <= 1.0:
-        raise ArgumentError("restitution", restitution, "a value in [0, 1]")
+    """Return b (c,) of J v⁺ >= b [m/s], e one or (c,); −inf marks contacts that the step leaves out."""
+    e = np.asarray(restitution, np.float64)
+    if not ((e >= 0.0) & (e <= 1.0)).all() or e.shape not in ((), gap.shape):
+        raise ArgumentError("restitution", restitution, "values in [0, 1], one for all or one for each contact")
     if not 0.0 <= stabilization <= 1.0:
         raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
     if scheme not in SCHEMES:
         raise ArgumentError("scheme", scheme, "one of " + ", ".join(SCHEMES))
-    may_close = scheme == "stewart-trinkle" or (scheme == "automatic" and restitution == 0.0)
-    when_open = -gap / dt if may_close else np.full_like(gap, -np.inf)
-    newton = 0.0 if scheme == "stewart-trinkle" else restitution
+    may_close = (scheme == "stewart-trinkle") | ((scheme == "automatic") & (e == 0.0))
+    when_open = np.where(may_close, -gap / dt, -np.inf)
+    newton = 0.0 if scheme == "stewart-trinkle" else e
     when_closed = newton * np.maximum(-gamma_minus, 0.0)
     push_out = stabilization * np.maximum(-gap, 0.0) / dt
     return np.where(gap > 0.0, when_open, np.maximum(when_closed, push_out))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iapb.contact.laws import StepResult
 from iapb.errors import ArgumentError
+from iapb.restitution import restitution_by_pair
 from iapb.run import COLLIDING, FREE, RESTING
 from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
 from reference.one_thread import one_thread
@@ -50,7 +51,8 @@ class RigidConstraints:
     scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
     friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient
 
-    Restitution is Newton's; Poisson's in "stewart-trinkle" with e > 0, and in steps where Newton's law has no solution.
+    Restitution is Newton's, of each pair as the scene says; Poisson's in "stewart-trinkle" with e > 0, and in steps
+    where Newton's law has no solution or, with unequal e and no friction, would gain energy.
     """
 
     margin: float = np.inf
@@ -103,7 +105,7 @@ class RigidConstraints:
     def _solve(
         self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float, found: ContactRows
     ) -> _Solved:
-        e, mu = system.scene.contact.restitution, 0.0 if self.friction == "none" else system.scene.contact.friction
+        e, mu = _restitution(system, found), 0.0 if self.friction == "none" else system.scene.contact.friction
         if mu == 0.0:
             step = rigid_step(
                 mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization, self.scheme
@@ -116,6 +118,16 @@ class RigidConstraints:
         velocity, normal, slip = friction_step(mass, v_free, found.jacobian, rows, bound, mu, relaxed)
         along, dragging = np.einsum("csx,cs->cx", tangents, slip), np.einsum("csd,cs->dc", rows, slip)
         return _Solved(velocity, normal, along, dragging)
+
+
+def _restitution(system: Any, found: ContactRows) -> float | Floats:
+    """e of all contacts, or of each (c,) where the pairs that can touch differ."""
+    values = system.restitutions
+    if len(values) <= 1:
+        return float(values[0]) if len(values) else float(system.scene.contact.restitution)
+    count = len(found.gap)
+    pairs = np.stack([found.geometry.shape_a[:count], found.geometry.shape_b[:count]], axis=1)
+    return restitution_by_pair(system.scene, pairs)
 
 
 def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:

@@ -90,9 +90,9 @@ IMPACTS = (
     Quantity("energy_lost", ("impact",), "J", "kinetic energy before minus after"),
     Quantity("scale", ("impact",), "1", "factor by which the device limit scaled the impulse"),
     Quantity("clamp", ("impact",), "1", "factor of the final energy clamp"),
-    Quantity("friction_share", ("impact",), "1", "factor by which friction was reduced so that no energy is gained"),
+    Quantity("friction_share", ("impact",), "1", "factor by which friction was reduced (energy, cones)"),
     Quantity("approaching", ("impact",), "1", "rows that approach still afterwards, -1 = the law does not say"),
-    Quantity("solved", ("impact",), "1", "0 where an iteration of the law ended early; passive all the same"),
+    Quantity("solved", ("impact",), "1", "0 where the law is not met (friction reduced); passive all the same"),
 )
 
 TIMINGS = (

@@ -8,6 +8,7 @@ from iapb.effects.question import (
     IMPACT_FRICTION,
     IMPULSES,
     NEWNESS,
+    OWN_RESTITUTION,
     PENALTY,
     Effect,
     Question,
@@ -64,8 +65,12 @@ def _restitution(question: Question) -> str:
 
 
 def unequal_restitution(question: Question) -> Effect:
-    """Poisson's law where contacts of one impact differ in restitution: a future extension in the paper."""
-    unused = question.unused(IMPULSES)
+    """Contacts of one impact that differ in restitution: a future extension in the paper.
+
+    The engine's impulses follow Poisson's law there; rigid constraints Newton's for each contact while that has a
+    solution that gains nothing, else Poisson's.
+    """
+    unused = question.unused(OWN_RESTITUTION)
     if unused is None and len(question.restitutions) == 1:
         unused = f"alike everywhere: {_restitution(question)}"
     reason = unused or f"pairs that can touch differ: {_restitution(question)}"

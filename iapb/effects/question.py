@@ -14,14 +14,14 @@ from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
 
 # What each law makes of a scene's contact section; a law that is not listed is taken to use all of it.
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
-IMPACT_FRICTION = "impact friction"
+IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
 LAW_USES = {
     "impulse-augmented penalty with impact friction": frozenset(
-        {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION}
+        {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION}
     ),
-    "impulse-augmented penalty": frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS}),
+    "impulse-augmented penalty": frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, OWN_RESTITUTION}),
     "penalty": frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS}),  # new contacts are marked in the record
-    "rigid constraints": frozenset[str](),
+    "rigid constraints": frozenset({OWN_RESTITUTION}),
 }
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,6 +111,55 @@ def test_stewart_trinkle_with_restitution_is_poisson_and_bounces_before_it_passe
     assert left_alone.velocity[0] == -1.0
 
 
+BAR, ENDS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, -0.5]])
+
+
+@pytest.mark.parametrize("e", [(1.0, 0.0), (0.3, 0.8), (0.5, 0.5)])
+def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
+    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law; equal e is the scalar's step."""
+    found = step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], np.array(e))
+    assert found.restitution_law == NEWTON
+    assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
+    if e[0] == e[1]:
+        assert np.array_equal(found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity)
+
+
+def test_unequal_restitution_that_would_gain_energy_steps_by_poisson() -> None:
+    """One end falls, the other rises slowly and is struck down: holding it at rest by Newton's law would pay for it."""
+    v, e = np.linalg.solve(ENDS, [-1.0, 0.1]), np.array([1.0, 0.0])
+    bound = velocity_bounds(np.zeros(2), ENDS @ v, e, DT)
+    newton = stepping.nearest_velocity(BAR, v, ENDS, bound).velocity
+    found = step(BAR, v, [0.0, 0.0], ENDS, [0.0, 0.0], e)
+    assert newton @ BAR @ newton > 1.01 * (v @ BAR @ v)  # what is avoided
+    assert found.restitution_law == POISSON
+    assert found.velocity @ BAR @ found.velocity <= (1.0 + 1e-14) * (v @ BAR @ v)
+    assert (ENDS @ found.velocity).min() >= -1e-14
+
+
+@given(st.integers(0, 10_000))
+def test_steps_with_unequal_restitution_never_gain(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    d, c = int(rng.integers(1, 7)), int(rng.integers(2, 7))
+    root, rows, v = rng.normal(size=(d, d)), rng.normal(size=(c, d)), rng.normal(size=d)
+    mass, e = root @ root.T + 0.1 * np.eye(d), rng.choice([0.0, 0.3, 1.0], size=c)
+    e[:2] = 0.0, 1.0
+    found = step(mass, v, np.zeros(d), rows, np.zeros(c), e)
+    assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
+    assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
+
+
+def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
+    gap, v = np.array([1e-4, 1e-4]), np.array([-1.0, -1.0])
+    found = rigid_step(np.eye(2), v, np.zeros(2), DT, np.eye(2), gap, v, np.array([0.0, 0.5]))
+    assert gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18) and found.velocity[1] == -1.0
+
+
+@pytest.mark.parametrize("e", [np.array([0.5]), np.array([0.5, 1.5]), -0.1])
+def test_a_wrong_restitution_is_named(e: Any) -> None:
+    with pytest.raises(ArgumentError, match="restitution"):
+        velocity_bounds(np.zeros(2), np.zeros(2), e, DT)
+
+
 def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = lambda rows, offset: np.full(len(offset), 0.123)  # noqa: E731
     monkeypatch.setattr(stepping.daqp_qp, "multipliers", wrong)
@@ -145,7 +195,7 @@ def peg_world(position, velocity, restitution=0.0):  # type: ignore[no-untyped-d
     contact = SimpleNamespace(restitution=restitution, approach_velocity=1e-6)
     system = SimpleNamespace(
         mechanism=mechanism, shapes=shapes, pairs=pairs, capacity=capacity, tool_tree=0,
-        gravity=np.zeros(3), scene=SimpleNamespace(contact=contact),
+        gravity=np.zeros(3), scene=SimpleNamespace(contact=contact), restitutions=np.array([restitution]),
     )  # fmt: skip
     log = SimpleNamespace(
         logged=np.zeros(1, int), group=np.zeros(1, int), rows=np.zeros(1, int), rank=np.zeros(1, int),

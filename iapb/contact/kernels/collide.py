@@ -83,17 +83,18 @@ def resolve_unequal(world, state, size, count, smallest):
 
 @kernel
 def add_friction_to_impact(world, state, size, count, rank):
-    """Friction on top of the normal impact; return (α, clamp, whether Coulomb's law was met)."""
+    """Friction on top of the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
     gather_tangents(world, state, size, count)
+    state.friction_work.coefficient[:count] = world.friction
     return add_impact_friction(
-        state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, world.friction,
-        rank, state.work, state.push_work, state.friction_work, state.row_impulse, state.group_v_plus[:size],
+        state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, rank,
+        state.work, state.push_work, state.friction_work, state.row_impulse, state.group_v_plus[:size],
         state.group_impulse[:size])
 
 
 @kernel
 def resolve_rows(world, state, size, count):
-    """(20)-(21), or what the scene and the law ask for beyond; return (rank, clamp, α of friction, solved)."""
+    """(20)-(21), or what the scene and the law ask for beyond; return (rank, clamp, share of friction, solved)."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
     if world.switches.unequal_restitution:

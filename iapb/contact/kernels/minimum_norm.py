@@ -25,7 +25,20 @@ def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, ta
     impulses : (≥c,) output [N s].
     tall : (≥rank, ≥c) scratch for Vᵀ.  triangle : (≥rank, ≥rank) scratch for T.  target : (≥rank,) scratch.
     """
-    d = change.shape[0]
+    minimum_norm_factors(rows, length, count, change.shape[0], basis, rank, tall, triangle)
+    for j in range(rank):
+        total = 0.0
+        for k in range(change.shape[0]):
+            total += basis[j, k] * change[k]
+        target[j] = total
+    for i in range(count):
+        impulses[i] = 0.0
+    add_minimum_norm(count, rank, target, tall, triangle, impulses)
+
+
+@kernel
+def minimum_norm_factors(rows, length, count, d, basis, rank, tall, triangle):
+    """B = A Qᵀ = V T: write Vᵀ into `tall` and T into `triangle`; a direction that no row reaches becomes zero."""
     for j in range(rank):
         for i in range(count):
             total = 0.0
@@ -53,15 +66,28 @@ def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, ta
         triangle[j, j] = math.sqrt(square) if reached else 0.0
         for i in range(count):
             tall[j, i] = tall[j, i] / triangle[j, j] if reached else 0.0
+
+
+@kernel
+def add_minimum_norm(count, rank, target, tall, triangle, impulses):
+    """impulses += V T⁻ᵀ target, the least change by which Bᵀ p grows by `target` (rank,), which is overwritten."""
     for j in range(rank):
-        total = 0.0
-        for k in range(d):
-            total += basis[j, k] * change[k]
+        total = target[j]
         for m in range(j):
             total -= triangle[m, j] * target[m]
         target[j] = total / triangle[j, j] if triangle[j, j] > 0.0 else 0.0
-    for i in range(count):
-        impulses[i] = 0.0
     for j in range(rank):
         for i in range(count):
             impulses[i] += tall[j, i] * target[j]
+
+
+@kernel
+def subtract_pushed(count, rank, impulses, tall, triangle, along, target):
+    """target (rank,) −= Bᵀ p = Tᵀ Vᵀ p; `along` (≥rank,) is scratch."""
+    for j in range(rank):
+        along[j] = 0.0
+        for i in range(count):
+            along[j] += tall[j, i] * impulses[i]
+    for j in range(rank):
+        for m in range(j + 1):
+            target[j] -= triangle[m, j] * along[m]
