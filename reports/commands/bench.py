@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED
-
 if TYPE_CHECKING:
     from rich.console import Console
 
     from reports.figures.figure import Numbers
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
-_WORDS = {REPRODUCED: "as asked for", LIMITED: "not as asked for", NOT_COMPUTED: "not measured"}
 
 
 def bench(
@@ -27,6 +24,7 @@ def bench(
     from reports.commands.progress import stage_progress
     from reports.evidence import accuracy
     from reports.evidence.haptic_rate import topic_of
+    from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED
     from verification.accuracy_time.study import haptic_study
 
     with stage_progress() as progress:
@@ -38,8 +36,9 @@ def bench(
             _print(console, name.capitalize(), numbers)
     if tables:
         _print(console, "What a microsecond buys", methods)
+    words = {REPRODUCED: "as asked for", LIMITED: "not as asked for", NOT_COMPUTED: "not measured"}
     for finding in topic.findings:
-        console.print(f"• {_WORDS[finding.outcome]}: {finding.sentence}", highlight=False, markup=False)
+        console.print(f"• {words[finding.outcome]}: {finding.sentence}", highlight=False, markup=False)
     console.print(_methods(methods), highlight=False, markup=False)
     if not tables:
         console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
