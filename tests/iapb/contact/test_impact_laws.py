@@ -126,3 +126,18 @@ def test_wrong_arguments_are_named(argument: str, change: dict[str, Any]) -> Non
 def test_no_contacts() -> None:
     found = resolve_frictional_impact(np.eye(2), [], [], [1.0, -1.0], 0.5, 0.3)
     assert np.array_equal(found.velocity, [1.0, -1.0]) and found.status == "complete"
+
+
+@pytest.mark.parametrize("power", [-40, 0, 40])
+def test_in_a_corner_friction_has_nothing_to_do_in_any_unit_of_mass(power: int) -> None:
+    """Where every tangent is the other contact's normal, what is left of it is rounding, however light the mass."""
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        root, v = rng.normal(size=(2, 2)), rng.normal(size=2)
+        M = root @ root.T + 0.1 * np.eye(2)
+        normals = np.linalg.qr(rng.normal(size=(2, 2)))[0]
+        M, T = 4.0**power * M, normals[::-1, None]
+        found = resolve_frictional_impact(M, normals, T, v, 0.3, 0.8)
+        plain = resolve_impact(M, normals, v, 0.3)
+        assert np.array_equal(found.velocity, plain.velocity)
+        assert np.array_equal(found.tangential_impulses, np.zeros((2, 1)))
