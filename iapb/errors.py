@@ -80,12 +80,12 @@ class Mistake:
 
 
 class SceneError(IapbError, ValueError):
-    """A scene file cannot be used; carries *all* of its mistakes."""
+    """A scene file cannot be used; carries *all* of its mistakes. A study file, too: `what` is its kind in words."""
 
-    def __init__(self, mistakes: list[Mistake]) -> None:
+    def __init__(self, mistakes: list[Mistake], what: str = "scene") -> None:
         self.mistakes = tuple(mistakes)
         count = len(self.mistakes)
-        head = "1 mistake in the scene" if count == 1 else f"{count} mistakes in the scene"
+        head = f"1 mistake in the {what}" if count == 1 else f"{count} mistakes in the {what}"
         lines = [f"  {mistake}" for mistake in self.mistakes[:_LISTED_MISTAKES]]
         lines += [f"  and {count - len(lines)} more"] if count > len(lines) else []
         super().__init__("\n".join([f"{head}:", *lines]))

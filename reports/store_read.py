@@ -34,7 +34,7 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
 
     path = Path(path)
     if not path.is_file():
-        raise RunFileError(f"{path}: no such file")
+        raise RunFileError(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
     check_seal(path)
     try:
         with h5py.File(path, "r") as file:

@@ -34,6 +34,8 @@ def compare(
 
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
+    for folder in problems or ():
+        _require_problems(folder)
     console = Console()
     if export is not None:
         console.print(f"{_export(export)} problems written to {export}", highlight=False)
@@ -50,6 +52,15 @@ def compare(
         console.print(table)
     for text in found:
         console.print(f"• {text}", highlight=False)
+
+
+def _require_problems(folder: Path) -> None:
+    from iapb.errors import ArgumentError
+    from reference.datasets import problem_files
+
+    if not problem_files(folder):
+        kinds = ".lcp, .lcp.gz, .dat, .txt, .hdf5, .h5"
+        raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
 
 
 def _export(folder: Path) -> int:

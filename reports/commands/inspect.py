@@ -10,7 +10,7 @@ import typer
 
 def inspect(
     file: Annotated[Path, typer.Argument(help="A run file (.h5, or .h5.partial of an interrupted run).")],
-    impacts: Annotated[int, typer.Option(help="How many impacts to list.")] = 10,
+    impacts: Annotated[int, typer.Option(min=0, help="How many impacts to list.")] = 10,
 ) -> None:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
     from reports.commands.run import describe

@@ -26,7 +26,7 @@ def live(
         help="module:factory of a device of your own (factory(scene) -> iapb.haptics.device.Device), or: simulated. "
              "Default: the device compiled into the loop.")] = "",
     view: Annotated[bool, typer.Option("--view", help="Show it in a browser, with the mouse as the hand.")] = False,
-    port: Annotated[int, typer.Option(help="Of the viewer's web page, on this machine only.")] = 8080,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Of the viewer's web page, on this machine only.")] = 8080,
     budget: Annotated[bool, typer.Option(help="Give impacts the rows that the time left allows, or all.")] = True,
     set_: Annotated[list[str] | None, typer.Option(
         "--set", help="Change a value, as in `iapb run`. Repeatable.")] = None,
@@ -93,20 +93,25 @@ def describe(pace: Pace, live: LiveRun) -> None:
 
 
 def _misses(pace: Pace) -> str:
-    from reports.commands.run import duration
+    from reports.commands.run import counted, duration
 
     if not pace.missed:
         return "No deadline was missed: simulated time is the clock's."
     share = 100.0 * pace.missed / pace.ticks
-    return (f"{pace.missed} deadlines were missed ({share:.3g} %). No step was left out: what came after was done "
-            f"that much later, and simulated time is {duration(pace.behind)} behind the clock.")
+    were = "was" if pace.missed == 1 else "were"
+    return (f"{counted(pace.missed, 'deadline')} {were} missed ({share:.3g} %). No step was left out: what came "
+            f"after was done that much later, and simulated time is {duration(pace.behind)} behind the clock.")
 
 
 def _rows(pace: Pace, live: LiveRun) -> str:
+    from reports.commands.run import counted
+
     if not pace.collisions:
         return "No collision was resolved by an impulse."
     least = int(live.timetable.budget[live.run.impacts.step].min())
-    if not pace.rows_left_out:
-        return f"{pace.collisions} collisions, each with all the rows it needed (the least budget was {least})."
-    return (f"{pace.collisions} collisions; the time left gave them {least} rows at the least, and "
-            f"{pace.rows_left_out} rows that still approached were left to the next steps.")
+    collisions, left_out = counted(pace.collisions, "collision"), pace.rows_left_out
+    if not left_out:
+        return f"{collisions}, each with all the rows it needed (the least budget was {least})."
+    were = "was" if left_out == 1 else "were"
+    return (f"{collisions}; the time left gave them {counted(least, 'row')} at the least, and "
+            f"{counted(left_out, 'row')} that still approached {were} left to the next steps.")

@@ -74,8 +74,8 @@ def describe(run: Run, existed: bool) -> None:
     impacts = run.impacts
     if len(impacts.step):
         lost = float(np.sum(impacts.energy_lost))
-        print(f"{_counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
-              f"{_counted(int(impacts.rows.max()), 'contact')} at once; {lost:.4g} J were lost in them.")
+        print(f"{counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
+              f"{counted(int(impacts.rows.max()), 'contact')} at once; {lost:.4g} J were lost in them.")
     else:
         print("No collision was resolved by an impulse.")
     if len(run.contacts.gap):
@@ -101,5 +101,6 @@ def duration(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} µs"
 
 
-def _counted(count: int, noun: str) -> str:
+def counted(count: int, noun: str) -> str:
+    """Say a number of things: "1 collision", "2 collisions"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

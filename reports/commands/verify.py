@@ -27,9 +27,12 @@ def verify(
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
     simulator: Annotated[list[str] | None, typer.Option(
         help="Instead, an engine on the fixed scenes: mujoco, drake, ... or all; may be repeated.")] = None,
-    scene: Annotated[list[str] | None, typer.Option(help="Only this fixed scene; may be repeated.")] = None,
+    scene: Annotated[list[str] | None, typer.Option(
+        help="With --simulator: only this fixed scene; may be repeated.")] = None,
 ) -> None:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
+    if scene and not simulator:
+        raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
     if simulator:
         from reports.commands.verify_simulator import verify_simulators
 

@@ -121,14 +121,14 @@ def study_from_text(text: str, file: str = "(text)") -> Study:
         root, repeated = read_document(text)
     except DocumentError as failure:
         mistake = Mistake(file, failure.line, failure.column, "(file)", failure.value, failure.expected)
-        raise SceneError([mistake]) from failure
+        raise SceneError([mistake], "study") from failure
     mistakes = [Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated]
     try:
         study = Study.model_validate(root.value)
     except ValidationError as failure:
-        raise SceneError(mistakes + mistakes_of(failure, file, root)) from failure
+        raise SceneError(mistakes + mistakes_of(failure, file, root), "study") from failure
     if study.size > MAX_POINTS:
         mistakes.append(Mistake(file, 1, 1, "(file)", f"{study.size} points", f"at most {MAX_POINTS}"))
     if mistakes:
-        raise SceneError(mistakes)
+        raise SceneError(mistakes, "study")
     return study

@@ -46,7 +46,10 @@ def test_every_command_explains_itself(command, iapb):
     assert status == 0 and "Usage" in out
 
 
-@pytest.mark.parametrize("arguments", [["walk"], ["run"], ["run", "peg_corner", "--speed", "3"], ["inspect"], []])
+@pytest.mark.parametrize("arguments", [["walk"], ["run"], ["run", "peg_corner", "--speed", "3"], ["inspect"], [],
+                                       ["verify", "--scene", "elastic_cradle"],
+                                       ["inspect", "run.h5", "--impacts", "-3"],
+                                       ["live", "peg_corner", "--view", "--port", "99999999"]])
 def test_wrong_usage_ends_with_2_and_says_what_is_wrong(arguments, iapb):
     status, out, err = iapb(*arguments)
     assert status == 2
@@ -146,6 +149,8 @@ def test_debug_shows_the_traceback(tmp_path):
         (["run", "peg_corner", "--set", "contact.frictoin=1"], "frictoin"),
         (["run", "peg_corner", "--set", "contact.friction=[1"], "--set"),
         (["inspect", "no_such_file.h5"], "no_such_file.h5: no such file"),
+        (["inspect", "."], ".: a folder, not a file"),
+        (["compare", "--only-problems", "--problems", "."], "a folder with problem files"),
         (["prove", "no_such_statement"], "no_such_statement"),
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),

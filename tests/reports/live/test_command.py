@@ -24,7 +24,7 @@ def live(capsys, tmp_path):
 def test_it_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(live, tmp_path, device):
     status, out, _ = live("--seconds", "0.1", "--set", "bodies.peg.velocity=[-0.3,0.4,0]", *device)
     assert status == 0
-    for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "collisions"):
+    for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "collision"):
         assert text in out, text
     timetable, path = sorted(tmp_path.glob("*.h5"), key=lambda path: "timetable" not in path.name)
     assert str(path) in out and str(timetable) in out
