@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from typing import Any
 
@@ -37,15 +38,28 @@ def _before(debug: bool = typer.Option(False, "--debug", help="Show the tracebac
 def _register(name: str) -> None:
     module = import_module(f"reports.commands.{name}")
     command: Callable[..., Any] = getattr(module, name)
-    app.command(name)(command)
+    app.command(name)(_abortable(command))
+
+
+def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Turn Ctrl-C into Abort, which typer hands on to `main`; by itself it would end with 130 and say nothing."""
+
+    @wraps(command)
+    def call(*arguments: Any, **options: Any) -> Any:
+        try:
+            return command(*arguments, **options)
+        except KeyboardInterrupt:
+            raise typer.Abort from None
+
+    return call
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
-    for name in COMMANDS:
-        if name not in {command.name for command in app.registered_commands}:
-            _register(name)
     try:
+        for name in COMMANDS:
+            if name not in {command.name for command in app.registered_commands}:
+                _register(name)
         status = app(args=arguments, standalone_mode=False)
     except KeyboardInterrupt:
         print("iapb: stopped; what was finished is kept.", file=sys.stderr)

@@ -193,6 +193,15 @@ def test_prove_prints_one_proof(iapb):
     assert status == 0 and "proved" in out
 
 
+def test_ctrl_c_outside_a_run_is_told_and_ends_with_130(iapb, monkeypatch):
+    def stopped(**options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("iapb.scene.scene_schema", stopped)
+    status, _, err = iapb("schema")
+    assert status == 130 and err == "iapb: stopped; what was finished is kept.\n"
+
+
 def test_a_fault_of_ours_is_not_hidden(monkeypatch):
     def broken(**options):
         raise ZeroDivisionError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from iapb.errors import ArgumentError
 from verification.hard_cases.case import AnyCase, CaseAbsent, HardCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge_impact import METHODS, judge_impact
@@ -28,9 +29,18 @@ def judge_hard_cases(
     -------
     tuple of HardCaseVerdict
         one for each pair of case and method: the verdict in a word, and the numbers that it follows from.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such case.
     """
     wanted = None if methods is None else tuple(methods)
-    found = (verdict for name in (HARD_CASES if cases is None else cases) for verdict in _of(name, wanted, simulate))
+    names = tuple(HARD_CASES if cases is None else cases)
+    for name in names:
+        if name not in HARD_CASES:
+            raise ArgumentError("cases", name, f"one of {', '.join(HARD_CASES)}")
+    found = (verdict for name in names for verdict in _of(name, wanted, simulate))
     with one_thread():
         return tuple(found)
 
