@@ -67,13 +67,20 @@ def main(arguments: list[str] | None = None) -> int:
     except (IapbError, OSError) as error:
         if _Options.debug:
             raise
-        print(f"iapb: {error}", file=sys.stderr)
+        print(f"iapb: {_sentence(error)}", file=sys.stderr)
         status = 1
     except Exception as error:
         status = _usage(error)
     if arguments is None:
         sys.exit(status or 0)
     return status or 0
+
+
+def _sentence(error: IapbError | OSError) -> str:
+    """What went wrong; an error of the system as "file: why", without its number."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
 
 
 def _usage(error: Exception) -> int:

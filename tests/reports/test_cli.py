@@ -151,6 +151,7 @@ def test_debug_shows_the_traceback(tmp_path):
         (["inspect", "no_such_file.h5"], "no_such_file.h5: no such file"),
         (["inspect", "."], ".: a folder, not a file"),
         (["compare", "--only-problems", "--problems", "."], "a folder with problem files"),
+        (["compare", "--export", "/dev/null/folder"], "iapb: /dev/null/folder: Not a directory"),
         (["prove", "no_such_statement"], "no_such_statement"),
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),
