@@ -109,6 +109,7 @@ REFUSED: list[tuple[str, list[Any]]] = [
     ("device.delay", [-1, 1001, 1.0, "1", None, True]),
     ("device.position_resolution", NOT_A_PAIR_OF_GAINS),
     ("device.damping", NOT_A_PAIR_OF_GAINS),
+    ("device.waveform", ["bell", "", "Step", 0, None, True]),
     ("couplings.four_channel.stiffness", NOT_A_PAIR_OF_GAINS),
     ("couplings.four_channel.damping", NOT_A_PAIR_OF_GAINS),
     ("couplings.unilateral.stiffness", NOT_A_PAIR_OF_GAINS),
