@@ -21,9 +21,10 @@ def inspect(
     print("Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}.")
     if impacts and len(run.impacts.step):
         _list_impacts(run, impacts)
-    print("\nEnergy at the end [J] (iapb.mechanics.energy):")
-    for name, values in run.energy.items():
-        print(f"  {name:<22}{values[-1]: .6e}")
+    if run.steps:  # a run can be stopped before its first step is done
+        print("\nEnergy at the end [J] (iapb.mechanics.energy):")
+        for name, values in run.energy.items():
+            print(f"  {name:<22}{values[-1]: .6e}")
     print("\nEffects that were on:")
     for effect in run.effects:
         if effect.active:
