@@ -67,6 +67,18 @@ def test_near_pairs_are_those_whose_bounding_spheres_meet_in_the_order_of_the_ca
         assert broad.pairs[:count].tolist() == expected
 
 
+def test_a_margin_widens_the_reach_of_every_pair() -> None:
+    """Two discs along many directions, a hair nearer and a hair farther than radii and margin."""
+    shapes, margin = make_shapes([Circle(0.05, body=0), Circle(0.05, body=1)]), 0.04
+    broad: Any = block(make_broad_phase(shapes, candidate_pairs(shapes)))
+    rng = np.random.default_rng(5)
+    for angle in rng.uniform(-math.pi, math.pi, 50):
+        direction, start = np.array([math.cos(angle), math.sin(angle), 0.0]), np.append(rng.uniform(-1, 1, 2), 0.0)
+        for share, near in ((1.0 - 1e-9, 1), (1.0 + 1e-9, 0)):
+            p = np.array([start, start + share * (0.1 + margin) * direction])
+            assert near_pairs(broad, np.tile(np.eye(3), (2, 1, 1)), p, margin) == near
+
+
 def test_too_many_pairs_are_reported_not_dropped() -> None:
     shapes = planar_shapes(np.random.default_rng(0), 10)
     made = make_broad_phase(shapes, candidate_pairs(shapes))

@@ -222,3 +222,33 @@ def test_boxes_apart_in_all_three_directions_meet_between_their_corners(sides: t
     low, high = np.minimum(corner_a, corner_b) - 1e-15, np.maximum(corner_a, corner_b) + 1e-15
     assert np.all((low <= found.point) & (found.point <= high))
     assert found.point[0, 0] == pytest.approx(0.5 * (corner_a + corner_b)[0])
+
+
+@pytest.mark.parametrize("small_first", [False, True])
+@pytest.mark.parametrize("turn", [0.0, 0.4, -1.1])
+def test_a_small_face_within_a_large_one_touches_at_its_own_corners(small_first: bool, turn: float) -> None:
+    small, large, depth = np.array([0.05, 0.08, 0.1]), np.array([0.4, 0.5, 0.2]), 1e-3
+    cos, sin = np.cos(turn), np.sin(turn)
+    yaw = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    R, p = random_pose(np.random.default_rng(6), 1.0)
+    above = (R @ yaw, p + R @ [0.07, -0.11, 0.5 * (small[2] + large[2]) - depth])
+    pair: list[Any] = [(small, above), (large, (R, p))]
+    pair = pair if small_first else pair[::-1]
+    found = contacts_of([SpatialBox(size, body=k) for k, (size, _) in enumerate(pair)], [pose for _, pose in pair])
+    local = (found.point - above[1]) @ above[0]
+    order = np.lexsort(local.T[:2].round(6))
+    corners = np.array([[-0.025, -0.04], [0.025, -0.04], [-0.025, 0.04], [0.025, 0.04]])
+    np.testing.assert_allclose(local[order, :2], corners, atol=1e-12)
+    np.testing.assert_allclose(found.gap, -depth, atol=1e-12)
+
+
+def test_a_sphere_leaves_a_box_through_the_nearest_face_and_each_face_is_a_feature_of_its_own() -> None:
+    shapes: list[SpatialShape] = [Sphere(0.05, body=0), SpatialBox([0.4, 0.4, 0.4])]
+    features = set()
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            found = contacts_of(shapes, [(np.eye(3), side * 0.15 * np.eye(3)[axis])])
+            np.testing.assert_allclose(found.normal, side * np.eye(3)[[axis]], atol=1e-15)
+            assert found.gap == pytest.approx([-0.1])
+            features.add(int(found.feature[0]))
+    assert len(features) == 6

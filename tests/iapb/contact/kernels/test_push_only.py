@@ -60,3 +60,15 @@ def test_opposed_contacts_hold_a_body_still() -> None:
     p, residual = np.zeros(2), np.zeros(2)
     assert push_only(columns, 2, np.array([-2.0, 3.0]), p, residual, make_push_work(2, 2))
     assert np.array_equal(residual, [0.0, 3.0]) and np.array_equal(p, [2.0, 0.0])
+
+
+def test_the_impulses_grow_with_the_speeds_bit_for_bit() -> None:
+    """A power of two changes no rounding: what counts as closing is a share of the speed, not a speed."""
+    columns, b = unit_columns_of(3, 5, 8), np.random.default_rng(4).normal(size=5)
+    found = []
+    for factor in (1.0, 2.0**-80, 2.0**80):
+        p, residual = np.zeros(8), np.zeros(5)
+        assert push_only(columns, 8, factor * b, p, residual, make_push_work(5, 8))
+        found.append(np.concatenate([p, residual]) / factor)
+    assert np.any(found[0][:8] > 0.0)
+    np.testing.assert_array_equal(found[1:], found[:1] * 2)
