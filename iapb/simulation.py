@@ -206,7 +206,7 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
             stop = recording.chunk(total)
             if progress is not None:
                 progress(recording.steps, total)
-            if checkpoint is not None and recording.steps < total and checkpoint.due:
+            if checkpoint is not None and stop is None and recording.steps < total and checkpoint.due:
                 checkpoint(recording.run(world, "not finished when this was written"))
     except KeyboardInterrupt as interrupt:
         stop = interrupt
