@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from verification.properties.bounds import KIT
+from iapb import resolve_impact
+from verification.properties.bounds import FACTORED, KIT
 from verification.properties.campaign import (
     IMPACTS,
     OF_ONE_CALL,
@@ -105,3 +106,19 @@ def test_the_worst_is_the_one_furthest_above_its_tolerance() -> None:
     assert kept == [True, False, False]
     count = running.count("any")
     assert (count.checked, count.failures) == (3, 2) and count.worst is not None and np.isnan(count.worst.value)
+
+
+@pytest.mark.parametrize("index", [41452, 57210])
+def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(index: int) -> None:
+    """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than rounding does."""
+    engine = Subject(resolve_impact, FACTORED, 1e10)
+    case = drawn(UNEQUAL, index, engine)
+    law = UNEQUAL_LAWS["unequal_momentum"].check
+    residual = law(case, resolve_impact, FACTORED)
+    assert residual is not None and residual.passed and 2.0 * np.sqrt(FACTORED.energy_gain(case)) < 1e-5
+
+    def per_body(M: Floats, J: Floats, v: Floats, e: Floats) -> object:
+        return resolve_impact(M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, np.concatenate([e, e]))
+
+    broken = law(case, per_body, FACTORED)
+    assert broken is not None and not broken.passed
