@@ -49,8 +49,8 @@ def sentences(judged: Sequence[Judgement], table: list[Explanation], places: int
     lines += [
         "",
         f"{share:.1%} of {count} mutants were noticed ({too_long} of them because a test did not end).",
-        f"For a sample that no test was written for, that puts the share among all {places} that could be drawn between "
-        f"{low:.0%} and {high:.0%} (95 % confidence); another seed draws another sample.",
+        f"For a sample that no test was written for, that puts the share among all {places} that could be drawn "
+        f"between {low:.0%} and {high:.0%} (95 % confidence); another seed draws another sample.",
         f"Without the {equivalent} survivors that change nothing it is {(count * share) / (count - equivalent):.1%}; "
         f"{open_ones} of {len(survivors(judged))} survivors have no explanation.",
     ]
