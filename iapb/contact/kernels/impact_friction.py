@@ -42,9 +42,12 @@ class FrictionWork(NamedTuple):
 def make_friction_work(coordinates: int, contacts: int, tangents: int) -> FrictionWork:
     """Allocate the scratch for up to `contacts` contacts with `tangents` directions each."""
     d, c, m = coordinates, contacts, tangents
+    per_contact = {name: np.zeros(c) for name in (
+        "inertia", "coefficient", "radius", "before", "sliding", "without", "wanted")}
+    per_coordinate = {name: np.zeros(d) for name in ("target", "left", "moved")}
     return FrictionWork(
-        np.zeros((c * m, d)), np.zeros((c * m, d)), np.zeros(c * m), np.zeros(c * m),
-        *(np.zeros(c) for _ in range(7)), *(np.zeros(d) for _ in range(3)), velocity=np.zeros(m),
+        free=np.zeros((c * m, d)), normal_part=np.zeros((c * m, d)), slip=np.zeros(c * m), p=np.zeros(c * m),
+        velocity=np.zeros(m), **per_contact, **per_coordinate,
     )  # fmt: skip
 
 
