@@ -226,12 +226,15 @@ def test_boxes_apart_in_all_three_directions_meet_between_their_corners(sides: t
 
 @pytest.mark.parametrize("small_first", [False, True])
 @pytest.mark.parametrize("turn", [0.0, 0.4, -1.1])
-def test_a_small_face_within_a_large_one_touches_at_its_own_corners(small_first: bool, turn: float) -> None:
+@pytest.mark.parametrize("place", [(0.07, -0.11), (0.14, 0.2), (-0.14, 0.2), (0.14, -0.2)])
+def test_a_small_face_within_a_large_one_touches_at_its_own_corners(
+    small_first: bool, turn: float, place: tuple[float, float]
+) -> None:
     small, large, depth = np.array([0.05, 0.08, 0.1]), np.array([0.4, 0.5, 0.2]), 1e-3
     cos, sin = np.cos(turn), np.sin(turn)
     yaw = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     R, p = random_pose(np.random.default_rng(6), 1.0)
-    above = (R @ yaw, p + R @ [0.07, -0.11, 0.5 * (small[2] + large[2]) - depth])
+    above = (R @ yaw, p + R @ [*place, 0.5 * (small[2] + large[2]) - depth])
     pair: list[Any] = [(small, above), (large, (R, p))]
     pair = pair if small_first else pair[::-1]
     found = contacts_of([SpatialBox(size, body=k) for k, (size, _) in enumerate(pair)], [pose for _, pose in pair])
