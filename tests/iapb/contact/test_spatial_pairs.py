@@ -225,15 +225,17 @@ def test_boxes_apart_in_all_three_directions_meet_between_their_corners(sides: t
 
 
 @pytest.mark.parametrize("small_first", [False, True])
+@pytest.mark.parametrize("tilted", [False, True])
 @pytest.mark.parametrize("turn", [0.0, 0.4, -1.1])
 @pytest.mark.parametrize("place", [(0.07, -0.11), (0.14, 0.2), (-0.14, 0.2), (0.14, -0.2)])
 def test_a_small_face_within_a_large_one_touches_at_its_own_corners(
-    small_first: bool, turn: float, place: tuple[float, float]
+    small_first: bool, turn: float, place: tuple[float, float], tilted: bool
 ) -> None:
-    small, large, depth = np.array([0.05, 0.08, 0.1]), np.array([0.4, 0.5, 0.2]), 1e-3
+    """Upright and with binary heights both faces separate alike to the bit: then the first box clips the other."""
+    small, large, depth = np.array([0.05, 0.08, 0.125]), np.array([0.4, 0.5, 0.25]), 2.0**-10
     cos, sin = np.cos(turn), np.sin(turn)
     yaw = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    R, p = random_pose(np.random.default_rng(6), 1.0)
+    R, p = random_pose(np.random.default_rng(6), 1.0) if tilted else (np.eye(3), np.zeros(3))
     above = (R @ yaw, p + R @ [*place, 0.5 * (small[2] + large[2]) - depth])
     pair: list[Any] = [(small, above), (large, (R, p))]
     pair = pair if small_first else pair[::-1]
