@@ -56,6 +56,7 @@ def _slide(free, slip, radius, inertia, p, moved, velocity, first):
     size = velocity.shape[0]
     for a in range(size):
         velocity[a] = slip[first + a] + along(free[first + a], moved)
+    fastest = math.sqrt(along(velocity, velocity))
     if not _stops(free, radius, p, velocity, first):
         square = 0.0
         for a in range(size):
@@ -65,10 +66,11 @@ def _slide(free, slip, radius, inertia, p, moved, velocity, first):
         share = radius / length if length > radius else 1.0
         for a in range(size):
             velocity[a] *= share
-    fastest = 0.0
+        fastest = 0.0
+        for a in range(size):
+            fastest = max(fastest, inertia * abs(velocity[a] - p[first + a]))
     for a in range(size):
         change = velocity[a] - p[first + a]
-        fastest = max(fastest, inertia * abs(change))
         p[first + a] += change
         for k in range(moved.shape[0]):
             moved[k] += change * free[first + a, k]

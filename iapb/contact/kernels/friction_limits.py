@@ -20,6 +20,8 @@ from iapb.contact.kernels.unilateral import push_only
 ROUNDS = 200
 UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way only, then a fifth: large μ can make them swing
 HALF, FIFTH = 0.5, 0.2
+STRIDE = 10.0  # times its change that a limit may move at once where friction loads its own contact, μ ∂p_n/∂p_t → 1
+AT_LIMIT = 0.99  # of a limit: what is below it sticks, or will
 # Of the speeds that a slip is summed from: a round that moves less is the last one. Some thousand roundings.
 STILL = 1e-12
 # Coulomb's law counts as met to this, as restitution does: two rows that differ by less count as one (RANK_TOLERANCE).
@@ -85,6 +87,7 @@ def _start(count, rank, work, push, f, d):
     minimum_norm_factors(work.rows, work.length, count, d, work.basis, rank, work.columns, push.triangle)
     for j in range(rank):
         f.target[j] = along(work.basis[j], change)
+    _responses(count, rank, work, push, f)
     if not pushes:
         _least_norm_start(count, rank, work, push, f)
         return False
@@ -94,6 +97,29 @@ def _start(count, rank, work, push, f, d):
         f.sliding[i], f.radius[i] = f.coefficient[i], 0.0
     _spread(count, rank, work, push, f)
     return True
+
+
+@kernel
+def _responses(count, rank, work, push, f):
+    """∂p_n,i / ∂p_t,i of each tangent: what a contact's own friction adds to its limit."""
+    size = f.velocity.shape[0]
+    for j in range(count * size):
+        for i in range(rank):
+            f.left[i] = -f.normal_part[j, i]
+        f.wanted[:count] = 0.0
+        add_minimum_norm(count, rank, f.left, work.columns, push.triangle, f.wanted)
+        f.response[j] = f.wanted[j // size]
+
+
+@kernel
+def _stride(f, i, size):
+    """Factor 1/(1 − μ ∂p_n/∂p_t) of a limit's change that settles a sliding contact by itself: Newton's step."""
+    own = f.p[i * size : (i + 1) * size]
+    length = math.sqrt(along(own, own))
+    if length == 0.0 or length < AT_LIMIT * f.radius[i]:
+        return 1.0
+    gain = f.sliding[i] * along(f.response[i * size : (i + 1) * size], own) / length
+    return 1.0 / max(1.0 - gain, 1.0 / STRIDE)
 
 
 @kernel
@@ -144,11 +170,11 @@ def _settle(count, rank, work, push, f, d, scale, pushes):
         defect = _move_normals(count, rank, work, push, f, pushes)
         step = 1.0 if done < UNDAMPED else (HALF if done < HALVED else FIFTH)
         for i in range(count):
-            f.before[i] = f.radius[i]
             if pushes:
                 f.wanted[i] = max(f.wanted[i], 0.0)
-            f.radius[i] += step * (f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i])
-        moved = _sweep_tangents(f, count, size, d, step, STILL * scale)
+            f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i]
+            f.radius[i] = max(0.0, f.radius[i] + step * _stride(f, i, size) * f.change[i])
+        moved = _sweep_tangents(f, count, size, d, STILL * scale)
         if speed > 0.0:
             moved = max(moved, scale * (defect / speed))
         if moved <= STILL * scale:
@@ -157,10 +183,10 @@ def _settle(count, rank, work, push, f, d, scale, pushes):
 
 
 @kernel
-def _sweep_tangents(f, count, size, d, step, still):
+def _sweep_tangents(f, count, size, d, still):
     """Sweep p_t; return the largest velocity [m/s] that the first sweep, or a limit that holds p_t, moved.
 
-    A limit counts by how far it has to move yet, its damped `step` undone.
+    A limit counts by the whole change that it was to make, damped or not.
     """
     p, rows, radius = f.p[: count * size], f.free[: count * size, :d], f.radius[:count]
     moved = friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, 1, 0.0)
@@ -168,9 +194,9 @@ def _sweep_tangents(f, count, size, d, step, still):
         friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, SWEEPS - 1, SETTLED * moved)
     for i in range(count):
         own = p[i * size : (i + 1) * size]
-        length, change = math.sqrt(along(own, own)), abs(radius[i] - f.before[i])
-        if length >= radius[i] - change:
-            moved = max(moved, f.inertia[i] * min(change / step, length))
+        length, change = math.sqrt(along(own, own)), abs(f.change[i])
+        if length >= radius[i] - STRIDE * change:
+            moved = max(moved, f.inertia[i] * min(change, length))
     return moved
 
 

@@ -27,9 +27,10 @@ class FrictionWork(NamedTuple):
     slip: np.ndarray  # (c m,) tangential velocity after the normal impact [m/s]
     p: np.ndarray  # (c m,) tangential impulses [N s]
     inertia: np.ndarray  # (c,) ‖B_i B_iᵀ‖ [1/kg]
+    response: np.ndarray  # (c m,) ∂p_n,i / ∂p_t,i by least norm: how friction at a contact loads or relieves it
     coefficient: np.ndarray  # (c,) μ
     radius: np.ndarray  # (c,) Coulomb's limit μ p_n [N s]
-    before: np.ndarray  # (c,) the limits of the round before
+    change: np.ndarray  # (c,) what a round finds the limits off by
     sliding: np.ndarray  # (c,) μ, 0 where the contact pulls without friction
     without: np.ndarray  # (c,) normal impulses without friction [N s]
     wanted: np.ndarray  # (c,) normal impulses with it
@@ -43,11 +44,11 @@ def make_friction_work(coordinates: int, contacts: int, tangents: int) -> Fricti
     """Allocate the scratch for up to `contacts` contacts with `tangents` directions each."""
     d, c, m = coordinates, contacts, tangents
     per_contact = {name: np.zeros(c) for name in (
-        "inertia", "coefficient", "radius", "before", "sliding", "without", "wanted")}
+        "inertia", "coefficient", "radius", "change", "sliding", "without", "wanted")}
     per_coordinate = {name: np.zeros(d) for name in ("target", "left", "moved")}
     return FrictionWork(
         free=np.zeros((c * m, d)), normal_part=np.zeros((c * m, d)), slip=np.zeros(c * m), p=np.zeros(c * m),
-        velocity=np.zeros(m), **per_contact, **per_coordinate,
+        response=np.zeros(c * m), velocity=np.zeros(m), **per_contact, **per_coordinate,
     )  # fmt: skip
 
 

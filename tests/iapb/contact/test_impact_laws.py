@@ -82,6 +82,18 @@ def test_a_lever_that_sticks_takes_few_sweeps() -> None:
     assert jacobian @ found.velocity == pytest.approx([0.0, 0.0, 0.0], abs=1e-10)
 
 
+def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
+    """A planar contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds near by a tenth."""
+    jacobian = np.array([[1.0, 0.0, 0.9], [0.0, 1.0, 1.0]])  # x and y of the point; turning couples them
+    M, v = np.diag([1.0, 1.0, 1.0 / 2.0]), [50.0, -1.0, 0.0]
+    coupling = (jacobian @ np.linalg.solve(M, jacobian.T))[0, 1] / (jacobian @ np.linalg.solve(M, jacobian.T))[1, 1]
+    found = resolve_frictional_impact(M, jacobian[1:], jacobian[:1], v, 0.0, 0.9 / coupling)
+    assert found.status == "complete" and found.friction_share == 1.0
+    p, p_t = found.impulses[0], found.tangential_impulses[0, 0]
+    assert p_t == pytest.approx(-0.9 / coupling * p, rel=1e-9)
+    assert (jacobian @ found.velocity)[1] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_where_limits_never_settle_friction_is_reduced_and_says_so() -> None:
     """Random strong couplings, μ up to 2: few have no solution that is found; these keep cones, energy, restitution."""
     impacts = [drawn(seed) for seed in range(60)]
