@@ -65,9 +65,8 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
 
 def _run(point: Point, folder: Path) -> tuple[Run, Path]:
     """The run of a point and its file; BLAS on one thread, or the sums would depend on the machine's cores."""
-    from threadpoolctl import threadpool_limits
-
     from iapb.simulation import simulate
+    from reference.one_thread import one_thread
     from reference.worlds import find_world, require_complete
     from reports.store_read import read_run
     from reports.store_write import write_run
@@ -82,7 +81,7 @@ def _run(point: Point, folder: Path) -> tuple[Run, Path]:
     path = folder / f"{scene.name}-{point.world}-{key[:16]}.h5"
     if path.is_file():
         return read_run(path), path
-    with threadpool_limits(limits=1):
+    with one_thread():
         run = require_complete(simulate(scene, law, coupling, world=point.world))
     write_run(path, run, key=key)
     return run, path

@@ -55,36 +55,36 @@ class Constant(NumberReplacer):
         yield from positions[:1] if positions and _is_first_length(node) else positions
 
 
-class AugmentedSign(Operator):
-    """`a += b` becomes `a -= b`, and the other way round; `*=` and `/=` likewise."""
+class _OtherToken(Operator):
+    """One token for another: `_OTHER` says which, `_KIND` which sort of token, the docstring of each child why."""
 
-    _OTHER = {"+=": "-=", "-=": "+=", "*=": "/=", "/=": "*="}
+    _KIND: type = Leaf
+    _OTHER: dict[str, str] = {}
 
     def mutation_positions(self, node: Any) -> Iterator[Any]:
-        if isinstance(node, Leaf) and node.value in self._OTHER:
+        if isinstance(node, self._KIND) and node.value in self._OTHER:
             yield node.start_pos, node.end_pos
 
     def mutate(self, node: Any, index: int) -> Any:
         node.value = self._OTHER[node.value]
         return node
+
+
+class AugmentedSign(_OtherToken):
+    """`a += b` becomes `a -= b`, and the other way round; `*=` and `/=` likewise."""
+
+    _OTHER = {"+=": "-=", "-=": "+=", "*=": "/=", "/=": "*="}
 
     @classmethod
     def examples(cls) -> tuple[Example, ...]:
         return (Example("a += b", "a -= b"),)
 
 
-class OtherExtreme(Operator):
+class OtherExtreme(_OtherToken):
     """`min` becomes `max`, and the other way round."""
 
+    _KIND = Name
     _OTHER = {"min": "max", "max": "min"}
-
-    def mutation_positions(self, node: Any) -> Iterator[Any]:
-        if isinstance(node, Name) and node.value in self._OTHER:
-            yield node.start_pos, node.end_pos
-
-    def mutate(self, node: Any, index: int) -> Any:
-        node.value = self._OTHER[node.value]
-        return node
 
     @classmethod
     def examples(cls) -> tuple[Example, ...]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference.one_thread import one_thread
 from verification.accuracy_time.kernels import Floats, factored_loop, printed_impact, random_impact
-from verification.threads import one_thread
 
 DEADLINE = 1e-3  # [s] the haptic rate of 1 kHz
 CALLS, ALLOWED = 1000, 1  # calls of one trial, and how many of them may be late: 99.9 % are in time

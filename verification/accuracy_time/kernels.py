@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.one_thread import one_thread
 from verification.accuracy_time.measure import Quartiles
-from verification.threads import one_thread
 
 Floats = NDArray[Any]
 

@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 
 from iapb.errors import IapbError
+from reference.one_thread import one_thread
 from verification.accuracy_time.methods import METHODS
 from verification.accuracy_time.problems import Floats, TimedProblem, timed_problems
-from verification.threads import one_thread
 
 ROUNDS = 30
 _ENOUGH = 0.5  # seconds spent on one method of one problem; slow methods get fewer rounds, never less than three

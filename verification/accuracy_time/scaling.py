@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference.one_thread import one_thread
 from verification.accuracy_time.kernels import factored_loop, printed_impact, quartiles, random_impact
 from verification.accuracy_time.measure import Quartiles
-from verification.threads import one_thread
 
 CONTACTS = (50, 100, 200, 500, 1000, 2000, 5000)  # at d = 12
 COORDINATES = (3, 6, 12, 24, 48, 96)  # with 60 contacts

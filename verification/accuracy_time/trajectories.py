@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import IapbError, MissingDependencyError
+from reference.one_thread import one_thread
 from reference.simulators import FixedScene, Settings, Trajectory, find_simulator
 from reference.simulators.scene import rotation
 from reference.simulators.trajectory import steps_between_samples
 from verification.accuracy_time.trajectory_scenes import TRAJECTORY_SCENES
-from verification.threads import one_thread
 
 Floats = NDArray[np.float64]
 

@@ -109,11 +109,10 @@ def study_read(
     longest: float = np.inf, progress: Progress | None = None,
 ) -> ProblemStudy:
     """Solve every problem of a collection called `name` by every solver that takes its kind."""
-    from threadpoolctl import threadpool_limits
-
     from reference.complementarity.benchmark import run_solvers
+    from reference.one_thread import one_thread
 
-    with threadpool_limits(1):
+    with one_thread():
         _warm(problems)
         small_first = sorted((stored.problem for stored in problems), key=lambda problem: problem.size)
         done = 0

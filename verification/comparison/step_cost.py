@@ -112,14 +112,14 @@ def impact_cost(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[CostRow, ...]:
     """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
-    from threadpoolctl import threadpool_limits
+    from reference.one_thread import one_thread
 
     rows: list[CostRow] = []
     too_slow: dict[tuple[str, str], float] = {}
     for done, count in enumerate(contacts):
         for make in (patch, pile):
             case = make(count, np.random.default_rng([seed, count]))
-            with threadpool_limits(1):
+            with one_thread():
                 rows += _time_case(case, solvers, max(3, repeats), longest, too_slow)
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))

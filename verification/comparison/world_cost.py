@@ -49,12 +49,12 @@ def world_cost(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[StepCostRow, ...]:
     """Time every world on every scene; the first run of each, which compiles, is not counted."""
-    from threadpoolctl import threadpool_limits
+    from reference.one_thread import one_thread
 
     rows: list[StepCostRow] = []
     for done, name in enumerate(scenes):
         samples: dict[str, list[float]] = {way: [] for way in ways}
-        with threadpool_limits(1):
+        with one_thread():
             for turn in range(max(3, repeats) + 1):
                 for way in ways:
                     seconds = _seconds_per_step(name, way, steps)

@@ -73,9 +73,9 @@ def bounded_impact(
 
 def _serve() -> None:
     """Warm up, say so, then read one call and write its answer."""
+    from reference.one_thread import one_thread
     from verification.hard_cases import bounded  # by its name: what __main__ pickles is not found again
     from verification.hard_cases.judge_impact import resolve_once, warm_up
-    from verification.threads import one_thread
 
     with one_thread():
         warm_up()

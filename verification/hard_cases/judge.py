@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from iapb.errors import ArgumentError
+from reference.one_thread import one_thread
 from verification.hard_cases.case import AnyCase, CaseAbsent, HardCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge_impact import METHODS, judge_impact
 from verification.hard_cases.judge_trajectory import Simulate, judge_trajectory, run_in_world
 from verification.hard_cases.verdict import HardCaseVerdict
-from verification.threads import one_thread
 
 
 def judge_hard_cases(

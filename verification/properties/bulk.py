@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.energy_gain import bulk_energy_gain
-from verification.threads import one_thread
+from reference.one_thread import one_thread
 
 Floats = NDArray[Any]
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from iapb.errors import IapbError
 from iapb.run import Run
+from reference.one_thread import one_thread
 from verification.properties.bounds import Bounds
 from verification.properties.case import LawResidual, Resolver
 from verification.properties.engine_laws import ENGINE_LAWS
@@ -23,7 +24,6 @@ from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.scenes import draw_scene
 from verification.properties.tally import LawCount, RunningCount, residual_of
 from verification.properties.trajectory_laws import judge_run
-from verification.threads import one_thread
 
 IMPACTS, UNEQUAL, TRAJECTORIES = "impacts", "unequal restitution", "trajectories"
 PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS)  # the order enters the seeds: add at the end

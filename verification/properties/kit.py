@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from reference.one_thread import one_thread
 from verification.properties.bounds import KIT, Bounds
 from verification.properties.case import ImpactCase, Resolver
 from verification.properties.families import draw_case, with_unequal_restitution
@@ -17,7 +18,6 @@ from verification.properties.passivity_report import LawVerdict, PassivityReport
 from verification.properties.pasteable import name_of
 from verification.properties.shrink import search_counterexample, shrink
 from verification.properties.tally import Tally, residual_of
-from verification.threads import one_thread
 
 NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
 LARGEST_CONDITION = 1e8  # κ(M) of the default families; beyond it plain Cholesky loses what the laws compare
