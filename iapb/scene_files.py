@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 
 def scene_folder() -> Path:
@@ -48,4 +49,4 @@ def find_scene(name: str | Path) -> Path:
     ours = scene_folder() / f"{path.stem}.yaml"
     if str(name) in (path.stem, path.name) and ours.is_file():
         return ours
-    raise ArgumentError("scene", str(name), f"a file, or one of: {', '.join(scene_names())}")
+    raise ArgumentError("scene", str(name), one_of(path.stem, scene_names(), "a file, or one of: "))

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
+from iapb.names import one_of
 from reference.complementarity.solvers import daqp_qp, quadprog_qp
 
 Floats = NDArray[np.float64]
@@ -147,7 +148,7 @@ def velocity_bounds(
     if not 0.0 <= stabilization <= 1.0:
         raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
     if scheme not in SCHEMES:
-        raise ArgumentError("scheme", scheme, "one of " + ", ".join(SCHEMES))
+        raise ArgumentError("scheme", scheme, one_of(scheme, SCHEMES))
     may_close = (scheme == "stewart-trinkle") | ((scheme == "automatic") & (e == 0.0))
     when_open = np.where(may_close, -gap / dt, -np.inf)
     newton = 0.0 if scheme == "stewart-trinkle" else e

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iapb.contact.laws import StepResult
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from iapb.restitution import restitution_by_pair
 from iapb.run import COLLIDING, FREE, RESTING
 from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
@@ -64,7 +65,7 @@ class RigidConstraints:
     def __post_init__(self) -> None:
         for argument, value, known in (("scheme", self.scheme, SCHEMES), ("friction", self.friction, FRICTION_LAWS)):
             if value not in known:
-                raise ArgumentError(argument, value, "one of " + ", ".join(known))
+                raise ArgumentError(argument, value, one_of(value, known))
 
     @property
     def settings(self) -> dict[str, Any]:

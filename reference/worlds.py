@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import INTERRUPTED, simulate
@@ -72,7 +73,7 @@ def find_world(name: str, rendering: str = "full") -> World:
         There is no such world, or its law has no impulses that a rendering could fit.
     """
     if name not in WORLDS:
-        raise ArgumentError("world", name, "one of " + ", ".join(WORLDS))
+        raise ArgumentError("world", name, one_of(name, WORLDS))
     world = WORLDS[name](rendering)
     if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
         raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")

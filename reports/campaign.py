@@ -48,11 +48,12 @@ class CampaignRequest:
 
     def subject(self) -> Subject:
         """What the laws are put to; imports the resolver."""
-        from reports.commands.verify import found
+        from reports.by_name import function_named
         from verification.properties import bounds
         from verification.properties.campaign import Subject
 
-        return Subject(found(self.resolver), getattr(bounds, self.bounds), self.largest_condition, self.seed)
+        tested = function_named("--resolver", self.resolver)
+        return Subject(tested, getattr(bounds, self.bounds), self.largest_condition, self.seed)
 
     def key(self) -> str:
         """Hash of all that a batch depends on; not how many there are."""

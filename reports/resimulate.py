@@ -9,6 +9,7 @@ from typing import Any
 
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 
@@ -68,7 +69,7 @@ def scene_of(run: Run) -> Scene:
 def law_of(run: Run) -> Any:
     """The contact law of a run with its settings."""
     if run.law not in LAWS:
-        raise ArgumentError("law", run.law, "one of " + ", ".join(LAWS) + ": another law is not in the file")
+        raise ArgumentError("law", run.law, one_of(run.law, LAWS) + " (any other law is not in the file)")
     module, name = LAWS[run.law]
     kind = getattr(import_module(module), name)
     return kind(**_known(kind, run.law_settings))
@@ -77,7 +78,7 @@ def law_of(run: Run) -> Any:
 def coupling_of(run: Run) -> Coupling:
     """The coupling of a run with its gains."""
     if run.coupling not in COUPLINGS:
-        raise ArgumentError("coupling", run.coupling, "one of " + ", ".join(COUPLINGS))
+        raise ArgumentError("coupling", run.coupling, one_of(run.coupling, COUPLINGS))
     kind = COUPLINGS[run.coupling]
     settings = _known(kind, run.coupling_settings)
     made: Coupling = kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in settings.items()})

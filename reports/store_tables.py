@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import ArgumentError, RunFileError
+from iapb.names import one_of
 from reports.provenance import collect_provenance
 from reports.store_datasets import (
     mark_plottable,
@@ -65,7 +66,7 @@ class Table:
         for column in self.columns:
             if column.name == name:
                 return column.values
-        raise ArgumentError("column", name, f"one of: {', '.join(column.name for column in self.columns)}")
+        raise ArgumentError("column", name, one_of(name, [column.name for column in self.columns], "one of: "))
 
 
 def write_table(path: Path | str, table: Table, provenance: Mapping[str, str] | None = None) -> Path:
@@ -111,7 +112,7 @@ def read_table(path: Path | str, name: str | None = None) -> Table:
     if name is None:
         return next(iter(tables.values()))
     if name not in tables:
-        raise RunFileError(f"{path}: no table {name!r}: expected one of {', '.join(tables)}")
+        raise RunFileError(f"{path}: no table {name!r}: expected {one_of(name, tables)}")
     return tables[name]
 
 

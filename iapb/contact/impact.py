@@ -25,6 +25,7 @@ from iapb.contact.impact_methods import (
 from iapb.contact.impact_problem import ImpactInput, check_input
 from iapb.contact.kernels.compensated import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -130,7 +131,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
 def _method(method: Any) -> tuple[Any, bool]:
     offered = {name: entry for name, entry in METHODS.items() if name != "poisson"}
     if not isinstance(method, str) or method not in offered:
-        raise ArgumentError("method", method, "one of " + ", ".join(offered))
+        raise ArgumentError("method", method, one_of(method, offered))
     return offered[method].solve, offered[method].clamped
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
+from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 
 Floats = NDArray[np.float64]
@@ -82,7 +83,7 @@ class _EngineLaw:
 
     def __post_init__(self) -> None:
         if self.integrator not in INTEGRATORS:
-            raise ArgumentError("integrator", self.integrator, "one of " + ", ".join(INTEGRATORS))
+            raise ArgumentError("integrator", self.integrator, one_of(self.integrator, INTEGRATORS))
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
         """One step by the compiled kernel, from Python (see `ContactLaw`)."""
@@ -123,7 +124,7 @@ class ImpulseAugmented(_EngineLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rendering not in RENDERINGS:
-            raise ArgumentError("rendering", self.rendering, "one of " + ", ".join(RENDERINGS))
+            raise ArgumentError("rendering", self.rendering, one_of(self.rendering, RENDERINGS))
         if not isinstance(self.friction_in_impacts, bool):
             raise ArgumentError("friction_in_impacts", self.friction_in_impacts, "True or False")
 

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.contact.laws import RENDERINGS
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -90,4 +91,4 @@ def _check(impulse: Floats, dt: float, limit: Floats, rendering: str) -> None:
     if limit.shape != impulse.shape or not np.all(limit > 0.0):
         raise ArgumentError("force_limit", limit, "one number > 0 per coordinate (infinity: no limit)")
     if rendering not in RENDERINGS:
-        raise ArgumentError("rendering", rendering, "one of " + ", ".join(RENDERINGS))
+        raise ArgumentError("rendering", rendering, one_of(rendering, RENDERINGS))

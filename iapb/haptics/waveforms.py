@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ def waveform_weights(name: str, dt: float) -> Floats:
         An unknown waveform, or one that this rate cannot render.
     """
     if name not in WAVEFORMS:
-        raise ArgumentError("waveform", name, "one of " + ", ".join(WAVEFORMS))
+        raise ArgumentError("waveform", name, one_of(name, WAVEFORMS))
     return WAVEFORMS[name](dt)
 
 

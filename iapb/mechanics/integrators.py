@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 Integrate = Callable[[Floats, Floats, float], Floats]  # q, v, dt [s] -> q
@@ -86,5 +87,5 @@ INTEGRATORS: dict[str, Integrator] = {
 def integrator(name: str) -> Integrator:
     """Return the integrator of that name."""
     if name not in INTEGRATORS:
-        raise ArgumentError("integrator", name, "one of " + ", ".join(INTEGRATORS))
+        raise ArgumentError("integrator", name, one_of(name, INTEGRATORS))
     return INTEGRATORS[name]

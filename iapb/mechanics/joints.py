@@ -24,6 +24,7 @@ from iapb.mechanics.kernels.arrays import (
     REVOLUTE,
     SPHERICAL,
 )
+from iapb.names import one_of
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise ArgumentError("kind", self.kind, f"one of {', '.join(KINDS)}")
+            raise ArgumentError("kind", self.kind, one_of(self.kind, KINDS))
         axis = np.asarray(self.axis, dtype=np.float64)
         if axis.shape != (3,) or not np.isfinite(axis).all() or not np.any(axis):
             raise ArgumentError("axis", self.axis, "three finite numbers, not all zero")

@@ -21,6 +21,7 @@ from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.urdf_elements import elements_by_name, numbers_in, origin_of, parse_robot, where_of
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -110,7 +111,7 @@ def _connection(element: ElementTree.Element) -> _Connection:
     """Return a joint with the links it connects."""
     where, kind = where_of(element), element.get("type", "")
     if kind not in KIND_OF_TYPE:
-        raise ArgumentError(f"{where} type", kind, f"one of {', '.join(KIND_OF_TYPE)}")
+        raise ArgumentError(f"{where} type", kind, one_of(kind, KIND_OF_TYPE))
     ends = {tag: element.find(tag) for tag in ("parent", "child")}
     names = {tag: end.get("link") if end is not None else None for tag, end in ends.items()}
     for tag, name in names.items():

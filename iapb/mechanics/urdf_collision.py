@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.urdf_elements import elements_by_name, numbers_in, origin_of, parse_robot, where_of
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ def _shape(collision: ElementTree.Element, where: str) -> CollisionShape:
     kinds = [] if geometry is None else list(geometry)
     if len(kinds) != 1 or kinds[0].tag not in LENGTHS:
         found = ", ".join(f"<{kind.tag}>" for kind in kinds) or "nothing"
-        raise ArgumentError(f"{where} geometry", found, f"one of {', '.join(f'<{kind}>' for kind in LENGTHS)}")
+        raise ArgumentError(f"{where} geometry", found, one_of(found, [f"<{kind}>" for kind in LENGTHS]))
     kind = kinds[0]
     values = [
         numbers_in(f"{where} {kind.tag} {name}", kind.get(name), count) for name, count in LENGTHS[kind.tag].items()

@@ -10,6 +10,7 @@ import difflib
 import xml.etree.ElementTree as ElementTree
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 # element: (children that are read, children of the format that are not)
 _CHILDREN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -71,4 +72,4 @@ def _check_attributes(element: ElementTree.Element, where: str) -> None:
         return
     for name, value in element.attrib.items():
         if name not in known and not name.startswith("{"):  # another XML namespace: somebody else's
-            raise ArgumentError(f"{where} {name}", value, f"one of its attributes: {', '.join(known)}")
+            raise ArgumentError(f"{where} {name}", value, one_of(name, known, "one of its attributes: "))

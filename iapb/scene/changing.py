@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from iapb.errors import ArgumentError, SceneError
+from iapb.names import one_of
 from iapb.scene.model import Scene
 from iapb.scene.reading import mistakes_of
 from iapb.scene.writing import scene_text
@@ -61,4 +62,4 @@ def _key(place: Any, step: str, path: str) -> str | int:
     if step.isdecimal() and int(step) < len(place):
         return int(step)
     known = [name for name in names if name] or [f"0 to {len(place) - 1}"]
-    raise ArgumentError("values", path, f"at {step!r} one of: {', '.join(known)}")
+    raise ArgumentError("values", path, one_of(step, known, f"at {step!r} one of: "))

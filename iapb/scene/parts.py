@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
+import re
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from iapb.names import nearest
 
 LARGEST_NUMBER = 1e9  # SI units; products of four such numbers stay far inside double precision
 SMALLEST_POSITIVE = (
@@ -89,8 +91,8 @@ class Part(BaseModel):
 
 
 def _known_fields(wrong: str, known: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(wrong, known, n=1)
-    guess = f" (did you mean {near[0]}?)" if near else ""
+    near = nearest(wrong, known)
+    guess = f" (did you mean {near}?)" if near else ""
     return f"one of the known fields{guess}: {', '.join(known)}"
 
 
@@ -119,7 +121,17 @@ _EXPECTED = {
 def expected_of(error: Any) -> str:
     """Return what was expected, in the words of a scene's author."""
     template = _EXPECTED.get(error["type"])
-    return template.format(**error.get("ctx", {})) if template else error["msg"]
+    if template is None:
+        return str(error["msg"])
+    return template.format(**error.get("ctx", {})) + _guess(error)
+
+
+def _guess(error: Any) -> str:
+    """The word that was meant, where one of a few was expected and a given one is much like it."""
+    words = error.get("ctx", {})
+    listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
+    near = nearest(words.get("tag", error["input"]), listed) if listed else ""
+    return f"; did you mean {near}?" if near else ""
 
 
 def _follows_from_others(error: Any) -> bool:

@@ -25,6 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from iapb.errors import ArgumentError, Mistake, shown
+from iapb.names import one_of
 from iapb.scene.parts import Name, Number, Part, Text
 from iapb.scene.space import JOINTS, ORIGIN, SpatialShape, Vector3
 
@@ -73,7 +74,8 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
     for field in ("shapes", "position", "velocity"):
         for link in getattr(robot, field):
             if link not in names:
-                raise ArgumentError(f"{field} of robot {robot.name}", link, f"a link of it: {', '.join(sorted(names))}")
+                expected = one_of(link, sorted(names), "a link of it: ")
+                raise ArgumentError(f"{field} of robot {robot.name}", link, expected)
     shapes = {link: [shape.model_dump(mode="json") for shape in given] for link, given in robot.shapes.items()}
     if robot.collisions == "urdf":
         shapes = _collisions_of(robot, path) | shapes

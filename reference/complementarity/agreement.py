@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from reference.complementarity.adhesion import adhesion
 from reference.complementarity.laws import LAWS, Outcome
 from reference.complementarity.problem import ImpactProblem
@@ -46,7 +47,7 @@ def compare_with_law(
     Contacts count as approaching below −1e-9 of the velocity scale: rounding of an exact zero stays above.
     """
     if law not in LAWS:
-        raise ArgumentError("law", law, "one of " + ", ".join(LAWS))
+        raise ArgumentError("law", law, one_of(law, LAWS))
     mass, rows, before = problem.mass_matrix, problem.contact_jacobian, problem.velocity
     if mass is None or rows is None or before is None or problem.friction is not None:
         raise ArgumentError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from reference.simulators.fixed_scenes import FIXED_SCENES, fixed_scene
 from reference.simulators.scene import FixedScene
 from reference.simulators.simulator import Settings, Simulator
@@ -31,7 +32,7 @@ SIMULATORS: dict[str, str] = {
 def find_simulator(name: str) -> Simulator:
     """The adapter of that name; the engine itself is imported when it is first used."""
     if name not in SIMULATORS:
-        raise ArgumentError("simulator", name, "one of " + ", ".join(SIMULATORS))
+        raise ArgumentError("simulator", name, one_of(name, SIMULATORS))
     module, kind = SIMULATORS[name].split(":")
     made: Simulator = getattr(import_module(module), kind)()
     return made

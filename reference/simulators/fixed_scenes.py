@@ -10,6 +10,7 @@ from collections.abc import Callable
 from math import cos, pi, sin, sqrt
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from reference.simulators.scene import Cuboid, FixedScene, Obstacle, RigidBody, Sphere, Vector
 
 RADIUS, SIDE = 0.05, 0.1  # of all balls and boxes [m]
@@ -108,7 +109,7 @@ FIXED_SCENES: dict[str, Callable[[], FixedScene]] = {
 def fixed_scene(name: str) -> FixedScene:
     """The scene of that name."""
     if name not in FIXED_SCENES:
-        raise ArgumentError("scene", name, "one of " + ", ".join(FIXED_SCENES))
+        raise ArgumentError("scene", name, one_of(name, FIXED_SCENES))
     return FIXED_SCENES[name]()
 
 

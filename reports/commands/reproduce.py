@@ -56,13 +56,14 @@ def make_report(out: Path, depth: str) -> None:
 def _write_figure(key: str, out: Path, depth: str) -> None:
     """Write a figure's panels, and all of them with their legend in one file; compute only what it needs."""
     from iapb.errors import ArgumentError
+    from iapb.names import one_of
     from reports.figures import RECIPES
     from reports.figures.figure import Figure, draw
     from reports.figures.standalone import standalone
 
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
-        raise ArgumentError("--figure", key, "one of " + ", ".join(recipes))
+        raise ArgumentError("--figure", key, one_of(key, recipes))
     drawn = draw(recipes[key], _inputs(recipes[key].needs, out, depth))
     if not isinstance(drawn, Figure):
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -53,35 +52,14 @@ def verify(
 
 
 def _kit(resolver: str, impacts: int | None, seed: int, unequal: bool) -> bool:
+    from reports.by_name import function_named
     from reports.commands.progress import stage_progress
     from verification import check_passivity
     from verification.properties.kit import IMPACTS
 
-    tested = found(resolver)
+    tested = function_named("--resolver", resolver)
     with stage_progress() as progress:
         report = check_passivity(tested, impacts=impacts or IMPACTS, seed=seed, unequal_restitution=unequal,
                                  progress=lambda done, total: progress("impacts", done, total))
     print(report)
     return report.passed
-
-
-def found(name: str) -> Callable[..., Any]:
-    """Import ``package.module:function``; the working directory counts as a place to look."""
-    import importlib
-    import os
-    import sys
-
-    from iapb.errors import ArgumentError
-
-    module, colon, attribute = name.partition(":")
-    if not (module and colon and attribute):
-        raise ArgumentError("--resolver", name, "package.module:function")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        function = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise ArgumentError("--resolver", name, f"a function that can be imported ({error})") from error
-    if not callable(function):
-        raise ArgumentError("--resolver", name, "something that can be called")
-    return function

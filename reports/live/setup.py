@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import Device
 from iapb.scene import Scene
 from iapb.simulation import Simulation
 from reference.worlds import World
+from reports.by_name import function_named
 
 _SIMULATED = "simulated"  # the word for the device of `iapb.scene_device.simulated_device`
 
@@ -25,7 +23,15 @@ def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -
     device : ``module:factory`` of a device of one's own, ``simulated``, or empty for the compiled one.
     """
     scene = scene.with_values({"rate": rate})
-    return Simulation(scene, world.law, world.coupling_in(scene), made_device(device, scene))
+    made = made_device(device, scene)
+    try:
+        return Simulation(scene, world.law, world.coupling_in(scene), made)
+    except IapbError:
+        raise
+    except Exception as error:
+        if made is None:
+            raise
+        raise IapbError(f"the device failed at its first reading: {type(error).__name__}: {error}") from error
 
 
 def made_device(name: str, scene: Scene) -> Device | None:
@@ -40,12 +46,12 @@ def made_device(name: str, scene: Scene) -> Device | None:
         return None
     if name == _SIMULATED:
         name = "iapb.scene_device:simulated_device"
-    module, colon, factory = name.partition(":")
-    if not colon or not module or not factory:
-        raise ArgumentError("device", name, "module:factory, such as my_lab.omega:connect, or simulated")
+    make = function_named("--device", name, "module:factory, such as my_lab.omega:connect, or simulated")
     try:
-        make: Any = getattr(import_module(module), factory)
-    except (ImportError, AttributeError) as error:
-        raise ArgumentError("device", name, f"an importable module with that factory ({error})") from error
-    device: Device = make(scene)
+        device: Device = make(scene)
+    except IapbError:
+        raise
+    except Exception as error:  # a device of somebody's own
+        why = f"{type(error).__name__}: {error}"
+        raise ArgumentError("--device", name, f"a factory that makes a device of a scene ({why})") from error
     return device

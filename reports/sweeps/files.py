@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from iapb.scene_files import find_scene, scene_folder, scene_names
 from reports.sweeps.study import Study
 
@@ -27,7 +28,7 @@ def find_study(name: str) -> Path:
         return path
     if Path(name).name == name and ours.is_file():
         return ours
-    raise ArgumentError("study", name, f"a file, or one of: {', '.join(study_names())}")
+    raise ArgumentError("study", name, one_of(path.stem, study_names(), "a file, or one of: "))
 
 
 def scene_of(study: Study, path: Path) -> Path:
@@ -52,5 +53,6 @@ def scene_of(study: Study, path: Path) -> Path:
         raise ArgumentError("scene", study.scene, "a path inside the study's folder, or the name of a scene of ours")
     found = (folder / given).resolve()
     if not (found.is_relative_to(folder) and found.is_file()):
-        raise ArgumentError("scene", study.scene, f"a file beside the study, or one of: {', '.join(scene_names())}")
+        expected = one_of(given.stem, scene_names(), "a file beside the study, or one of: ")
+        raise ArgumentError("scene", study.scene, expected)
     return found

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import ArgumentError, IapbError
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from reports.store_keys import code_version, content_hash, run_key
@@ -99,7 +100,7 @@ def _with_settings(law: Any, settings: dict[str, Any]) -> Any:
     known = [field.name for field in fields(law)] if is_dataclass(law) else []
     for name, value in settings.items():
         if name not in known:
-            expected = f"a setting of the law {law.name!r}: {', '.join(known) or 'it has none'}"
+            expected = one_of(name, known or ["it has none"], f"a setting of the law {law.name!r}: ")
             raise ArgumentError(f"law.{name}", value, expected)
     return replace(law, **settings) if settings else law
 

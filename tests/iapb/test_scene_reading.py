@@ -66,6 +66,13 @@ def test_all_mistakes_at_once_with_line_column_path_value_and_expectation() -> N
     assert all(mistake.file == "wrong.yaml" and mistake.expected for mistake in found.values())
 
 
+def test_a_misspelt_choice_is_guessed_and_a_strange_one_is_not() -> None:
+    found = mistakes(GOOD.replace("joint: planar", "joint: plannar").replace("kind: half_plane", "kind: halfplane"))
+    assert found["bodies[0].joint"].expected.endswith("or 'planar'; did you mean planar?")
+    assert found["walls[0].kind"].expected.endswith("; did you mean half_plane?")
+    assert "did you mean" not in mistakes(GOOD.replace("joint: planar", "joint: 3"))["bodies[0].joint"].expected
+
+
 def test_message_of_a_mistake_reads_as_an_editor_expects() -> None:
     found = mistakes(GOOD.replace("rate: 1e3", "rate: 0"))
     assert str(found["rate"]) == "wrong.yaml:2:7: rate = 0: expected a number >= 1e-12"

@@ -156,6 +156,16 @@ def test_debug_shows_the_traceback(tmp_path):
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),
         (["verify", "--resolver", "no_such_module:f"], "can be imported"),
+        (["verify", "--resolver", "iapb:resolve_impct"], "which has no resolve_impct; did you mean resolve_impact?"),
+        (["verify", "--simulator", "mujocco"], "did you mean mujoco?"),
+        (["verify", "--simulator", "iapb", "--scene", "elastic_cradel"], "did you mean elastic_cradle?"),
+        (["run", "peg_cornr"], "did you mean peg_corner?"),
+        (["run", "scenes/peg_cornr.yaml"], "did you mean peg_corner?"),
+        (["run", "peg_corner", "--world", "iapb"], "did you mean IAPB?"),
+        (["run", "peg_corner", "--set", "bodies.pegg.mass=1"], "did you mean peg?"),
+        (["sweep", "corner_tlt"], "did you mean corner_tilt?"),
+        (["prove", "theorem1"], "did you mean theorem_1?"),
+        (["reproduce", "--figure", "fig7"], "did you mean fig07?"),
     ],
 )
 def test_an_error_is_one_sentence_with_value_and_expectation(arguments, said, iapb, tmp_path, monkeypatch):

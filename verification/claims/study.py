@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.claims.claim import ClaimResult
@@ -58,7 +59,7 @@ class Study:
 
     def __post_init__(self) -> None:
         if self.depth not in DEPTHS:
-            raise ArgumentError("depth", self.depth, "one of " + ", ".join(DEPTHS))
+            raise ArgumentError("depth", self.depth, one_of(self.depth, DEPTHS))
 
     def scene(self, name: str) -> Scene:
         """A scene that comes with the project."""
@@ -126,7 +127,7 @@ def check_claims(
 
     unknown = [name for name in ids or () if name not in CLAIMS]
     if unknown:
-        raise ArgumentError("ids", unknown, "some of " + ", ".join(CLAIMS))
+        raise ArgumentError("ids", unknown, one_of(unknown[0], CLAIMS, "some of "))
     chosen = tuple(CLAIMS) if ids is None else tuple(ids)
     study, results = Study(run, depth, asked=asked), []
     for done, name in enumerate(chosen):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def random_cases(
     """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same ones."""
     unknown = set(families or ()) - set(FAMILIES)
     if unknown:
-        raise ArgumentError("families", sorted(unknown), "some of " + ", ".join(FAMILIES))
+        raise ArgumentError("families", sorted(unknown), one_of(min(unknown), FAMILIES, "some of "))
     for family in FAMILIES.values() if families is None else (FAMILIES[name] for name in families):
         for redundancy in family.redundancies:
             rng = np.random.default_rng([seed, list(FAMILIES).index(family.name), redundancy])

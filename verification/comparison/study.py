@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.comparison.agreement import Comparison, compare_case, compare_cases
@@ -106,7 +107,7 @@ def compare(
         An unknown depth, or a folder that does not exist.
     """
     if depth not in DEPTHS:
-        raise ArgumentError("depth", depth, "one of " + ", ".join(DEPTHS))
+        raise ArgumentError("depth", depth, one_of(depth, DEPTHS))
     size, say = DEPTHS[depth], progress or (lambda stage, done, total: None)
     comparisons = _random_comparisons(size.cases, say)
     scene_cells, left_out = compare_scenes(scenes, say)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from reference.one_thread import one_thread
 from verification.hard_cases.case import AnyCase, CaseAbsent, HardCase
 from verification.hard_cases.catalogue import HARD_CASES
@@ -39,7 +40,7 @@ def judge_hard_cases(
     names = tuple(HARD_CASES if cases is None else cases)
     for name in names:
         if name not in HARD_CASES:
-            raise ArgumentError("cases", name, f"one of {', '.join(HARD_CASES)}")
+            raise ArgumentError("cases", name, one_of(name, HARD_CASES))
     found = (verdict for name in names for verdict in _of(name, wanted, simulate))
     with one_thread():
         return tuple(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 from verification.claims.table import Table
 
 DEPTHS = ("quick", "full")
@@ -42,4 +43,4 @@ class Finding:
 def check_depth(depth: str) -> None:
     """Raise ArgumentError unless the depth is one of DEPTHS."""
     if depth not in DEPTHS:
-        raise ArgumentError("depth", depth, "one of " + ", ".join(DEPTHS))
+        raise ArgumentError("depth", depth, one_of(depth, DEPTHS))

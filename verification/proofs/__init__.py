@@ -15,6 +15,7 @@ import time
 from typing import TYPE_CHECKING
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 if TYPE_CHECKING:
     from verification.proofs.statement import ProofRecord, Statement
@@ -72,7 +73,7 @@ def all_proofs() -> tuple[str, ...]:
 def load(name: str) -> Statement:
     """The statement of this name, unchecked."""
     if name not in _NAMES:
-        raise ArgumentError("name", name, "one of " + ", ".join(_NAMES))
+        raise ArgumentError("name", name, one_of(name, _NAMES))
     module = importlib.import_module(f"verification.proofs.statements.{name}")
     return module.statement()
 

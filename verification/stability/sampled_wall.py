@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 PENALTY, IMPULSES = "penalty", "impulses"
@@ -89,7 +90,7 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
         An unknown law.
     """
     if law not in LAWS:
-        raise ArgumentError("law", law, "one of " + ", ".join(LAWS))
+        raise ArgumentError("law", law, one_of(law, LAWS))
     steps = round(loop.seconds * loop.rate)
     x, v = np.full(len(stiffness), -loop.distance), np.full(len(stiffness), loop.speed)
     positions, speeds, forces = (np.empty((steps, len(stiffness))) for _ in range(3))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from iapb.errors import ArgumentError, MissingDependencyError, SolverError
+from iapb.names import one_of
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Solution
 from reference.complementarity.solvers.answer import Answer
@@ -85,7 +86,7 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
     A solver that refuses or breaks gives a Solution without impulse, whose residuals are infinite.
     """
     if solver not in SOLVERS:
-        raise ArgumentError("solver", solver, "one of " + ", ".join(SOLVERS))
+        raise ArgumentError("solver", solver, one_of(solver, SOLVERS))
     entry = SOLVERS[solver]
     call = _load(solver, entry)
     started = time.perf_counter()

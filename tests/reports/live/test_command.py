@@ -40,3 +40,27 @@ def test_it_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(l
 def test_what_cannot_be_done_is_named(live, options):
     status, _, err = live(*options)
     assert status == 1 and "expected" in err and "Traceback" not in err
+
+
+DEVICES = """\
+def broken(scene):
+    raise RuntimeError("no cable")
+
+class Mute:
+    def read(self):
+        raise RuntimeError("no answer")
+    def apply(self, force):
+        pass
+
+def mute(scene):
+    return Mute()
+"""
+
+
+@pytest.mark.parametrize(("factory", "said"), [("broken", "no cable"), ("mute", "no answer"), ("brokn", "broken?")])
+def test_a_device_that_cannot_be_had_is_one_sentence(live, tmp_path, monkeypatch, factory, said):
+    (tmp_path / "own_devices.py").write_text(DEVICES)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    status, _, err = live("--seconds", "0.1", "--device", f"own_devices:{factory}")
+    assert status == 1 and err.startswith("iapb: ") and said in err and not list(tmp_path.glob("*.h5"))

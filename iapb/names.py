@@ -1,0 +1,21 @@
+"""Names that are looked up: what to say of one that nothing has."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+def nearest(wrong: Any, known: Iterable[Any]) -> str:
+    """Return the known name that is spelt most like `wrong`, capitals aside; empty where none is much like it."""
+    spelt = {str(name).casefold(): str(name) for name in known}
+    near = difflib.get_close_matches(str(wrong).casefold(), spelt, n=1)
+    return spelt[near[0]] if near else ""
+
+
+def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
+    """Say what was expected instead of `wrong`: ``one of peg_corner, two_discs; did you mean peg_corner?``."""
+    names = [str(name) for name in known]
+    near = nearest(wrong, names)
+    return lead + ", ".join(names) + (f"; did you mean {near}?" if near else "")

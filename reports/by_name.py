@@ -1,0 +1,46 @@
+"""Functions of other people's modules, found by ``package.module:function``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+from iapb.errors import ArgumentError
+from iapb.names import nearest
+
+
+def function_named(argument: str, name: str, form: str = "package.module:function") -> Callable[..., Any]:
+    """Import a function; the working directory counts as a place to look.
+
+    Parameters
+    ----------
+    argument : what the name was given as, such as ``--resolver``
+    name : module, colon, function
+    form : how a name looks, for messages
+
+    Raises
+    ------
+    ArgumentError
+        The name has another form, its module cannot be imported, or has no such function.
+    """
+    module, colon, attribute = name.partition(":")
+    if not (module and colon and attribute):
+        raise ArgumentError(argument, name, form)
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        home = import_module(module)
+    except Exception as error:  # somebody else's module: whatever it raises, it is what is wrong with the name
+        why = f"{type(error).__name__}: {error}"
+        raise ArgumentError(argument, name, f"a module that can be imported ({why})") from error
+    if not hasattr(home, attribute):
+        near = nearest(attribute, [word for word in dir(home) if not word.startswith("_")])
+        guess = f"; did you mean {near}?" if near else ""
+        raise ArgumentError(argument, name, f"a function of the module {module}, which has no {attribute}{guess}")
+    function: Callable[..., Any] = getattr(home, attribute)
+    if not callable(function):
+        raise ArgumentError(argument, name, "something that can be called")
+    return function
