@@ -1,7 +1,7 @@
 """The laws at length, with their batches on the disk: what was done is not done again, and what broke a law is kept.
 
     out/verify/<key>/impacts-000000000.h5 …      a table per batch: law, cases, failures, worst residual
-    out/verify/<key>/counterexamples/…           an impact as a table with its JSON, and as FCLIB; a trajectory as a run
+    out/verify/<key>/counterexamples/…           runs, for `iapb inspect`: impacts (as FCLIB too) and trajectories
 
 The key is a hash of the code, the resolver and the tolerances, so that a changed line starts afresh. A batch is written
 aside and renamed: a killed process leaves whole batches only.
@@ -10,6 +10,7 @@ aside and renamed: a killed process leaves whole batches only.
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 _TABLE = "laws"
 _COMMAND = "iapb verify --full"
+# Files of one law: each is a run of about 150 kB. A resolver that breaks a law more often is not understood by more.
+KEPT_PER_LAW = 1000
 
 
 @dataclass(frozen=True)
@@ -116,11 +119,14 @@ class Campaign:
             pool.shutdown(cancel_futures=True)
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
-        """Counterexamples first: a batch that is there has all of its own."""
+        """Counterexamples first: a batch that is there has all of its own, up to KEPT_PER_LAW in the whole folder."""
         from reports.campaign_counterexamples import keep_counterexample
 
+        kept = Counter(path.stem.rsplit("-", 1)[-1] for path in self.counterexamples())
         for found in outcome.found:
-            keep_counterexample(self.folder / "counterexamples", found, self.request)
+            kept[found.law] += 1
+            if kept[found.law] <= KEPT_PER_LAW:
+                keep_counterexample(self.folder / "counterexamples", found, self.request)
         write_table(self.path_of(batch), _table(batch, outcome))
 
     def counts(self, batches: Iterable[Batch]) -> dict[str, dict[str, LawCount]]:

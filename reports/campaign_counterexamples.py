@@ -1,4 +1,6 @@
-"""What broke a law, kept so that it can be judged again: an impact as a table and as FCLIB, a trajectory as its run."""
+"""What broke a law, kept so that it can be judged again: as a run where it is a trajectory or an impact, the impact as
+FCLIB too; a wall in the hand, limits of a device or two rooms as a table that says how to draw them again.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,10 @@ from reports.store_tables import Column, Table, read_table, write_table
 
 if TYPE_CHECKING:
     from reports.campaign import CampaignRequest
-    from verification.properties.campaign import Found
+    from reports.store_impact import BrokenImpact
+    from verification.properties.campaign import Found, Subject
     from verification.properties.case import ImpactCase, LawResidual
+    from verification.properties.struck import Struck
 
 _TABLE = "counterexample"
 
@@ -25,40 +29,58 @@ _TABLE = "counterexample"
 def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) -> Path:
     """Write one; return its file. The same one again is the same file."""
     from reports.store import write_run
+    from reports.store_impact import write_broken_impact
 
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{found.part.replace(' ', '_')}-{found.index:09d}-{found.law}.h5"
     if found.run is not None:
         return write_run(path, found.run, replace=True)
-    record = {"law": found.law, "part": found.part, "index": found.index, "request": asdict(request),
-              "value": found.residual.value, "tolerance": found.residual.tolerance,
-              "case": plain(asdict(found.case))}  # fmt: skip
+    if found.struck is not None:
+        _write_fclib(path.with_suffix(".hdf5"), found.struck.case)
+        return write_broken_impact(path, _broken_impact(found, found.struck, request))
+    record = {**_origin(found, request), "law": found.law, "value": found.residual.value,
+              "tolerance": found.residual.tolerance, "case": plain(asdict(found.case))}  # fmt: skip
     columns = (Column("json", (json.dumps(record),), "1", "law, tolerances and input as JSON"),)
-    write_table(path, Table(_TABLE, columns, found.law, command=f"iapb verify --recheck {path.name}"))
-    _write_fclib(path.with_suffix(".hdf5"), found.case)
-    return path
+    return write_table(path, Table(_TABLE, columns, found.law, command=f"iapb verify --recheck {path.name}"))
 
 
-def _write_fclib(path: Path, case: Any) -> None:
+def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
+    """What draws the case again."""
+    return {"part": found.part, "index": found.index, "request": asdict(request)}
+
+
+def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> BrokenImpact:
+    from reports.commands.verify import ENGINE
+    from reports.store_impact import BrokenImpact
+    from verification.properties.engine_laws import ENGINE_LAWS
+    from verification.properties.laws import LAWS, UNEQUAL_LAWS
+    from verification.properties.pasteable import as_test
+
+    subject = request.subject()
+    return BrokenImpact(
+        struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law,
+        (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law].statement, found.residual.value, found.residual.tolerance,
+        _origin(found, request), as_test(struck.case, found.law, subject.bounds, subject.resolver))  # fmt: skip
+
+
+def _write_fclib(path: Path, case: ImpactCase) -> None:
     """The impact as FCLIB too, where it is a problem of that kind: contacts, and a restitution in [0, 1]."""
     from reference.complementarity.problem import ImpactProblem
     from reference.fclib import write_fclib
-    from verification.properties.case import ImpactCase
 
-    if not isinstance(case, ImpactCase) or case.contacts == 0:
-        return
     e = case.given_restitution()
-    if np.min(e) < 0.0:
+    if case.contacts == 0 or np.min(e) < 0.0:
         return
     try:
         problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e, name=path.stem)
         write_fclib(path, problem)
-    except IapbError:  # an extreme input that is no such problem: the table has it
+    except IapbError:  # an extreme input that is no such problem: the run has it
         path.unlink(missing_ok=True)
 
 
 def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
     """Judge a counterexample again: an impact by its resolver, a run as recorded and as it comes out now."""
+    from reports.store_impact import read_broken_impact
     from reports.store_read import opened
     from reports.store_tables import TABLE_FORMAT
 
@@ -68,31 +90,37 @@ def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
         with opened(path, TABLE_FORMAT):
             pass
     except RunFileError:
-        yield from _recheck_run(path)
+        broken = read_broken_impact(path)
+        yield from _recheck_run(path) if broken is None else _recheck_impact(broken)
         return
-    yield from _recheck_impact(json.loads(read_table(path, _TABLE)["json"][0]))
+    yield from _recheck_drawn(json.loads(read_table(path, _TABLE)["json"][0]))
 
 
-def _recheck_impact(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
-    """The stored impact itself; what is no impact is drawn again from its seed."""
+def _recheck_impact(broken: BrokenImpact) -> Iterator[tuple[str, LawResidual]]:
+    """The stored impact itself, by its resolver."""
+    yield _judged(broken.law, broken.found, broken.struck.case)
+
+
+def _recheck_drawn(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
+    """What is no impact: the case that its part, seed and number draw."""
+    from verification.properties.campaign import drawn
+
+    case = drawn(record["part"], record["index"], _subject(record))
+    yield _judged(record["law"], record, case)
+
+
+def _judged(law: str, origin: dict[str, Any], case: Any) -> tuple[str, LawResidual]:
+    from reference.one_thread import one_thread
+    from verification.properties.campaign import residuals
+
+    with one_thread():  # as it was found
+        return law, residuals(origin["part"], case, _subject(origin))[0][law]
+
+
+def _subject(origin: dict[str, Any]) -> Subject:
     from reports.campaign import CampaignRequest
-    from verification.properties.campaign import drawn, residuals
 
-    subject, values = CampaignRequest(**record["request"]).subject(), record["case"]
-    stored = "contact_jacobian" in values
-    case = _impact_case(values) if stored else drawn(record["part"], record["index"], subject)
-    yield record["law"], residuals(record["part"], case, subject)[0][record["law"]]
-
-
-def _impact_case(values: dict[str, Any]) -> ImpactCase:
-    from verification.properties.case import ImpactCase
-
-    arrays: dict[str, Any] = dict(values)
-    for name in ("mass_matrix", "contact_jacobian", "velocity", "translations", "unequal"):
-        arrays[name] = None if values[name] is None else np.array(values[name], dtype=float)
-    d = len(arrays["velocity"])
-    arrays["contact_jacobian"] = arrays["contact_jacobian"].reshape(-1, d)
-    return ImpactCase(**arrays)
+    return CampaignRequest(**origin["request"]).subject()
 
 
 def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:

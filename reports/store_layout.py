@@ -7,6 +7,7 @@
     /impacts                  one row per colliding group and step
     /energy                   the ledger, on instants and on steps
     /effects                  what was on, and why
+    /struck                   only where an impact of bare numbers broke a law: see reports.store_impact
     /timings, /provenance     outside the content hash: they differ from one machine to the next
 
 Each group carries its own dimension scales, so that it opens as one xarray dataset.
@@ -28,9 +29,10 @@ FORMAT_VERSION = 2  # 2: names and units of velocities, which quaternions need
 
 # Units of generalized quantities follow the unit of their coordinate or of their velocity.
 POSITION = {"m": "m", "rad": "rad", "1": "1"}
-VELOCITY = {"m/s": "m/s", "rad/s": "rad/s"}
-FORCE = {"m/s": "N", "rad/s": "N m"}
-IMPULSE = {"m/s": "N s", "rad/s": "N m s"}
+# "1": an impact of bare numbers, which no scene gives a unit.
+VELOCITY = {"m/s": "m/s", "rad/s": "rad/s", "1": "1"}
+FORCE = {"m/s": "N", "rad/s": "N m", "1": "1"}
+IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ def write_run(
     key: str = "",
     provenance: Mapping[str, str] | None = None,
     replace: bool = False,
+    more: Callable[[Any], None] | None = None,
 ) -> Path:
     """Write one run: aside first, synced, then moved to `path` in one step.
 
@@ -46,6 +47,8 @@ def write_run(
         Texts by name; `collect_provenance()` by default.
     replace
         Whether a file at `path` is replaced. Otherwise an existing file stays as it is.
+    more
+        Writes groups of its own into the open file; who reads the run passes over them.
     """
     path = Path(path)
     with new_file(path, replace=replace) as file:
@@ -61,6 +64,8 @@ def write_run(
         file.create_group("provenance", track_order=True)
         for name, text in (collect_provenance() if provenance is None else provenance).items():
             write_text(file["provenance"], name, text)
+        if more is not None:
+            more(file)
     return path
 
 

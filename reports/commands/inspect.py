@@ -1,4 +1,4 @@
-"""`iapb inspect FILE`: what a run file holds, from the file alone."""
+"""`iapb inspect FILE`: what a run file holds, from the file alone: a simulation, or an impact that broke a law."""
 
 from __future__ import annotations
 
@@ -13,19 +13,26 @@ def inspect(
     impacts: Annotated[int, typer.Option(min=0, help="How many impacts to list.")] = 10,
 ) -> None:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
+    from reports.commands.inspect_impact import describe_impact
     from reports.commands.run import describe
+    from reports.store_impact import read_broken_impact
     from reports.store_read import read_head, read_provenance, read_run
 
     run, head = read_run(file), read_head(file)
-    describe(run, existed=True)
-    print("Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}.")
+    broken = read_broken_impact(file)
+    if broken is None:
+        describe(run, existed=True)
+        print("Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}.")
+    else:
+        describe_impact(broken, file)
     if impacts and len(run.impacts.step):
         _list_impacts(run, impacts)
     if run.steps:  # a run can be stopped before its first step is done
         print("\nEnergy at the end [J] (iapb.mechanics.energy):")
         for name, values in run.energy.items():
             print(f"  {name:<22}{values[-1]: .6e}")
-    print("\nEffects that were on:")
+    if run.effects:
+        print("\nEffects that were on:")
     for effect in run.effects:
         if effect.active:
             print(f"  {effect.name}: {effect.reason}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reports.campaign import Campaign, CampaignRequest
+from reports.campaign import KEPT_PER_LAW, Campaign, CampaignRequest
 
 if TYPE_CHECKING:
     from verification.properties.tally import LawCount
@@ -36,8 +36,12 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
         raise
     kept = _print_counts(campaign, batches)
     print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
-    for path in campaign.counterexamples()[:_SHOWN]:
-        print(f"again: iapb verify --recheck {path}")
+    found = campaign.counterexamples()
+    if found:
+        print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law, a run each, for iapb "
+              "inspect FILE. Judged again by:")
+    for path in found[:_SHOWN]:
+        print(f"  iapb verify --recheck {path}")
     return kept
 
 

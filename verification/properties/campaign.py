@@ -22,6 +22,7 @@ from verification.properties.engine_laws import ENGINE_LAWS
 from verification.properties.families import draw_case, with_unequal_restitution
 from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.scenes import draw_scene
+from verification.properties.struck import Struck, strike
 from verification.properties.tally import LawCount, RunningCount, residual_of
 from verification.properties.trajectory_laws import judge_run
 
@@ -62,7 +63,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Found:
-    """A counterexample: the law it breaks, where it was drawn, the case, and the run of a scene."""
+    """A counterexample: the law it breaks, where it was drawn, the case, and the run of a scene or what was struck."""
 
     law: str
     part: str
@@ -70,6 +71,7 @@ class Found:
     residual: LawResidual
     case: Any
     run: Run | None = None
+    struck: Struck | None = None
 
 
 @dataclass(frozen=True)
@@ -145,8 +147,9 @@ def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | N
             for law, residual in results.items():
                 kept = counts.setdefault(law, RunningCount()).add(residual)
                 if not kept and sum(one.law == law for one in found) < STORED_PER_LAW:
+                    struck = strike(batch.part, case, subject.resolver)
                     # replaced by itself: a copy without what its laws have worked out
-                    found.append(Found(law, batch.part, index, residual, replace(case), run))
+                    found.append(Found(law, batch.part, index, residual, replace(case), run, struck))
             if progress is not None:
                 progress(index + 1 - batch.first)
     counted = tuple(running.count(law) for law, running in counts.items())

@@ -10,31 +10,56 @@ import numpy as np
 
 from verification.properties.bounds import FACTORED, KIT, Bounds
 from verification.properties.case import ImpactCase
+from verification.properties.engine_laws import ENGINE_LAWS
 
 _BY_NAME = {"KIT": KIT, "FACTORED": FACTORED}
 
 
 def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None) -> str:
-    """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap."""
+    """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap.
+
+    A law of the engine's own (a budget, extreme inputs) is put to the engine, whatever the resolver and the bounds.
+    """
+    if law in ENGINE_LAWS:
+        return _test_of_the_engine(case, law)
     table = "UNEQUAL_LAWS" if law.startswith("unequal_") else "LAWS"
-    optional = {"translations": case.translations, "unequal": case.unequal}
-    arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
-    arrays |= {name: array for name, array in optional.items() if array is not None}
-    more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)
     name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
     imports = ["import numpy as np", f"from verification.properties import {table}, ImpactCase"]
     imports.append(f"from verification.properties.bounds import {name or 'Bounds'}")
     return "\n".join([
         *imports,
         import_line(resolver) or "\n# resolver = ...  the one under test",
+        *_test_of(case, law),
+        f"    residual = {table}[{law!r}].check(case, resolver, {name or _bounds(bounds)})",
+        "    assert residual.passed, residual",
+    ])  # fmt: skip
+
+
+def _test_of_the_engine(case: ImpactCase, law: str) -> str:
+    return "\n".join([
+        "import numpy as np",
+        "from verification.properties import ImpactCase",
+        "from verification.properties.engine_laws import ENGINE_LAWS",
+        *_test_of(case, law),
+        f"    law = ENGINE_LAWS[{law!r}]",
+        "    residual = law.check(case, law.ours)",
+        "    assert residual.passed, residual",
+    ])  # fmt: skip
+
+
+def _test_of(case: ImpactCase, law: str) -> list[str]:
+    """The head of the test, and its case."""
+    optional = {"translations": case.translations, "unequal": case.unequal}
+    arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
+    arrays |= {name: array for name, array in optional.items() if array is not None}
+    more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)
+    return [
         "",
         "",
         f"def test_{law}():",
         *(f"    {key} = {_written(array)}" for key, array in arrays.items()),
         f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
-        f"    residual = {table}[{law!r}].check(case, resolver, {name or _bounds(bounds)})",
-        "    assert residual.passed, residual",
-    ])  # fmt: skip
+    ]
 
 
 def import_line(resolver: Any) -> str:
