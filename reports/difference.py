@@ -1,6 +1,7 @@
 """Two reports compared number by number: what agrees exactly, what within a tolerance, what differs.
 
-Measured times are never judged: they belong to a machine and an hour.
+Measured times are never judged: they belong to a machine and an hour. Each table says itself which of its columns hold
+them (`Numbers.timed`).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 from reports.figures.figure import Numbers
@@ -21,13 +23,7 @@ TOLERANCE = 1e-9
 # Below this a number of the report is itself rounding: errors of 1e-16 need not repeat to any digit.
 ROUNDING = 1e-12
 
-_TIME_UNIT = re.compile(r"\[(?:log₁₀ ?)?(?:s|ms|µs|us|ns|min|h)(?:\]| per | a |/)")
-_TIME_WORD = re.compile(r"\b(?:times?|timed|seconds|faster|slower|speed-up|real-time)\b", re.IGNORECASE)
-# Tables, and rows of the tables of outcomes, that are made from times as well: ratios, late calls, verdicts on cost.
-_FROM_TIMES = re.compile(
-    r"^(?:haptic-rate(?:/|$)|claims/C(?:19|22)$|claims/\d+: C(?:19|22)$|verdicts/\d+: The haptic rate$"
-    r"|complementarity/(?:time per|.*profile)|inputs/work_prec|figures/.*(?:profile|cost|precision|haptic|budget))"
-)
+_PART_END = re.compile("[/,]")
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
@@ -73,11 +69,11 @@ class Difference:
         """Largest relative difference among those that agree within the tolerance."""
         return max((cell.gap for cell in self.of(CLOSE)), default=0.0)
 
-    def by_table(self) -> dict[str, Counter[str]]:
-        """Number of cells in each state, by table."""
+    def by_part(self) -> dict[str, Counter[str]]:
+        """Number of cells in each state, by part of the report: what stands before the first / or comma of a table."""
         found: dict[str, Counter[str]] = {}
         for cell in self.cells:
-            found.setdefault(cell.table, Counter())[cell.state] += 1
+            found.setdefault(_PART_END.split(cell.table)[0], Counter())[cell.state] += 1
         return found
 
 
@@ -96,24 +92,19 @@ def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...
     return tuple(name for name in first if name not in second)
 
 
-def is_timing(table: str, row: str, column: str) -> bool:
-    """Whether a cell holds a time, or what was made from times."""
-    made_from = _FROM_TIMES.search(table) or _FROM_TIMES.search(f"{table}/{row}")
-    return bool(_TIME_UNIT.search(column) or _TIME_WORD.search(column) or made_from)
-
-
 def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
     old_rows, new_rows = _rows(old, new)
+    timed, timed_rows = {*old.timed, *new.timed}, old.timed_rows or new.timed_rows
     for row in dict.fromkeys((*old_rows, *new_rows)):
         first, second = old_rows.get(row, {}), new_rows.get(row, {})
         for column in dict.fromkeys((*first, *second)):
             if column not in first or column not in second:
-                state, gap = (ONLY_OLD if column in first else ONLY_NEW), 0.0
+                state, gap = ONLY_OLD if column in first else ONLY_NEW, 0.0
+                by_time = timed_rows
             else:
                 state, gap = compare_values(first[column], second[column], tolerance)
-            if is_timing(table, row, column) and state != EXACT:
-                state = TIMING
-            yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
+                by_time = column in timed
+            yield Cell(table, column, row, first.get(column), second.get(column), TIMING if by_time else state, gap)
 
 
 def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
@@ -154,7 +145,7 @@ def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
         return (CLOSE if gap <= tolerance else DIFFERS), gap
     if isinstance(old, str) and isinstance(new, str) and _NUMBER.sub("#", old) == _NUMBER.sub("#", new):
         pairs = zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
-        gap = max((_gap(_value(a), _value(b)) for a, b in pairs), default=0.0)
+        gap = max((_printed_gap(a, b) for a, b in pairs), default=0.0)
         return (CLOSE if gap <= tolerance else DIFFERS), gap
     return DIFFERS, math.inf
 
@@ -178,5 +169,12 @@ def _gap(old: float, new: float) -> float:
     return 0.0 if largest <= ROUNDING else abs(old - new) / largest
 
 
-def _value(text: str) -> float:
-    return float(text.replace("−", "-"))
+def _printed_gap(old: str, new: str) -> float:
+    """Relative difference of two printed numbers; none where they part by one in the last digit of a fraction.
+
+    What was rounded for print can fall to either side. Counts have no fraction and must agree.
+    """
+    a, b = (Decimal(text.replace("−", "-")) for text in (old, new))
+    unit = Decimal(1).scaleb(max(int(x.as_tuple().exponent) for x in (a, b)))
+    rounded = all("." in text or "e" in text for text in (old, new))
+    return 0.0 if rounded and abs(a - b) <= unit else _gap(float(a), float(b))

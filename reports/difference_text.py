@@ -6,11 +6,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, TIMING, Cell, Difference
+from reports.provenance import PEERS
 
+# Columns of the table by part of the report, each with the states that it counts.
+PARTS = (("the same", (EXACT,)), ("within the tolerance", (CLOSE,)), ("differ", (DIFFERS,)),
+         ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)))  # fmt: skip
 SHOWN = 20  # rows of the table; the rest is counted
 _WIDEST = 34  # letters of a cell
-# What must be equal for runs to come out the same to the last bit. The lock fixes the BLAS, the processor its kernels.
-_BITWISE = ("cpu", "lock", "sources")
+# What must be equal for all to come out the same to the last bit. The lock fixes the BLAS, the processor its kernels;
+# of what is compared with, some is outside of the lock.
+_BITWISE = ("cpu", "lock", "sources", *PEERS)
 
 
 def sentences(found: Difference, tolerance: float) -> Iterator[str]:
@@ -19,7 +24,7 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
     judged = exact + close + differs
     yield (f"Of {judged} numbers and words in both reports, {exact} are exactly the same, {close} agree within "
            f"{tolerance:.0e} (by {found.largest_gap:.1e} at most), and {differs} differ.")  # fmt: skip
-    yield f"{found.count(TIMING)} measured times differ, and are not judged."
+    yield f"{found.count(TIMING)} measured times, and what is made from them, are not judged."
     old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
     if old or new or found.tables_old or found.tables_new:
         yield (f"{old} are only in the old report and {new} only in the new one, besides {len(found.tables_old)} and "
@@ -36,6 +41,12 @@ def table(found: Difference, state: str = DIFFERS) -> Iterator[tuple[str, str, s
     """Rows (table, row, column, old, new, relative difference) of what differs most, SHOWN at most."""
     for cell in found.of(state)[:SHOWN]:
         yield cell.table, _short(cell.row), _short(cell.column), *_values(cell), f"{cell.gap:.1e}"
+
+
+def parts(found: Difference) -> Iterator[tuple[str, ...]]:
+    """Rows (part of the report, then how many cells are in each of the states of PARTS)."""
+    for part, count in found.by_part().items():
+        yield part, *(str(sum(count[state] for state in states) or "") for _, states in PARTS)
 
 
 def _values(cell: Cell) -> tuple[str, str]:

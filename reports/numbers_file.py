@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from reports.pages.records import Evidence
 from reports.store_keys import plain
 
 NUMBERS_NAME = "numbers.json"
-FORMAT, FORMAT_VERSION = "iapb numbers", 1
+FORMAT, FORMAT_VERSION = "iapb numbers", 2
 LARGEST_FILE = 200_000_000  # bytes; a report's is a few million
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
@@ -37,16 +37,33 @@ class ReportNumbers:
 
 
 def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> ReportNumbers:
-    """Return every table of a report, those under its figures too, its verdicts, and what its runs came to."""
+    """Return every table and judged sentence of a report, and what its runs came to; no table twice."""
     tables = dict(_of_evidence(evidence))
-    tables |= {f"figures/{key}": figure.numbers for key, figure in figures.items() if figure.numbers is not None}
+    for key, figure in figures.items():
+        if figure.numbers is not None and all(figure.numbers is not table for table in tables.values()):
+            tables[f"figures/{key}"] = figure.numbers
     runs = {entry.command: entry.content_hash for entry in evidence.manifest if entry.used_by}
     return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
 
 
 def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
-    yield "verdicts", Numbers(("topic", "outcome"), tuple((one.topic, one.outcome) for one in evidence.verdicts))
-    yield "claims", Numbers(("claim", "outcome"), tuple((one.id, one.outcome) for one in evidence.claims))
+    yield from _outcomes("verdicts", ((one.topic, one.outcome, one.sentence, one.timed) for one in evidence.verdicts))
+    yield from _outcomes("claims", ((one.id, one.outcome, one.headline, one.timed) for one in evidence.claims))
+    for claim in evidence.claims:
+        if claim.numbers is not None:
+            yield f"claims/{claim.id}", claim.numbers
+    yield from _checks(evidence)
+    yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Numbers))
+    for scene, effects in evidence.effects.items():
+        rows = tuple((one.name, one.active, one.change, one.cost) for one in effects)
+        yield f"effects/{scene}", Numbers(("effect", "active", "change", "cost"), rows, timed=("cost",))
+    for topic in evidence.topics:
+        found = enumerate(topic.findings, 1)
+        yield from _outcomes(topic.id, ((number, one.outcome, one.sentence, one.timed) for number, one in found))
+        yield from ((f"{topic.id}/{name}", table) for name, table in topic.tables.items())
+
+
+def _checks(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
     yield "proofs", Numbers(("statement", "holds", "wrong twins"),
                             tuple((one.name, one.holds, len(one.twins)) for one in evidence.proofs))
     yield "properties", Numbers(
@@ -58,23 +75,21 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
         ("quantity", "against", "cases", "worst", "tolerance", "agrees"),
         tuple((one.quantity, one.against, one.cases, one.worst, one.tolerance, one.agrees)
               for one in evidence.cross_checks))  # fmt: skip
-    for claim in evidence.claims:
-        if claim.numbers is not None:
-            yield f"claims/{claim.id}", claim.numbers
-    for name, value in evidence.inputs.items():
-        if isinstance(value, Numbers):
-            yield f"inputs/{name}", value
-    for scene, effects in evidence.effects.items():
-        yield f"effects/{scene}", Numbers(("effect", "active"), tuple((one.name, one.active) for one in effects))
-    for topic in evidence.topics:
-        rows = tuple((number, one.outcome) for number, one in enumerate(topic.findings, 1))
-        yield topic.id, Numbers(("finding", "outcome"), rows)
-        yield from ((f"{topic.id}/{name}", table) for name, table in topic.tables.items())
+
+
+def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Numbers]]:
+    """Outcomes with their sentences, as one table; those that rest on measured times as another."""
+    columns, kept = ("what", "outcome", "sentence"), tuple(found)
+    yield name, Numbers(columns, tuple(tuple(row) for *row, timed in kept if not timed))
+    if any(timed for *_, timed in kept):
+        yield f"{name}, from times", Numbers(columns, tuple(tuple(row) for *row, timed in kept if timed),
+                                             timed=("outcome", "sentence"), timed_rows=True)  # fmt: skip
 
 
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
     """Write the numbers as JSON, to the last bit; what JSON has no number for is {"number": "nan"}, "inf" or "-inf"."""
-    tables = {name: {"columns": list(table.columns), "rows": [[_cell(value) for value in row] for row in table.rows]}
+    tables = {name: {"columns": list(table.columns), "timed": list(table.timed), "timed_rows": table.timed_rows,
+                     "rows": [[_cell(value) for value in row] for row in table.rows]}
               for name, table in numbers.tables.items()}  # fmt: skip
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "depth": numbers.depth,
                "provenance": dict(numbers.provenance), "runs": dict(numbers.runs), "tables": tables}  # fmt: skip
@@ -122,8 +137,8 @@ def _checked(content: Any) -> ReportNumbers:
 
 
 def _table(table: Any) -> Numbers:
-    columns = tuple(str(column) for column in table["columns"])
+    columns, timed = (tuple(str(column) for column in table[part]) for part in ("columns", "timed"))
     rows = tuple(tuple(_NOT_FINITE[v["number"]] if isinstance(v, dict) else v for v in row) for row in table["rows"])
     if any(len(row) != len(columns) for row in rows):
         raise ValueError("a row without a cell for each column")
-    return Numbers(columns, rows)
+    return Numbers(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]))

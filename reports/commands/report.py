@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,20 +47,26 @@ def report(
 
 
 def print_difference(found: Difference, tolerance: float) -> None:
-    """Print the sentences, and the table of what differs most."""
+    """Print the sentences, a table by part of the report, and what differs most."""
+    from reports.difference import DIFFERS
+    from reports.difference_text import PARTS, SHOWN, parts, sentences, table
+
+    _print_table("Numbers and words by part of the report", ("part", *(name for name, _ in PARTS)), parts(found))
+    count = found.count(DIFFERS)
+    if count:
+        _print_table(f"The largest {min(count, SHOWN)} of {count} differences",
+                     ("table", "row", "column", "old", "new", "relative"), table(found))  # fmt: skip
+    for sentence in sentences(found, tolerance):
+        print(sentence)
+
+
+def _print_table(title: str, headings: Iterable[str], rows: Iterable[tuple[str, ...]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from reports.difference import DIFFERS
-    from reports.difference_text import SHOWN, sentences, table
-
-    for sentence in sentences(found, tolerance):
-        print(sentence)
-    count = found.count(DIFFERS)
-    if count:
-        shown = Table(title=f"The largest {min(count, SHOWN)} of {count} differences")
-        for heading in ("table", "row", "column", "old", "new", "relative"):
-            shown.add_column(heading)
-        for row in table(found):
-            shown.add_row(*row)
-        Console().print(shown)
+    shown = Table(title=title)
+    for heading in headings:
+        shown.add_column(heading)
+    for row in rows:
+        shown.add_row(*row)
+    Console().print(shown)

@@ -42,6 +42,9 @@ def as_record(result: Any) -> Claim:
     if result.decided:
         headline = f"holds in {result.held} of {result.decided} trials"
     columns = tuple(column.heading for column in table.columns) + (("holds",) if table.holds else ())
+    timed = tuple(column.heading for column in table.columns if column.timed)
+    if timed and table.holds:
+        timed += ("holds",)
     words = {True: "yes", False: "no", None: "cannot tell"}
     rows = tuple(
         (*row, words[held]) for row, held in zip(table.rows, table.holds, strict=True)
@@ -50,7 +53,7 @@ def as_record(result: Any) -> Claim:
         id=result.id, statement=result.statement, place=result.place, outcome=result.verdict,
         headline=f"{result.finding} ({headline})" if headline else result.finding, quantity=result.quantity,
         conditions=result.conditions, tolerance=result.tolerance, fails=result.fails,
-        numbers=Numbers(columns, rows), figure=_map(result),
+        numbers=Numbers(columns, rows, timed=timed, timed_rows=bool(timed)), figure=_map(result),
     )  # fmt: skip
 
 

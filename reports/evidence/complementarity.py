@@ -39,7 +39,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         progress(len(stages) - 1, STAGES)
 
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
-    findings = tuple(Finding(judged.sentence, judged.verdict) for judged in judge(study))
+    findings = tuple(Finding(judged.sentence, judged.verdict, judged.timed) for judged in judge(study))
     progress(STAGES, STAGES)
     return Topic(ID, TITLE, LEAD, findings, tables.all_tables(study) | {"worlds": tables.worlds(runner)},
                  verdict(study, findings))  # fmt: skip

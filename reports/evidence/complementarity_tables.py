@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from verification.comparison.study import ComparisonStudy
 
 WORLD_SCENE = "peg_corner"
+SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
 
 
 def all_tables(study: ComparisonStudy) -> dict[str, Numbers]:
@@ -61,17 +62,16 @@ def impact_costs(study: ComparisonStudy) -> Numbers:
         for r in study.impact_costs
     )  # fmt: skip
     return Numbers(
-        ("impacts", "contacts", "coordinates", "solver", "outcome", "median [µs]", "least [µs]", "largest [µs]",
-         "samples", "distance", "note"), rows, 3,
+        ("impacts", "contacts", "coordinates", "solver", "outcome", *SPREAD, "samples", "distance", "note"), rows, 3,
         "From M, J, v to v⁺, one thread, in turns. Kernels are called from compiled code, all others from Python, "
-        "their checks included.")  # fmt: skip
+        "their checks included.", timed=(*SPREAD, "note"))  # fmt: skip
 
 
 def step_costs(study: ComparisonStudy) -> Numbers:
     """A row per scene and world."""
     rows = tuple((r.scene, r.way, *(1e6 * value for value in (r.median, r.least, r.largest)), r.repeats)
                  for r in study.step_costs)  # fmt: skip
-    return Numbers(("scene", "world", "median [µs]", "least [µs]", "largest [µs]", "samples"), rows, 3)
+    return Numbers(("scene", "world", *SPREAD, "samples"), rows, 3, timed=SPREAD)
 
 
 def profile(studies: Iterable[ProblemStudy]) -> Numbers:
@@ -83,7 +83,7 @@ def profile(studies: Iterable[ProblemStudy]) -> Numbers:
         for each in studies for kind, solver, shares in each.profile
         for factor, share in zip(FACTORS, shares, strict=True)
     )  # fmt: skip
-    return Numbers(("collection", "kind", "solver", "factor", "share solved"), rows, 3)
+    return Numbers(("collection", "kind", "solver", "factor", "share solved"), rows, 3, timed=("share solved",))
 
 
 def problems(study: ProblemStudy) -> Numbers:

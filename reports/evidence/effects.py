@@ -51,7 +51,8 @@ def summary(effects: Mapping[str, Sequence[SceneEffect]]) -> Numbers:
                  for scene, found in effects.items() for one in found
                  if one.saved is not None and one.position is not None)  # fmt: skip
     return Numbers(("scene", "effect", "time saved [%]", "error [mm]", "best of its error"), rows, 3,
-                   "Best of its error: no other effect saves more time at the cost of no larger error.")
+                   "Best of its error: no other effect saves more time at the cost of no larger error.",
+                   timed=("time saved [%]", "best of its error"))
 
 
 def _best(one: SceneEffect, others: Sequence[SceneEffect]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from reports.evidence import haptic_rate_tables as tables
@@ -27,8 +28,9 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 def topic_of(study: Any) -> Topic:
     """Findings and tables of a study."""
-    findings = (*_races(study), *_printed(study), *_solvers(study), _growth(study), *_rate(study), _bodies(study),
-                *_robots(study), *_start_up(study), _budgets(study), *_trajectories(study))  # fmt: skip
+    timed = (*_races(study), *_printed(study), *_solvers(study), _growth(study), *_rate(study), _bodies(study),
+             *_robots(study), *_start_up(study), *_trajectories(study))  # fmt: skip
+    findings = (*(replace(finding, timed=True) for finding in timed), _budgets(study))
     met, last = sum(finding.outcome == REPRODUCED for finding in findings), study.kernels[-1]
     verdict = (
         f"{met} of {len(findings)} questions on speed are answered as asked for; with {last.contacts} contacts the "

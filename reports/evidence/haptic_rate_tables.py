@@ -7,6 +7,8 @@ from typing import Any
 
 from reports.figures.figure import Numbers
 
+QUARTILES = ("time [µs]", "lower quartile [µs]", "upper quartile [µs]")
+
 
 def all_tables(study: Any) -> dict[str, Numbers]:
     """By name."""
@@ -28,23 +30,23 @@ def races(study: Any) -> Numbers:
                     "its step [µs]", "ratio", "quartiles", "asked for", "we moved", "it moved"), rows, 3,
                    "Frictionless (condim 1), same masses, forces and step; MuJoCo's other options are its defaults. "
                    "Ours is recorded, MuJoCo's is not. Moved: largest change of a coordinate while timed, m or rad.",
-                   )  # fmt: skip
+                   timed=("our step [µs]", "its step [µs]", "ratio", "quartiles", "we moved", "it moved"))  # fmt: skip
 
 
 def parts(study: Any) -> Numbers:
     """A row per scene and part."""
     rows = tuple((p.scene, p.part, *(1e6 * t for t in (p.seconds.median, p.seconds.lower, p.seconds.upper)))
                  for p in study.parts)  # fmt: skip
-    return Numbers(("scene", "part", "time [µs]", "lower quartile [µs]", "upper quartile [µs]"), rows, 3,
-                   "Each part repeated by itself in compiled code.")
+    return Numbers(("scene", "part", *QUARTILES), rows, 3, "Each part repeated by itself in compiled code.",
+                   timed=QUARTILES)
 
 
 def scaling(study: Any) -> Numbers:
     """A row per method and size."""
     rows = tuple((t.method, t.coordinates, t.contacts, t.seconds.median * 1e6, t.seconds.lower * 1e6,
                   t.seconds.upper * 1e6) for t in study.scaling)  # fmt: skip
-    return Numbers(("method", "coordinates", "contacts", "time [µs]", "lower quartile [µs]", "upper quartile [µs]"),
-                   rows, 3, "Rows of rank two thirds of d.")
+    return Numbers(("method", "coordinates", "contacts", *QUARTILES), rows, 3, "Rows of rank two thirds of d.",
+                   timed=QUARTILES)
 
 
 def fitted(study: Any) -> Numbers:
@@ -53,7 +55,8 @@ def fitted(study: Any) -> Numbers:
 
     rows = tuple((method, axis, exponent(study.scaling, method, axis))
                  for method in ("factored", "gram_pinv") for axis in ("contacts", "coordinates"))  # fmt: skip
-    return Numbers(("method", "axis", "exponent"), rows, 3, "Least squares of log time over log size.")
+    return Numbers(("method", "axis", "exponent"), rows, 3, "Least squares of log time over log size.",
+                   timed=("exponent",))
 
 
 def rate(study: Any) -> Numbers:
@@ -62,14 +65,16 @@ def rate(study: Any) -> Numbers:
 
     sizes = dict.fromkeys(trial.coordinates for trial in study.trials)
     rows = tuple((d, *(most_contacts(study.trials, method, d) for method in (FACTORED, PRINTED))) for d in sizes)
-    return Numbers(("coordinates", "most contacts, factored", "most contacts, printed formula"), rows, 6,
-                   "Largest size tried of which 999 of 1000 impacts end within 1 ms, on this machine.")
+    found = ("most contacts, factored", "most contacts, printed formula")
+    return Numbers(("coordinates", *found), rows, 6,
+                   "Largest size tried of which 999 of 1000 impacts end within 1 ms, on this machine.", timed=found)
 
 
 def bodies(study: Any) -> Numbers:
     """A row per number of bodies."""
     rows = tuple((b.bodies, b.seconds * 1e6, b.contacts, b.pairs, b.tested) for b in study.bodies)
-    return Numbers(("bodies", "step [µs]", "contacts", "pairs of shapes", "pairs tested"), rows, 3)
+    return Numbers(("bodies", "step [µs]", "contacts", "pairs of shapes", "pairs tested"), rows, 3,
+                   timed=("step [µs]",))
 
 
 def robots(study: Any) -> Numbers:
@@ -77,7 +82,8 @@ def robots(study: Any) -> Numbers:
     names = ("robot", "velocities", "quantity", "form", "time", "Pinocchio", "ratio", "lower quartile",
              "upper quartile")  # fmt: skip
     heads = tuple({"time": "ours [µs]", "Pinocchio": "Pinocchio [µs]"}.get(name, name) for name in names)
-    return Numbers(heads, tuple(tuple(row[name] for name in names) for row in study.robots), 3, study.robots_of)
+    return Numbers(heads, tuple(tuple(row[name] for name in names) for row in study.robots), 3, study.robots_of,
+                   timed=heads[4:])
 
 
 def solvers(study: Any) -> Numbers:
@@ -86,13 +92,15 @@ def solvers(study: Any) -> Numbers:
                   _known(r.largest * 1e6), _known(r.distance)) for r in study.solvers)  # fmt: skip
     return Numbers(("impacts", "contacts", "solver", "outcome", "median [µs]", "least [µs]", "largest [µs]",
                     "distance of v⁺"), rows, 3,
-                   "From M, J, v to v⁺; kernels compiled, all others from Python.")  # fmt: skip
+                   "From M, J, v to v⁺; kernels compiled, all others from Python.",
+                   timed=("median [µs]", "least [µs]", "largest [µs]"))  # fmt: skip
 
 
 def start(study: Any) -> Numbers:
     """A row per process."""
     rows = tuple((s.what, s.wall, s.cpu, s.runs, s.limit) for s in study.start_up)
-    return Numbers(("what", "on the wall [s]", "computing [s]", "processes", "asked for [s]"), rows, 3)
+    return Numbers(("what", "on the wall [s]", "computing [s]", "processes", "asked for [s]"), rows, 3,
+                   timed=("on the wall [s]", "computing [s]"))
 
 
 def budgets(study: Any) -> Numbers:
@@ -111,7 +119,8 @@ def motions(study: Any) -> Numbers:
     return Numbers(("scene", "method", "step [ms]", "time [ms]", "position", "velocity", "energy",
                     "signed energy", "outcome", "note"), rows, 3,
                    "Position in lengths of the body (sup norm), velocity in largest speeds (L¹, at samples a "
-                   "millisecond apart), energy at the end in largest kinetic energies.")  # fmt: skip
+                   "millisecond apart), energy at the end in largest kinetic energies.",
+                   timed=("time [ms]", "note"))  # fmt: skip
 
 
 def _known(value: float) -> float | None:

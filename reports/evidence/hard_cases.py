@@ -17,6 +17,7 @@ COLUMNS = (
     "method", "outcome", "energy gain", "gain allowed", "restitution residual", "forward error", "error allowed",
     "rank", "exact rank", "time [µs]", "note",
 )
+TIME = "time [µs]"
 _NOTES = {
     "impact": "Gain exact, (KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric; median time of a call.",
     "motion": "Gain: the most energy ever made, as a share of what was there or was fed in; error: distance from the "
@@ -41,7 +42,7 @@ def summary(cases: Sequence[HardCase]) -> Numbers:
     """All cases in one table: a row per case and method or world."""
     shown = len(COLUMNS) - 1  # all but the notes
     rows = tuple((case.name, case.kind, *row[:shown]) for case in cases for row in case.numbers.rows)
-    return Numbers((CASE, KIND, *COLUMNS[:shown]), rows, 2)
+    return Numbers((CASE, KIND, *COLUMNS[:shown]), rows, 2, timed=(TIME,))
 
 
 def _record(name: str, runner: Runner) -> HardCase:
@@ -55,7 +56,8 @@ def _record(name: str, runner: Runner) -> HardCase:
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
     rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner))
     noted = any(row[-1] for row in rows)
-    numbers = Numbers(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind])
+    numbers = Numbers(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind],
+                      timed=(TIME,))
     return HardCase(name, case.name, case.source, kind, case.why_hard, case.law, case.expected, numbers)
 
 

@@ -60,6 +60,6 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         sentences.operating(studies["operating"]),
         *sentences.linked(linked),
         sentences.false_collisions(rolled),
-        sentences.many_bodies(costs),
+        *sentences.many_bodies(costs),
     )
     return Topic(ID, TITLE, LEAD, findings, tables, sentences.verdict(studies, linked))

@@ -87,4 +87,5 @@ def bodies_table(costs: Sequence[StepCost]) -> Numbers:
     columns = ("free bodies", "pairs that could touch", "pairs tested per step", "contacts per step",
                "impacts in 500 steps", "time per step [µs]")  # fmt: skip
     rows = tuple((c.bodies, c.pairs, c.tested, c.contacts, c.impacts, 1e6 * c.seconds) for c in costs)
-    return Numbers(columns, rows, digits=3, note="Times are those of the machine that made this report.")
+    return Numbers(columns, rows, digits=3, timed=columns[-1:],
+                   note="Times are those of the machine that made this report.")

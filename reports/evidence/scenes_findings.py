@@ -155,4 +155,4 @@ def _time(measures: Sequence[SceneMeasure]) -> Finding:
         f"{YARDSTICK} ({1e6 * unit:.1f} µs on this machine beside other work). Nearest to real time is {near.scene}: "
         f"a step is computed {near.realtime_factor:.1f} times as fast as it lasts."
     )
-    return Finding(sentence, REPRODUCED if near.realtime_factor > 1.0 else LIMITED)
+    return Finding(sentence, REPRODUCED if near.realtime_factor > 1.0 else LIMITED, timed=True)

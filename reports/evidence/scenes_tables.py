@@ -47,7 +47,7 @@ def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
         for m in measures
     )  # fmt: skip
     note = "Time of the quickest part of each run, on a machine that did other work too: compare the ratios."
-    return Numbers(columns, rows, digits=3, note=note)
+    return Numbers(columns, rows, digits=3, note=note, timed=columns[8:11])
 
 
 def ledger(measures: Sequence[SceneMeasure]) -> Numbers:

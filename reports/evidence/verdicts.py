@@ -35,7 +35,8 @@ def _claims(evidence: Evidence) -> Iterator[Verdict]:
     refuted = [claim.id for claim in evidence.claims if claim.outcome == REFUTED]
     outcome = REPRODUCED if set(count) == {REPRODUCED} else LIMITED
     tail = f" Refuted: {', '.join(refuted)}." if refuted else ""
-    yield Verdict("The paper's claims", outcome, f"Of {len(evidence.claims)} claims computed: {words}.{tail}", "claims")
+    yield Verdict("The paper's claims", outcome, f"Of {len(evidence.claims)} claims computed: {words}.{tail}", "claims",
+                  any(claim.timed for claim in evidence.claims))
 
 
 def _passivity(evidence: Evidence) -> Iterator[Verdict]:
@@ -97,4 +98,5 @@ def _topics(evidence: Evidence) -> Iterator[Verdict]:
     for topic in evidence.topics:
         if topic.verdict:
             outcome = min((finding.outcome for finding in topic.findings), key=_WORST_FIRST.index)
-            yield Verdict(topic.title, outcome, topic.verdict, topic.id)
+            timed = any(finding.timed for finding in topic.findings)
+            yield Verdict(topic.title, outcome, topic.verdict, topic.id, timed)

@@ -17,13 +17,22 @@ from reports.figures.style import LineStyle
 class Numbers:
     """Numbers under a figure: `columns` are headings with their unit, `rows` hold text or numbers.
 
-    A number is printed with `digits` significant digits; None is printed as a dash: "does not apply".
+    A number is printed with `digits` significant digits; None is printed as a dash: "does not apply". `timed` names the
+    columns that hold measured times, or what is made from them: nobody can ask that they repeat. `timed_rows`: which
+    rows there are depends on times too, as where larger sizes are tried until one is too slow.
     """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
     digits: int = 4
     note: str = ""
+    timed: tuple[str, ...] = ()
+    timed_rows: bool = False
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.timed if name not in self.columns]
+        if unknown:
+            raise ValueError(f"timed columns {unknown}: expected some of {self.columns}")
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,13 @@ OUTCOMES = (REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED)
 
 @dataclass(frozen=True)
 class Verdict:
-    """One sentence of the first page; `link` is the id of the section that proves it."""
+    """One sentence of the first page; `link` is the id of the section that proves it, `timed` as in Finding."""
 
     topic: str
     outcome: str
     sentence: str
     link: str = ""
+    timed: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,11 @@ class Claim:
     numbers: Numbers | None = None
     figure: Figure | None = None
     inputs: tuple[str, ...] = ()  # names of runs and tables
+
+    @property
+    def timed(self) -> bool:
+        """Whether its outcome rests on measured times."""
+        return self.numbers is not None and bool(self.numbers.timed)
 
 
 @dataclass(frozen=True)
@@ -117,10 +123,11 @@ class HardCase:
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence that a topic found, with its number in it, and what that means."""
+    """One sentence that a topic found, with its number, and what that means; `timed` if measured times are in it."""
 
     sentence: str
     outcome: str
+    timed: bool = False
 
 
 @dataclass(frozen=True)

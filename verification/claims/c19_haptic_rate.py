@@ -14,8 +14,8 @@ COLUMNS = (
     Column("method", condition=True, part=True),
     Column("coordinates", condition=True),
     Column("contacts", condition=True),
-    Column("late calls", "of 1000"),
-    Column("time", "µs"),
+    Column("late calls", "of 1000", timed=True),
+    Column("time", "µs", timed=True),
 )
 MANY = 60  # collisions at once: ten times the six of the paper's peg in the hole
 

@@ -19,10 +19,10 @@ COLUMNS = (
     Column("problem", condition=True),
     Column("solver", condition=True),
     Column("contacts", condition=True),
-    Column("decades"),
-    Column("ratio"),
-    Column("least ratio"),
-    Column("largest ratio"),
+    Column("decades", timed=True),
+    Column("ratio", timed=True),
+    Column("least ratio", timed=True),
+    Column("largest ratio", timed=True),
 )
 CONTACTS = {"quick": (1, 4, 16, 64, 300), "full": (1, 2, 4, 8, 16, 32, 64, 128, 300)}
 SOLVERS = {"quick": ("daqp", "quadprog", "lemke"), "full": ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp")}

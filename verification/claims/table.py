@@ -11,12 +11,16 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of every trial: a `condition` was chosen, a `part` is judged apart, the others are measured."""
+    """One quantity of every trial: a `condition` was chosen, a `part` is judged apart, the others are measured.
+
+    A `timed` one is a measured time or made from some: it need not repeat.
+    """
 
     name: str
     unit: str = ""
     condition: bool = False
     part: bool = False
+    timed: bool = False
 
     @property
     def heading(self) -> str:

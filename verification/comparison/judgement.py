@@ -25,11 +25,15 @@ SAME_LAW = 1e-8
 
 @dataclass(frozen=True)
 class Judged:
-    """A sentence with its verdict: `name` is that of the function in `sentences` that made it."""
+    """A sentence with its verdict: `name` is that of the function in `sentences` that made it.
+
+    timed : whether it rests on measured times
+    """
 
     name: str
     sentence: str
     verdict: str
+    timed: bool = False
 
 
 def judge(study: ComparisonStudy) -> tuple[Judged, ...]:
@@ -38,7 +42,7 @@ def judge(study: ComparisonStudy) -> tuple[Judged, ...]:
     for name, verdict in VERDICTS.items():
         sentence = getattr(sentences, name)(study)
         if sentence:
-            found.append(Judged(name, sentence, verdict(study)))
+            found.append(Judged(name, sentence, verdict(study), name in FROM_TIMES))
     for folder in study.problems:
         found += judge_problems(folder)
     return tuple(found)
@@ -133,3 +137,4 @@ VERDICTS: dict[str, Callable[[ComparisonStudy], str]] = {
     "cost": _cost,
     "steps": _steps,
 }
+FROM_TIMES = ("cost", "steps")
