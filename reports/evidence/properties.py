@@ -11,7 +11,7 @@ from reports.pages.records import Property
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
 COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
 KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
-ENGINE_CASES, ROOMS, FAULT_CASES = 300, 20, 60
+ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60  # cases of a law; of one that simulates each; with a fault
 TRAJECTORIES, TRAJECTORY_STEPS = 60, 300
 SEED = 20050601
 Progress = Callable[[int, int], None]
@@ -56,7 +56,7 @@ def _engine_laws() -> Iterator[Property]:
     from verification.properties.planted_engine import PLANTED_ENGINE_FAULTS
 
     for name in ENGINE_LAWS:
-        cases = ROOMS if name == "group_splitting" else ENGINE_CASES
+        cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
         verdict, (fault, make) = judge_engine_law(name, cases=cases, seed=SEED), PLANTED_ENGINE_FAULTS[name]
         with np.errstate(all="ignore"):  # the faults compute with what overflows
             caught = not judge_engine_law(name, make(), cases=min(cases, FAULT_CASES), seed=SEED).passed

@@ -23,6 +23,7 @@ MARKS = {"settles": "+", "bounces on": "o", "grows": "x"}
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Maps of the sampled wall, and the peg under the same laws."""
+    from verification.stability.device_port import device_port_leaks
     from verification.stability.maps import stability_maps
     from verification.stability.peg import peg_contacts
     from verification.stability.waveforms import compare_waveforms
@@ -31,12 +32,14 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     pegs = peg_contacts(shipped_scene("peg_corner"),
                         lambda scene, world: runner(scene, world, keep=False, partial=True), depth, progress)
     pulses = compare_waveforms(shipped_scene("peg_corner"), lambda scene: runner(scene, "IAPB", keep=False))
+    ports = device_port_leaks(depth)
     tables = {
         "maps": _maps(maps), "dampings": Numbers(("damping [N s/m]",), tuple((float(B),) for B in maps[0].damping)),
         "hardness": _hardness(maps), "peg": _pegs(pegs),
-        "waveforms": _waveforms(pulses),
+        "waveforms": _waveforms(pulses), "hand port": _ports(ports),
     }  # fmt: skip
-    findings = (_held(maps), _beyond(maps), _undamped(maps), _hard(maps), *_peg(pegs), _pulses(pulses))
+    findings = (_held(maps), _beyond(maps), _undamped(maps), _hard(maps), *_peg(pegs), _pulses(pulses),
+                _coupled(ports), _coordinated(ports))  # fmt: skip
     return Topic("stability", "Stability of contact", LEAD, findings, tables, findings[0].sentence)
 
 
@@ -170,3 +173,42 @@ def _pulses(pulses: Sequence[Any]) -> Finding:
         f"Every waveform gives the hand the computed momentum (all but {unpaid:.0e}) and no more energy than the "
         f"collisions took; a brake asks for {brake.peak_force:.3g} N at most where one step asks for "
         f"{step.peak_force:.3g} N.", REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip
+
+
+def _ports(ports: Sequence[Any]) -> Numbers:
+    rows = tuple((p.loop.world, p.loop.stiffness, p.loop.damping, p.sensors, p.motion, p.loop.bound, p.needed, p.ratio,
+                  1e3 * p.leak, p.leak / p.turned_over if p.leak else 0.0) for p in ports)  # fmt: skip
+    return Numbers(
+        ("world", "stiffness [N/m]", "damping [N s/m]", "sensors", "the hand", "KT/2 + |B| [N s/m]",
+         "damping needed [N s/m]", "needed / bound", "leak at the bound [mJ]", "of what was turned over"), rows, 4,
+        "Whole device loops at 512 Hz, the hand moving 0.5 mm to and fro, worst over several speeds; stiffness and "
+        "damping of the coupler in CBuc, else of the wall, with the coordination of Table I.")  # fmt: skip
+
+
+def _coupled(ports: Sequence[Any]) -> Finding:
+    from verification.stability.device_loop import COUPLER_WORLD
+
+    coupled = [p for p in ports if p.loop.world == COUPLER_WORLD]
+    pressing = [p for p in coupled if p.motion == "presses" and p.sensors == "ideal"]
+    crossing, late = ([p.ratio for p in coupled if p.motion == motion and (p.sensors == "ideal") == ideal]
+                      for motion, ideal in (("crosses", True), ("presses", False)))  # fmt: skip
+    most = max(p.ratio for p in pressing)
+    return Finding(
+        "A device coupled to a tool on a rigid wall, the hand pressing and the sensors ideal, leaks nothing from "
+        f"b = KT/2 + |B| of the coupler on: it needs {most:.4f} of that. Late or coarse sensors need up to "
+        f"{max(late):.3g} of it, and a hand that goes in and out of contact {max(crossing):.3g}: a coupler that "
+        "switches on stretched brings energy of its own.",
+        LIMITED if most <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
+
+
+def _coordinated(ports: Sequence[Any]) -> Finding:
+    from verification.stability.device_loop import COORDINATION, COUPLER_WORLD
+
+    four = [p for p in ports if p.loop.world != COUPLER_WORLD]
+    wall, whole = (max(p.needed / bound(p.loop) for p in four) for bound in
+                   (lambda loop: loop.bound, lambda loop: loop.bound_with_coordination))  # fmt: skip
+    return Finding(
+        f"With the four-channel controller the wall's own KT/2 + |B| is not enough: up to {wall:.3g} of it is needed, "
+        f"{min(p.needed for p in four):.3g} to {max(p.needed for p in four):.3g} N s/m, for the coordination's damping "
+        f"of {COORDINATION[1]:g} N s/m is felt in the hand as well. The gains of both added, up to {whole:.3g} of the "
+        "bound is needed: no bound here, for the tool moves. The paper's device has no damping.", LIMITED)

@@ -34,8 +34,8 @@ OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
 ONE_IN = 10
 # Cases of a part for each impact or trajectory asked for, and cases per batch (a few seconds of work).
 _SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0.1, "hand_port": 0.02}
-_GROUPS_PER_TRAJECTORY = 0.2
-BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, "group_splitting": 20}
+_PER_TRAJECTORY = {"group_splitting": 0.2, "device_port": 0.1}
+BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, "group_splitting": 20, "device_port": 20}
 _BATCH = 2000
 # Counterexamples kept of each law and batch. All are counted, and all are kept unless a resolver breaks the law in more
 # than one case in forty: then the first say what is wrong with it, and a million files would say no more.
@@ -87,7 +87,7 @@ def plan(impacts: int, trajectories: int, parts: tuple[str, ...] = PARTS) -> tup
     """Return the batches of so many impacts and trajectories, with their share of the other parts."""
     totals = {IMPACTS: impacts, TRAJECTORIES: trajectories}
     totals |= {part: round(share * impacts) for part, share in _SHARE.items()}
-    totals["group_splitting"] = round(_GROUPS_PER_TRAJECTORY * trajectories)
+    totals |= {part: round(share * trajectories) for part, share in _PER_TRAJECTORY.items()}
     return tuple(batch for part in parts for batch in _batches(part, totals[part]))
 
 

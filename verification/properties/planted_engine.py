@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb.run import Run
 from verification.properties.case import Floats
@@ -15,6 +16,7 @@ from verification.properties.engine_laws.device_limits import saturated
 from verification.properties.engine_laws.hand_port import Wall
 from verification.properties.scenes import SceneCase
 from verification.properties.sound import sound_resolver
+from verification.stability.device_loop import DeviceLoop, actuator_forces
 
 __all__ = ["ENGINE_LAWS", "PLANTED_ENGINE_FAULTS", "EngineLaw", "judge_engine_law"]
 
@@ -47,11 +49,17 @@ def one_factor_for_all(case: SceneCase) -> Run:
     return replace(run, v=run.v * factor[:, None])
 
 
+def stiffer_coupler(loop: DeviceLoop, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A coupler a twentieth stiffer than it is said to be."""
+    return actuator_forces(replace(loop, stiffness=1.05 * loop.stiffness), positions)
+
+
 # law -> (name of the fault, how to make its subject)
 PLANTED_ENGINE_FAULTS: dict[str, tuple[str, Callable[[], Callable[..., Any]]]] = {
     "truncation": ("rows not made orthogonal", lambda: not_orthogonal),
     "device_limits": ("saturation, component by component", lambda: saturated),
     "group_splitting": ("one factor for all groups", lambda: one_factor_for_all),
     "hand_port": ("a wall one reading late", makes_late_wall),
+    "device_port": ("a coupler stiffer than it says", lambda: stiffer_coupler),
     "extremes": ("plain numpy without checks", lambda: sound_resolver),
 }

@@ -16,7 +16,8 @@ from verification.properties.engine_laws.hand_port import hand_port_is_passive, 
 from verification.properties.engine_laws.hand_port import ours as wall
 from verification.properties.planted_engine import PLANTED_ENGINE_FAULTS
 
-CASES = {"group_splitting": 8, "truncation": 80}  # three simulations a case; a resolver call per budget
+# three simulations a case; a resolver call per budget; a rigid contact in every step
+CASES = {"group_splitting": 8, "truncation": 80, "device_port": 12}
 
 
 @pytest.mark.parametrize("law", ENGINE_LAWS)

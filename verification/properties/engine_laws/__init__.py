@@ -1,4 +1,5 @@
-"""Laws that ask more than an impact resolver: a row budget, a device's limits, a wall in the hand, inputs of any size.
+"""Laws that ask more than an impact resolver: a row budget, a device's limits, a wall or a device in the hand, inputs
+of any size.
 
 A law draws its own cases and judges a subject of its own kind; `ours` is the engine's. To add one: write the file,
 add a line to ENGINE_LAWS, and a fault to `planted`.
@@ -15,6 +16,7 @@ import numpy as np
 from verification.properties.case import LawResidual
 from verification.properties.engine_laws import (
     device_limits,
+    device_port,
     extremes,
     group_splitting,
     hand_port,
@@ -47,6 +49,9 @@ ENGINE_LAWS: dict[str, EngineLaw] = {
     "extremes": EngineLaw(
         "every finite input gives a finite motion or an error by name",
         extremes.draw, extremes.finite_or_named, extremes.ours),
+    "device_port": EngineLaw(
+        "the hand gets no energy out of a device coupled to a tool on a rigid wall while b ≥ K_cpl T/2 + B_cpl",
+        device_port.draw, device_port.device_port_is_passive, device_port.ours),
 }  # fmt: skip
 
 

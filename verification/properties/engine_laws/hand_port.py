@@ -43,12 +43,12 @@ def draw(rng: np.random.Generator) -> WallInTheHand:
     """K, B, T over decades, b at the bound or above it, and motions from slow to as quick as the sampling."""
     K, B = 10.0 ** rng.uniform(1.0, 5.0), float(rng.choice([0.0, 1.0])) * 10.0 ** rng.uniform(-1.0, 3.0)
     dt = float(rng.choice([1.0 / 512.0, 1e-3, 1e-4]))
-    x = _motion(rng, int(rng.integers(50, 800)))
+    x = hand_motion(rng, int(rng.integers(50, 800)))
     margin = float(rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)]))
     return WallInTheHand(K, B, margin * (0.5 * K * dt + abs(B)), dt, x - x[0])
 
 
-def _motion(rng: np.random.Generator, n: int) -> Floats:
+def hand_motion(rng: np.random.Generator, n: int) -> Floats:
     """Readings of a sine up to half the sampling rate, a walk, or both, some millimetres wide."""
     k = np.arange(n + 1)
     sine = np.sin(np.pi * rng.uniform(0.0, 1.0) * k + rng.uniform(0.0, 6.3)) + rng.uniform(-1.0, 1.0)
