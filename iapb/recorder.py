@@ -36,6 +36,8 @@ class Recorder:
     def chunk(self, total: int) -> BaseException | None:
         """Do and keep the next chunk; return what stopped it before its end."""
         record, size = self.blank(total)
+        if self.steps == 0:
+            self.simulation.prepare(record)  # what is timed is steps alone
         started = time.perf_counter()
         done, stop = self.simulation.advance_chunk(record, size)
         self.keep(record, done, time.perf_counter() - started)

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -148,6 +149,18 @@ class Simulation:
         else:
             state.state_of_tree[:] = result.state
 
+    def prepare(self, record: Record) -> None:
+        """Load or compile the machine code of a step, which takes up to minutes, before the first one is timed.
+
+        A law in Python does so in a first step, here that of a twin; one that may keep a state of its own is let be.
+        """
+        if self.compiled and self.link is None:
+            compiled_steps(self.world, self.state, self.port, record, self.steps_done, 0)
+        elif self.link is None and _is_frozen(self.law):
+            with suppress(IapbError):  # this simulation's own first step will say so
+                twin = Simulation(self.scene, self.law, self.coupling)
+                twin.advance_chunk(Recorder(twin).blank(1)[0], 1)
+
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
         """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
         if self.compiled and self.link is None:
@@ -167,6 +180,11 @@ def _checked_law(law: Any) -> Any:
     if isinstance(law, type) or not all(hasattr(law, name) for name in ("name", "settings", "advance")):
         raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...)")
     return law
+
+
+def _is_frozen(law: Any) -> bool:
+    settings = getattr(law, "__dataclass_params__", None)
+    return settings is not None and bool(settings.frozen)
 
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ import numpy as np
 
 from reports.store_keys import canonical_json, code_version
 from reports.store_tables import Column, Table, read_table, write_table
+from reports.workers import worker_pool
 
 if TYPE_CHECKING:
     from verification.properties.campaign import Batch, BatchOutcome, Subject
@@ -93,30 +94,29 @@ class Campaign:
             missing = [batch for batch in own if not self.path_of(batch).is_file()]
             done = total - sum(batch.count for batch in missing)
             progress(part, done, total)
-            for batch, outcome in self._outcomes(missing):
-                self._keep(batch, outcome)
-                done += batch.count
-                progress(part, done, total)
+            with closing(self._outcomes(missing)) as outcomes:
+                for batch, outcome in outcomes:
+                    self._keep(batch, outcome)
+                    done += batch.count
+                    progress(part, done, total)
 
-    def _outcomes(self, batches: list[Batch]) -> Iterator[tuple[Batch, BatchOutcome]]:
+    def _outcomes(self, batches: list[Batch]) -> Generator[tuple[Batch, BatchOutcome]]:
         """Outcomes as they come; a few batches per worker wait, no more."""
         if self.request.workers == 1 or len(batches) < 2:
             yield from ((batch, outcome_of(self.request, batch)) for batch in batches)
             return
-        left, pool = iter(batches), ProcessPoolExecutor(self.request.workers, mp_context=get_context("spawn"))
+        left = iter(batches)
+        with worker_pool(self.request.workers) as pool:
 
-        def begin(count: int) -> dict[Future[BatchOutcome], Batch]:
-            return {pool.submit(outcome_of, self.request, batch): batch for batch in islice(left, count)}
+            def begin(count: int) -> dict[Future[BatchOutcome], Batch]:
+                return {pool.submit(outcome_of, self.request, batch): batch for batch in islice(left, count)}
 
-        try:
             running = begin(2 * self.request.workers)
             while running:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     yield running.pop(future), future.result()
                 running |= begin(len(finished))
-        finally:  # stopped: what waits is not begun
-            pool.shutdown(cancel_futures=True)
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
         """Counterexamples first: a batch that is there has all of its own, up to KEPT_PER_LAW in the whole folder."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from reports.store_index import INDEX_NAME, read_index
 from reports.store_keys import run_key
 from reports.store_layout import FORMAT
 from reports.store_read import opened, read_head, read_run
+
+Progress = Callable[[int, int], None]
 
 DAMAGED_SUFFIX = ".damaged"
 _AS_JSON = ("scene", "law settings", "coupling settings")
@@ -40,9 +42,17 @@ class FileState:
         return self.path.stat().st_size if self.path.is_file() else 0
 
 
-def check_store(folder: Path | str) -> tuple[FileState, ...]:
-    """Read every result file below a folder whole, seals and content hashes included; nothing is changed."""
-    return tuple(_state(path) for path in _files(Path(folder)))
+def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
+    """Read every result file below a folder whole, seals and content hashes included; nothing is changed.
+
+    `progress` is called as progress(files read, files in all).
+    """
+    paths, states = list(_files(Path(folder))), list[FileState]()
+    for path in paths:
+        if progress is not None:
+            progress(len(states), len(paths))
+        states.append(_state(path))
+    return tuple(states)
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -71,12 +81,12 @@ def _state(path: Path) -> FileState:
         return FileState(path, DAMAGED, str(error).removeprefix(f"{path}: "))
 
 
-def repair_store(folder: Path | str) -> tuple[FileState, ...]:
+def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
     """Set damaged files aside and write the index anew; return the state of every file before that.
 
     A file that was set aside is computed again when it is next asked for.
     """
-    states = check_store(folder)
+    states = check_store(folder, progress)
     for state in states:
         if state.state == DAMAGED:
             os.replace(state.path, state.path.with_name(state.path.name + DAMAGED_SUFFIX))

@@ -38,7 +38,11 @@ def compare(
         _require_problems(folder)
     console = Console()
     if export is not None:
-        console.print(f"{_export(export)} problems written to {export}", highlight=False)
+        export.mkdir(parents=True, exist_ok=True)
+        with stage_progress() as progress:
+            progress("our own problems", 0, 1)
+            count = _export(export)
+        print(f"{count} problems written to {export}")
         return
     with stage_progress() as progress:
         if only_problems:
@@ -70,7 +74,6 @@ def _export(folder: Path) -> int:
     from reference.fclib import write_fclib
     from verification.comparison.own_problems import own_problems
 
-    folder.mkdir(parents=True, exist_ok=True)
     problems = [stored.problem for stored in own_problems()]
     for problem in problems:
         title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII

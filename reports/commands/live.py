@@ -39,7 +39,9 @@ def live(
     from iapb.errors import ArgumentError
     from iapb.simulation import INTERRUPTED
     from reference.worlds import find_world
+    from reports.commands.progress import to_log
     from reports.commands.run import parsed
+    from reports.compiling import compiling_told
     from reports.live.files import write_live
     from reports.live.measure import summary
     from reports.live.setup import live_simulation
@@ -50,10 +52,10 @@ def live(
         raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
     source = load_scene(find_scene(scene))
     source = source.with_values(parsed(set_)) if set_ else source
-    print("Getting ready (the first time, some minutes of compiling).", flush=True)
-    simulation = live_simulation(source, find_world(world, rendering), rate, device)
-    name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
-    result = _held(simulation, round(seconds * rate), world, budget, port if view else None)
+    with compiling_told(to_log):
+        simulation = live_simulation(source, find_world(world, rendering), rate, device)
+        name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
+        result = _held(simulation, round(seconds * rate), world, budget, port if view else None)
     describe(summary(result), result)
     files = write_live(out, result, name)
     print(f"Run: {files[0]}\nTimetable: {files[1]}")
@@ -69,12 +71,16 @@ def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: in
     from reports.live.viewer import Viewer
 
     rows = calibrated(simulation, simulation.system.dt) if budget else None
+    length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
     if port is None:
-        return Loop(simulation, ticks, budget=rows).run(world)
+        loop = Loop(simulation, ticks, budget=rows)
+        print(f"Under way for {length}", flush=True)
+        return loop.run(world)
     viewer = Viewer(simulation, port)
     try:
-        print(f"See it, and drag the handle, at {viewer.start()}", flush=True)
-        return Loop(simulation, ticks, budget=rows, audience=viewer).run(world)
+        loop = Loop(simulation, ticks, budget=rows, audience=viewer)
+        print(f"See it, and drag the handle, at {viewer.start()} for {length}", flush=True)
+        return loop.run(world)
     finally:
         viewer.stop()
 

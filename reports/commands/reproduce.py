@@ -87,10 +87,13 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
             return figure_inputs(gather(out, depth, progress))
     runner = Runner(out / "runs")
     found: dict[str, Any] = {}
-    for name in needs:
-        if name in FIGURE_RUNS:
-            scene, values, world, rendering = FIGURE_RUNS[name]
-            found[name] = runner(shipped_scene(scene, values), world, rendering)
-        else:
-            found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
+    with stage_progress() as progress:
+        for done, name in enumerate(needs):
+            progress("runs of the figure", done, len(needs))
+            if name in FIGURE_RUNS:
+                scene, values, world, rendering = FIGURE_RUNS[name]
+                found[name] = runner(shipped_scene(scene, values), world, rendering)
+            else:
+                found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
+        progress("runs of the figure", len(needs), len(needs))
     return found

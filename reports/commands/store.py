@@ -40,9 +40,11 @@ def store(
 
 
 def _check(where: Path, _: bool) -> None:
+    from reports.commands.progress import stage_progress
     from reports.store_care import DAMAGED, check_store
 
-    states = check_store(where)
+    with stage_progress() as progress:
+        states = check_store(where, lambda done, total: progress("files read whole", done, total))
     _tell(states)
     if any(state.state == DAMAGED for state in states):
         print("Set the damaged files aside, to be computed again, with: iapb store repair")
@@ -50,9 +52,11 @@ def _check(where: Path, _: bool) -> None:
 
 
 def _repair(where: Path, _: bool) -> None:
+    from reports.commands.progress import stage_progress
     from reports.store_care import DAMAGED, repair_store
 
-    states = repair_store(where)
+    with stage_progress() as progress:
+        states = repair_store(where, lambda done, total: progress("files read whole", done, total))
     _tell(states)
     aside = sum(state.state == DAMAGED for state in states)
     print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
@@ -85,14 +89,18 @@ def _gc(where: Path, dry_run: bool) -> None:
 
 
 def _again(where: Path, _: bool) -> None:
+    from reports.commands.progress import stage_progress
     from reports.resimulate import repeat_run
 
     files = sorted(where.rglob("*.h5")) if where.is_dir() else [where]
     other = 0
-    for path in files:
-        found = repeat_run(path)
-        other += not found.same
-        print(f"{path}: " + ("the same to the last bit" if found.same else "differs in " + ", ".join(found.differs)))
+    with stage_progress() as progress:
+        for done, path in enumerate(files):
+            progress("runs simulated again", done, len(files))
+            found = repeat_run(path)
+            other += not found.same
+            words = "the same to the last bit" if found.same else f"differs in {', '.join(found.differs)}"
+            print(f"{path}: {words}")
     print(f"{len(files) - other} of {len(files)} runs came out the same.")
     if other:
         raise typer.Exit(1)

@@ -28,7 +28,7 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
     there = sum(campaign.path_of(batch).is_file() for batch in batches)
     print(f"{len(batches)} batches in {campaign.folder}, {there} of them done before.", flush=True)
     try:
-        with stage_progress(parts=20) as progress:
+        with stage_progress() as progress:
             campaign.run(batches, progress)
     except KeyboardInterrupt:
         print("Stopped; the same command goes on from here. So far:")
@@ -68,9 +68,13 @@ def count_in_words(count: LawCount) -> str:
 def print_recheck(path: Path) -> bool:
     """Print every residual of a stored counterexample; return whether all laws are kept now."""
     from reports.campaign_counterexamples import recheck
+    from reports.commands.progress import to_log
+    from reports.compiling import compiling_told
 
     kept = True
-    for law, residual in recheck(path):
+    with compiling_told(to_log):
+        judged = tuple(recheck(path))
+    for law, residual in judged:
         print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")
         kept = kept and residual.passed
     return kept

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 from verification.engines.record import EngineRecord
@@ -17,6 +16,7 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
         An engine that was asked for by name is not installed.
     """
     from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
+    from reports.commands.progress import stage_progress
     from verification.engines import SETTINGS, compare_engines, sentence
 
     names = list(SIMULATORS) if "all" in simulators else list(dict.fromkeys(simulators))
@@ -27,7 +27,9 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
         simulator = find_simulator(name)
         if "all" not in simulators:
             simulator.version()
-    records = compare_engines(names, chosen, progress=_say)
+    with stage_progress() as progress:
+        records = compare_engines(names, chosen,
+                                  progress=lambda done, total: progress("pairs of engine and scene", done, total))
     for name in names:
         for choice in SETTINGS:
             of_engine = [record for record in records if record.engine == name and record.choice == choice]
@@ -38,11 +40,6 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
     if present:
         _table(present)
         _settings(present)
-
-
-def _say(done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        print(f"\r{done} of {total} pairs of engine and scene", end="" if done < total else "\n", file=sys.stderr)
 
 
 def _table(records: Sequence[EngineRecord]) -> None:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from itertools import islice
 from typing import Any
 
 from iapb.errors import ArgumentError, MissingDependencyError
 from reports.sweeps.points import Point
 from reports.sweeps.work import Result, compute_point
+from reports.workers import worker_pool
 
 Compute = Callable[[Point], Result]
-Scheduler = Callable[[Iterable[Point], str, str], Iterator[Result]]
+Scheduler = Callable[[Iterable[Point], str, str], Generator[Result]]
 
 _AHEAD = 4  # points handed out per worker: enough that none waits, few enough that little is lost on Ctrl-C
 _CLUSTER_AHEAD = 256  # points on their way to a cluster
 
 
-def here(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
+def here(points: Iterable[Point], folder: str, code: str) -> Generator[Result]:
     """Compute in this process, one after the other."""
     for point in points:
         yield compute_point(point, folder, code)
@@ -27,14 +28,9 @@ def here(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
 def processes(workers: int) -> Scheduler:
     """Compute in `workers` processes of this machine; results come as they are done."""
 
-    def compute(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
-        from multiprocessing import get_context
-
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-        try:
+    def compute(points: Iterable[Point], folder: str, code: str) -> Generator[Result]:
+        with worker_pool(workers) as pool:
             yield from _as_done(lambda point: pool.submit(compute_point, point, folder, code), points, workers * _AHEAD)
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
 
     return compute
 
@@ -60,7 +56,7 @@ def cluster(address: str) -> Scheduler:
         Where no scheduler answers.
     """
 
-    def compute(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
+    def compute(points: Iterable[Point], folder: str, code: str) -> Generator[Result]:
         client = _client(address)
         try:
             yield from _on_cluster(client, points, folder, code)
@@ -81,7 +77,7 @@ def _client(address: str) -> Any:
         raise ArgumentError("--scheduler", address, "the address of a running dask scheduler") from error
 
 
-def _on_cluster(client: Any, points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
+def _on_cluster(client: Any, points: Iterable[Point], folder: str, code: str) -> Generator[Result]:
     """Keep _CLUSTER_AHEAD points on their way; pure=False: the work writes a file."""
     from distributed import as_completed
 

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,8 +72,9 @@ def run_sweep(
     keys = {p.index: p.key(code) for p in open_points}
     say = progress or (lambda done, total: None)
     say(reused, len(points))
-    with _appending(folder / JOURNAL) as append:
-        for result in scheduler(open_points, str(folder / RUNS), code_version()):
+    computed = scheduler(open_points, str(folder / RUNS), code_version())
+    with _appending(folder / JOURNAL) as append, closing(computed):
+        for result in computed:
             result = _under(result, keys[result.index])
             append(result)
             results[result.index] = result

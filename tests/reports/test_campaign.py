@@ -16,7 +16,6 @@ from iapb.errors import RunFileError
 from reports.campaign import Campaign, CampaignRequest
 from reports.campaign_counterexamples import keep_counterexample, recheck
 from reports.cli import main
-from reports.commands.progress import _log_of_stages
 from reports.store_tables import read_table
 from verification.properties.campaign import (
     IMPACTS,
@@ -131,17 +130,6 @@ def test_a_killed_process_leaves_whole_batches_that_are_not_done_again(tmp_path:
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(RunFileError, match="no such file"):
         list(recheck(tmp_path / "absent.h5"))
-
-
-def test_a_log_tells_how_far_the_work_is() -> None:
-    lines: list[str] = []
-    log = _log_of_stages(lines.append, parts=4)
-    for done in range(0, 1001, 50):
-        log("impacts", done, 1000)
-    log("trajectories", 0, 0)
-    assert lines[0] == "impacts ..." and lines[-1] == "trajectories ..." and len(lines) == 5
-    told = [line.split(" after ")[0] for line in lines[1:4]]
-    assert told == [f"impacts: {done} of 1,000" for done in (250, 500, 750)]
 
 
 def test_what_is_stopped_tells_what_there_is(

@@ -6,6 +6,7 @@ out in silence. Solutions are compared by velocities: the impulses of hyperstati
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,7 +97,10 @@ def study_problems(
     from reference.datasets import DatasetError, problem_files, read_problem
 
     read, unread = list["StoredProblem"](), list[UnreadFile]()
-    for path in problem_files(folder):
+    files = problem_files(folder)
+    for done, path in enumerate(files):
+        if progress is not None:
+            progress(f"reading {folder}", done, len(files))
         try:
             read.append(read_problem(path))
         except DatasetError as error:
@@ -110,27 +114,23 @@ def study_read(
 ) -> ProblemStudy:
     """Solve every problem of a collection called `name` by every solver that takes its kind."""
     from reference.complementarity.benchmark import run_solvers
+    from reference.complementarity.solvers import solver_names
     from reference.one_thread import one_thread
 
+    pairs, say = sum(len(solver_names(stored.problem)) for stored in problems), progress or (lambda *_: None)
+    stage, begun = f"problems of {name}, by every solver", itertools.count()
+    say(stage, 0, pairs)
     with one_thread():
         _warm(problems)
         small_first = sorted((stored.problem for stored in problems), key=lambda problem: problem.size)
-        done = 0
-
-        def tell(_: str, solver: str) -> None:
-            nonlocal done
-            done += 1
-            if progress is not None:
-                progress(f"problems of {name}", done, done + 1)
-
-        rows = run_solvers(small_first, repeats=repeats, longest=longest, progress=tell)
+        rows = run_solvers(small_first, repeats=repeats, longest=longest,
+                           progress=lambda *_: say(stage, next(begun), pairs))
+    say(stage, pairs, pairs)
     kinds: dict[str, list[SolverRow]] = {}
     for stored in problems:
         kind = "frictionless" if stored.problem.friction is None else "friction"
         kinds.setdefault(kind, []).extend(_of(stored, rows))
     lines = tuple(_line(stored, _of(stored, rows)) for stored in problems)
-    if progress is not None and problems:
-        progress(f"problems of {name}", 1, 1)
     return ProblemStudy(name, lines, tuple(rows), tuple(unread), _profiles(kinds))
 
 

@@ -43,7 +43,11 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
     (tmp_path / "damaged.lcp").write_text("3 1 2")
     (tmp_path / "readme.md").write_text("not a problem")
-    study = study_problems(tmp_path)
+    told: list[tuple[str, int, int]] = []
+    study = study_problems(tmp_path, progress=lambda *state: told.append(state))
+    assert [done for stage, done, _ in told if stage.startswith("reading")] == [0, 1, 2]
+    solving = [(done, total) for stage, done, total in told if stage.startswith("problems of")]
+    assert solving == [(0, total := len(study.rows)), *((done, total) for done in range(total + 1))]
     assert [line.problem for line in study.lines] == ["one.hdf5", "skew.lcp"]
     assert [file.file for file in study.unread] == ["damaged.lcp"]
     assert study.lines[1].asymmetry > 0.1 and dict(study.lines[1].verdicts)["daqp"] == "refused"

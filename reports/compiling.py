@@ -1,0 +1,63 @@
+"""Say it when kernels are compiled: nothing else keeps silent for a minute."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+BEGIN = "Compiling kernels, the first time only; it can take a minute or two ..."
+
+
+@contextmanager
+def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
+    """Call say(line) when this process begins to compile a kernel, and at the end say how long all of it took.
+
+    A kernel that is read from numba's cache is not compiled, and nothing is said of it.
+    """
+    from numba.core import event
+
+    listener = _listener(lambda: say(BEGIN))
+    try:
+        with event.install_listener("numba:compile", listener):
+            yield
+    finally:
+        if listener.seconds:
+            say(f"Compiling took {listener.seconds:.1f} s.")
+
+
+def tell_from_worker(told: Any) -> None:
+    """Initialise a worker process: the first of those that share the flag `told` says on stderr that it compiles."""
+    from numba.core import event
+
+    def say_once() -> None:
+        with told.get_lock():
+            first, told.value = not told.value, True
+        if first:
+            print(BEGIN, file=sys.stderr, flush=True)
+
+    event.register("numba:compile", _listener(say_once))
+
+
+def _listener(begin: Callable[[], None]) -> Any:
+    """A listener of numba's that calls begin() once, and adds up `seconds` of compiling."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        depth, started, seconds = 0, 0.0, 0.0
+
+        def on_start(self, event: object) -> None:
+            if not self.started:
+                begin()
+            self.depth += 1  # a kernel that calls another compiles it meanwhile
+            if self.depth == 1:
+                self.started = time.perf_counter()
+
+        def on_end(self, event: object) -> None:
+            self.depth -= 1
+            if not self.depth:
+                self.seconds += time.perf_counter() - self.started
+
+    return Listener()
