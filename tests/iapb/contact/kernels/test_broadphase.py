@@ -1,0 +1,103 @@
+"""The grid of the broad phase: sorting, cells, exact capacity, turned bodies, pairs listed the other way round."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.compiled import block
+from iapb.contact.broadphase import make_broad_phase
+from iapb.contact.geometry import Circle, Shapes, box, make_shapes
+from iapb.contact.kernels.broadphase import LARGEST_CELL, cell_number, near_pairs, sort_keys
+from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 7, 50])
+def test_keys_are_sorted_and_what_lies_behind_them_is_left_alone(count: int) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(10):
+        keys = rng.integers(0, 60, count + 3)
+        expected = np.concatenate([np.sort(keys[:count]), keys[count:]])
+        sort_keys(keys, count)
+        np.testing.assert_array_equal(keys, expected)
+
+
+def test_a_cell_is_as_wide_as_told_and_the_last_one_holds_what_is_out_of_range() -> None:
+    assert [cell_number(value, 0.5) for value in (-0.51, -0.5, -0.1, 0.0, 0.49, 0.5)] == [-2, -1, -1, 0, 0, 1]
+    assert cell_number(float(LARGEST_CELL - 1), 1.0) == LARGEST_CELL - 1
+    assert cell_number(1.0 - LARGEST_CELL, 1.0) == 1 - LARGEST_CELL
+    for far in (2.0**40, -(2.0**40), 2.0**50, -(2.0**50)):
+        assert cell_number(far, 1.0) == LARGEST_CELL
+
+
+def crowd(rng: np.random.Generator, n: int, spatial: bool) -> Shapes:
+    """Shapes off their bodies' origins; two of them on body 0; a static one and an endless one."""
+    body = [0, *range(n - 1)]
+    if not spatial:
+        moving = [box(rng.uniform(0.05, 0.3, 2), rng.uniform(-0.2, 0.2, 2), 0.4, k) for k in body]
+        return make_shapes([*moving[:2], Circle(0.2, (0.1, 0.3)), *moving[2:]])
+    balls = [Sphere(rng.uniform(0.05, 0.2), rng.uniform(-0.2, 0.2, 3), k) for k in body]
+    return make_spatial_shapes([
+        *balls[:2], SpatialBox([0.3, 0.2, 0.4], [0.1, 0.0, -0.2]), HalfSpace([0, 0, -1], [0, 0, 1]), *balls[2:]
+    ])  # fmt: skip
+
+
+def meeting(broad: Any, R: np.ndarray, p: np.ndarray, pairs: np.ndarray, margin: float) -> list[list[int]]:
+    """Pairs whose bounding spheres come as near as the margin, asked one by one."""
+    center = broad.local_center.copy()
+    for i, body in enumerate(broad.body):
+        if body >= 0:
+            center[i] = R[body] @ center[i] + p[body]
+    found = []
+    for a, b in pairs:
+        apart = float(np.linalg.norm(center[a] - center[b]))
+        if apart <= broad.radius[a] + broad.radius[b] + margin:
+            found.append([int(a), int(b)])
+    return sorted(found, key=sorted)
+
+
+@pytest.mark.parametrize("spatial", [False, True])
+@pytest.mark.parametrize("margin", [0.0, 0.3])
+@pytest.mark.parametrize("spread", [0.3, 1.5])
+def test_near_pairs_of_turned_bodies_in_either_order_and_exact_capacity(
+    spatial: bool, margin: float, spread: float
+) -> None:
+    rng = np.random.default_rng(7)
+    for n in (2, 3, 9, 20):
+        shapes = crowd(rng, n, spatial)
+        total = len(shapes.kind)
+        pairs = np.array([(i, j) if rng.random() < 0.5 else (j, i) for i in range(total) for j in range(i)
+                          if shapes.body[i] != shapes.body[j] and rng.random() < 0.9], np.int32)  # fmt: skip
+        made = make_broad_phase(shapes, pairs)
+        R = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)])
+        p = rng.uniform(-spread, spread, (n, 3))
+        if not spatial:
+            cos, sin = np.cos(angles := rng.uniform(-3.0, 3.0, n)), np.sin(angles)
+            R[:] = np.eye(3)
+            R[:, :2, :2] = np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1)
+            p[:, 2] = 0.0
+        broad: Any = block(made)
+        expected = meeting(broad, R, p, pairs, margin)
+        count = near_pairs(broad, R, p, margin)
+        assert broad.pairs[:count].tolist() == expected
+        for room in {max(count - 1, 0), count // 2}:
+            small: Any = block(made._replace(key=np.zeros(room, np.int64)))
+            assert near_pairs(small, R, p, margin) == (-1 if room < count else count)
+        exact: Any = block(made._replace(key=np.zeros(count, np.int64)))
+        assert near_pairs(exact, R, p, margin) == count
+
+
+def test_spheres_that_just_touch_are_near() -> None:
+    """Numbers that are exact: radii 0.25 and 0.5, centres 0.75 + 0.25 apart in each direction of space."""
+    shapes = make_spatial_shapes([Sphere(0.25, body=0), Sphere(0.5, body=1)])
+    broad: Any = block(make_broad_phase(shapes, np.array([[1, 0]], np.int32)))
+    R, p = np.array([np.eye(3)] * 2), np.zeros((2, 3))
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            p[:] = 0.0
+            p[1, axis] = side
+            assert near_pairs(broad, R, p, 0.25) == 1
+            assert broad.pairs[0].tolist() == [1, 0]
+            assert near_pairs(broad, R, p, 0.25 - 1e-12) == 0

@@ -1,0 +1,213 @@
+"""Every kind of pair: where contacts begin, what a full buffer says, and shapes that stand off their body's origin."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.compiled import block
+from iapb.contact.geometry import Circle, HalfPlane, Polygon, box, make_contact_buffer, make_shapes
+from iapb.contact.kernels.box_pair import boxes
+from iapb.contact.kernels.narrow_phase import circle_polygon, circles, detect, vertices_half_plane
+from iapb.contact.kernels.polygon_pair import polygons
+from iapb.contact.kernels.spatial_pairs import spatial_pair
+from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+
+Pose = tuple[np.ndarray, np.ndarray]
+GROUND, FLOOR = HalfPlane((0.0, 0.0), (0.0, 1.0)), HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+SQUARE, CUBE = box((2.0, 2.0), body=1), SpatialBox([2.0, 2.0, 2.0], body=1)
+# (shape a, shape b, place of a, gap, contacts): all numbers are binary, so that the gap is exact.
+EXACT: list[tuple[Any, Any, tuple[float, float, float], float, int]] = [
+    (Circle(0.5), GROUND, (0.0, 1.0, 0.0), 0.5, 1),
+    (box((1.0, 1.0)), GROUND, (0.0, 1.0, 0.0), 0.5, 2),
+    (Circle(0.5), Circle(0.25, body=1), (0.0, 2.0, 0.0), 1.25, 1),
+    (Circle(0.5), Circle(0.25, body=1), (-1.5, 2.0, 0.0), 1.75, 1),
+    (Circle(0.5), SQUARE, (0.25, 2.0, 0.0), 0.5, 1),
+    (Circle(1.0), SQUARE, (4.0, 5.0, 0.0), 4.0, 1),
+    (box((1.0, 1.0)), SQUARE, (0.25, 2.0, 0.0), 0.5, 2),
+    (box((1.0, 1.0)), SQUARE, (-4.5, 5.5, 0.0), 5.0, 1),
+    (Sphere(0.5), FLOOR, (0.0, 0.0, 1.0), 0.5, 1),
+    (SpatialBox([1.0, 2.0, 0.5]), FLOOR, (0.0, 0.0, 1.0), 0.75, 4),
+    (Sphere(0.5), Sphere(0.25, body=1), (1.0, -2.0, 2.0), 2.25, 1),
+    (Sphere(0.5), CUBE, (0.25, 0.5, -2.0), 0.5, 1),
+    (Sphere(1.0), CUBE, (3.0, -4.0, 7.0), 6.0, 1),
+    (SpatialBox([1.0, 1.0, 1.0]), CUBE, (0.25, 2.0, 0.25), 0.5, 4),
+]
+
+
+def on(body: int, shape: Any) -> Any:
+    return type(shape)(**{**shape.__dict__, "body": body})
+
+
+def arrays_of(*shapes: Any) -> Any:
+    spatial = isinstance(shapes[0], Sphere | SpatialBox)
+    return block(make_spatial_shapes(shapes) if spatial else make_shapes(shapes))
+
+
+def placed(*places: Any) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([np.eye(3)] * len(places)), np.array(places, float)
+
+
+def found(shapes: Any, R: np.ndarray, p: np.ndarray, margin: float, room: int = 64, pairs: Any = ((0, 1),)) -> Any:
+    buffer: Any = block(make_contact_buffer(room))
+    return detect(shapes, np.array(pairs, np.int32), R, p, margin, buffer), buffer
+
+
+@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), EXACT)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(
+    a: Any, b: Any, place: Any, gap: float, number: int, swapped: bool
+) -> None:
+    endless = isinstance(b, HalfPlane | HalfSpace)
+    shapes, poses = arrays_of(on(0, a), b), placed(place, np.zeros(3))
+    pair = ((1, 0),) if swapped and not endless else ((0, 1),)
+    count, buffer = found(shapes, *poses, gap, pairs=pair)
+    assert count == number
+    assert buffer.gap[:count] == pytest.approx([gap] * number, abs=0.0)
+    assert found(shapes, *poses, math.nextafter(gap, 0.0), pairs=pair)[0] == 0
+
+
+@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), EXACT)
+def test_a_full_buffer_is_told_by_minus_one_and_an_exact_fit_is_none(
+    a: Any, b: Any, place: Any, gap: float, number: int
+) -> None:
+    """Also behind a pair that is far away, and before another pair."""
+    shapes, poses = arrays_of(on(0, a), b, on(2, a)), placed(place, np.zeros(3), (0.0, 100.0, 100.0))
+    for pairs, all_of_them in ((((2, 1), (0, 1)), number), (((0, 1), (0, 1)), 2 * number)):
+        assert found(shapes, *poses, gap, all_of_them, pairs)[0] == all_of_them
+        for room in range(1, all_of_them):
+            assert found(shapes, *poses, gap, room, pairs)[0] == -1
+    kernel, extra = kernel_of(a, b)
+    full: Any = block(make_contact_buffer(1))
+    assert kernel(shapes, 0, 1, *extra, *poses, gap, full, 1) == -1
+
+
+def test_what_can_touch_at_one_place_only_is_feature_zero_and_a_corner_is_its_own() -> None:
+    still = placed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for swapped, normal in ((False, [0.0, 1.0, 0.0]), (True, [0.0, -1.0, 0.0])):
+        pair = ((1, 0),) if swapped else ((0, 1),)
+        _, buffer = found(arrays_of(Circle(0.5, body=0), Circle(0.25, body=1)), *still, 0.0, pairs=pair)
+        assert buffer.feature[0] == 0 and buffer.normal[0].tolist() == normal
+    corners = np.array([[0.0, 0.0], [2.0, -0.5], [3.0, 1.0], [1.0, 2.0]])
+    count, buffer = found(arrays_of(Polygon(corners, 0), HalfPlane((0.5, 0.25), (0.0, 1.0))), *still, 5.0)
+    assert count == 4 and [int(feature) for feature in buffer.feature[:4]] == [k << 20 for k in range(4)]
+    assert buffer.gap[:4].tolist() == (corners[:, 1] - 0.25).tolist()
+
+
+def kernel_of(a: Any, b: Any) -> tuple[Any, tuple[bool, ...]]:
+    if isinstance(a, Sphere | SpatialBox):
+        return (boxes if isinstance(a, SpatialBox) and isinstance(b, SpatialBox) else spatial_pair), ()
+    if isinstance(b, HalfPlane):
+        return vertices_half_plane, ()
+    if isinstance(a, Circle):
+        return (circles, ()) if isinstance(b, Circle) else (circle_polygon, (True,))
+    return polygons, ()
+
+
+# --- shapes off their body's origin ----------------------------------------------------------------------------
+
+
+def planar_pose(rng: np.random.Generator, spread: float) -> Pose:
+    cos, sin = np.cos(angle := rng.uniform(-np.pi, np.pi)), np.sin(angle)
+    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]]), np.array([*rng.uniform(-spread, spread, 2), 0.0])
+
+
+def spatial_pose(rng: np.random.Generator, spread: float) -> Pose:
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return axes * np.sign(np.linalg.det(axes)), rng.uniform(-spread, spread, 3)
+
+
+def standing_off(shape: Any, offset: Pose, body: int) -> Any:
+    """The shape, given about the origin, at an offset in the frame of its body."""
+    R, p = offset
+    match shape:
+        case Circle():
+            return Circle(shape.radius, R[:2, :2] @ np.array(shape.center) + p[:2], body)
+        case Polygon():
+            return Polygon(np.asarray(shape.vertices) @ R[:2, :2].T + p[:2], body)
+        case HalfPlane():
+            return HalfPlane(R[:2, :2] @ np.array(shape.point) + p[:2], R[:2, :2] @ np.array(shape.normal), body)
+        case Sphere():
+            return Sphere(shape.radius, R @ np.array(shape.center) + p, body)
+        case SpatialBox():
+            return SpatialBox(shape.size, p, R, body)
+        case _:
+            return HalfSpace(R @ np.array(shape.point) + p, R @ np.array(shape.normal), body)
+
+
+def moved_by(pose: Pose, offset: Pose) -> Pose:
+    return pose[0] @ offset[0], pose[1] + pose[0] @ offset[1]
+
+
+PLANAR = [Circle(0.3), box((0.5, 0.4)), GROUND]
+SPATIAL = [Sphere(0.3), SpatialBox([0.5, 0.4, 0.6]), FLOOR]
+
+
+@pytest.mark.parametrize("a", [0, 1])
+@pytest.mark.parametrize("b", [0, 1, 2])
+@pytest.mark.parametrize("spatial", [False, True])
+def test_a_shape_at_an_offset_touches_as_one_at_the_origin_of_a_moved_body(a: int, b: int, spatial: bool) -> None:
+    """On two bodies, and with b fixed in the static world: contacts come from world places alone."""
+    rng = np.random.default_rng(8)
+    kinds, pose = (SPATIAL, spatial_pose) if spatial else (PLANAR, planar_pose)
+    touching = 0
+    for _ in range(25):
+        poses, offsets = [pose(rng, 0.3) for _ in range(2)], [pose(rng, 0.4) for _ in range(2)]
+        whole = [moved_by(pose, offset) for pose, offset in zip(poses, offsets, strict=True)]
+        R, p = (np.ascontiguousarray(np.array(part)) for part in zip(*whole, strict=True))
+        count, plain = found(arrays_of(on(0, kinds[a]), on(1, kinds[b])), R, p, 0.2)
+        touching += count > 0
+        on_two = arrays_of(standing_off(kinds[a], offsets[0], 0), standing_off(kinds[b], offsets[1], 1))
+        on_world = arrays_of(standing_off(kinds[a], offsets[0], 0), standing_off(kinds[b], whole[1], -1))
+        R, p = (np.ascontiguousarray(np.array(part)) for part in zip(*poses, strict=True))
+        for shapes, body_b in ((on_two, 1), (on_world, -1)):
+            same, other = found(shapes, R, p, 0.2)
+            assert same == count
+            for name in ("point", "normal", "gap", "feature", "shape_a", "shape_b", "body_a"):
+                wanted = getattr(plain, name)[:count]
+                assert getattr(other, name)[:count] == pytest.approx(wanted, abs=1e-13), name
+            assert list(other.body_b[:count]) == [body_b] * count
+    assert touching > 3
+
+
+# --- a ball and a box, written out -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_ball_touches_the_nearest_point_of_a_box_and_names_the_side_it_is_on(dimension: int) -> None:
+    """Outside: nearest point = coordinates cut to the box. Inside: out through the nearest face."""
+    rng, regions = np.random.default_rng(9), set()
+    half, radius = np.array([0.3, 0.2, 0.4])[:dimension], 0.15
+    for _ in range(300):
+        R, p = (planar_pose if dimension == 2 else spatial_pose)(rng, 0.1)
+        local = rng.uniform(-2.0, 2.0, dimension) * half
+        center = np.zeros(3)
+        center[:] = p + R[:, :dimension] @ local
+        ball = Circle(radius, body=0) if dimension == 2 else Sphere(radius, body=0)
+        brick = box(2.0 * half, body=1) if dimension == 2 else SpatialBox(2.0 * half, body=1)
+        nearest = np.clip(local, -half, half)
+        if inside := bool(np.all(nearest == local)):
+            k = int(np.argmax(np.abs(local) - half))
+            normal = np.eye(dimension)[k] * (1.0 if local[k] >= 0.0 else -1.0)
+            distance = abs(local[k]) - half[k]
+        else:
+            distance = float(np.linalg.norm(local - nearest))
+            normal = (local - nearest) / distance
+        count, buffer = found(arrays_of(ball, brick), np.array([np.eye(3), R]), np.array([center, p]), 10.0)
+        assert count == 1
+        assert buffer.gap[0] == pytest.approx(distance - radius, abs=1e-14)
+        world_normal = R[:, :dimension] @ normal
+        assert buffer.normal[0] == pytest.approx(world_normal, abs=1e-13)
+        between = center - (radius + 0.5 * (distance - radius)) * world_normal
+        assert buffer.point[0] == pytest.approx(between, abs=1e-14)
+        regions.add((int(buffer.feature[0]), tuple(np.sign(np.where(np.abs(normal) > 1e-9, normal, 0.0)))))
+        swapped, other = found(arrays_of(on(0, brick), on(1, ball)), np.array([R, np.eye(3)]),
+                               np.array([p, center]), 10.0)
+        assert swapped == 1 and other.normal[0] == pytest.approx(-world_normal, abs=1e-13)
+        assert inside or distance > 0.0
+    assert len(regions) == len({feature for feature, _ in regions}) == len({side for _, side in regions})
+    assert len(regions) == 3**dimension - 1
+
