@@ -32,6 +32,8 @@ from numba.extending import (
     unbox,
 )
 
+from iapb.inlining import called_from_kernels
+
 
 def _source_stamp() -> str:
     """Hash of all files with kernels: numba alone would keep a cached kernel when one that it calls has changed."""
@@ -39,7 +41,7 @@ def _source_stamp() -> str:
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         text = path.read_bytes()
-        if b"iapb.compiled" in text or path.name in ("compiled.py", "run.py", "arrays.py"):
+        if b"iapb.compiled" in text or path.name in ("compiled.py", "inlining.py", "run.py", "arrays.py"):
             digest.update(str(path.relative_to(folder)).encode() + b"\0" + text)
     return digest.hexdigest()
 
@@ -60,6 +62,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     compiled = njit(fastmath=False, _nrt=False)(function)
     if config.DISABLE_JIT:
         return compiled
+    called_from_kernels(function, compiled, fastmath=False, _nrt=False)
     compiled.enable_caching()
     compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
     return compiled

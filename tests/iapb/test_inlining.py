@@ -1,0 +1,74 @@
+"""Kernels that kernels call leave bitcode only, and the caller has all that it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core import config
+
+from iapb.inlining import called_from_kernels
+
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """As the engine's, but not cached: from the cache nothing would be compiled."""
+    compiled = njit(function)
+    called_from_kernels(function, compiled)
+    return compiled
+
+
+@kernel
+def _square(x: float) -> float:
+    return x * x
+
+
+@kernel
+def _never_squared(x: float) -> float:
+    one = 1
+    if one > 2:  # the optimiser sees that this is never so, the lowering does not
+        return _square(x)
+    return x
+
+
+@kernel
+def _squared_if(wanted: bool, x: float) -> float:
+    return _square(x) if wanted else x
+
+
+@kernel
+def _entry(values: Any, k: int) -> Any:
+    return values[k]
+
+
+@kernel
+def _sum(values: Any) -> Any:
+    total = _never_squared(0.0) + _squared_if(False, 0.0)
+    for k in range(values.shape[0]):
+        total += _squared_if(True, _entry(values, k))
+    return total - _entry(values, 0) * _entry(values, 0)
+
+
+def bitcode_versions(compiled: Any) -> int:
+    return len(compiled.get_overload.__self__.overloads)
+
+
+def test_the_caller_has_all_that_it_calls_and_only_it_becomes_machine_code() -> None:
+    assert _sum(np.array([1.0, 2.0, 3.0])) == 4.0 + 9.0
+    assert len(_sum.overloads) == 1
+    assert not _square.overloads and not _squared_if.overloads and not _entry.overloads
+
+
+def test_a_constant_argument_makes_no_version_of_its_own() -> None:
+    _sum(np.ones(2))
+    assert bitcode_versions(_entry) == 1
+    assert bitcode_versions(_squared_if) == 1
+
+
+def test_python_can_call_the_inner_kernel_too() -> None:
+    assert _entry(np.array([3, 4]), 1) == 4
+    assert len(_entry.overloads) == 1
