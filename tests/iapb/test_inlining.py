@@ -29,8 +29,7 @@ def _square(x: float) -> float:
 
 @kernel
 def _never_squared(x: float) -> float:
-    one = 1
-    if one > 2:  # the optimiser sees that this is never so, the lowering does not
+    if len((x, x)) > 2:  # the optimiser sees that this is never so, the lowering does not
         return _square(x)
     return x
 
