@@ -62,7 +62,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     compiled = njit(fastmath=False, _nrt=False)(function)
     if config.DISABLE_JIT:
         return compiled
-    called_from_kernels(function, compiled, fastmath=False, _nrt=False)
+    called_from_kernels(compiled)
     compiled.enable_caching()
     compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
     return compiled

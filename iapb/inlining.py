@@ -8,10 +8,9 @@ needs and is optimised as a whole, once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from numba import njit, types
+from numba import jit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -48,7 +47,7 @@ class BitcodeLowering(NativeLowering):
         state.library = BitcodeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        state.library._ensure_finalized()
+        state.library.finalize()
         key = object()
         state.targetctx.insert_user_function(key, state.cr.fndesc, state.library.needed())
         state.cr = state.cr._replace(cfunc=key)
@@ -68,9 +67,10 @@ class BitcodeCompiler(CompilerBase):
         return [passes]
 
 
-def called_from_kernels(function: Callable[..., Any], compiled: Any, **options: Any) -> None:
-    """Let kernels that call `compiled`, the dispatcher of `function`, take its bitcode."""
-    inner = njit(pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(function)
+def called_from_kernels(compiled: Any) -> None:
+    """Let kernels that call `compiled`, what `njit` made of a function, take its bitcode: the same, options and all."""
+    bitcode_alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": BitcodeCompiler}
+    inner = jit(**compiled.targetoptions, **bitcode_alone)(compiled.py_func)
 
     def add_overload(result: Any) -> None:
         inner.overloads[tuple(result.signature.args)] = result

@@ -105,7 +105,7 @@ def test_every_kernel_that_the_loop_can_reach_is_compiled_without_an_allocator()
     reached = reached_from("iapb.haptics.kernels") | reached_from("iapb.recording")
     assert {"iapb.contact.kernels.step", "iapb.contact.kernels.collide", "iapb.mechanics.kernels"} <= reached.keys()
     for name, path in reached.items():
-        if name != "iapb.compiled":
+        if name not in ("iapb.compiled", "iapb.inlining"):
             names = {node.id for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Name)}
             assert "njit" not in names, name
 

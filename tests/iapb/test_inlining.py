@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is com
 def kernel(function: Callable[..., Any]) -> Any:
     """As the engine's, but not cached: from the cache nothing would be compiled."""
     compiled = njit(function)
-    called_from_kernels(function, compiled)
+    called_from_kernels(compiled)
     return compiled
 
 
@@ -50,6 +50,13 @@ def _sum(values: Any) -> Any:
     for k in range(values.shape[0]):
         total += _squared_if(True, _entry(values, k))
     return total - _entry(values, 0) * _entry(values, 0)
+
+
+def test_the_bitcode_is_compiled_with_the_options_of_the_kernel() -> None:
+    """Asked of the options: once numba has refused to allocate, it refuses everywhere in the process."""
+    compiled = njit(_square.py_func, _nrt=False, fastmath=False)
+    called_from_kernels(compiled)
+    assert compiled.get_overload.__self__.targetoptions["_nrt"] is False
 
 
 def bitcode_versions(compiled: Any) -> int:
