@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-BEGIN = "Compiling kernels, the first time only; it can take a minute or two ..."
+BEGIN = "Compiling kernels, the first time only; it takes half a minute or more ..."
 
 
 @contextmanager
