@@ -12,8 +12,9 @@ pytest.importorskip("cosmic_ray")
 
 from cosmic_ray.mutating import mutate_code
 
+from tools.mutants.clones import Clone
 from tools.mutants.explained import Explanation, explanations
-from tools.mutants.judge import NOTICED, SURVIVED, Judgement, Kept
+from tools.mutants.judge import NOTICED, SURVIVED, Judgement, Kept, _only_the_change_breaks
 from tools.mutants.operators import OPERATORS
 from tools.mutants.report import likely_range, score, unexplained
 from tools.mutants.selection import MeasuredTest, Selection
@@ -80,6 +81,18 @@ def test_tests_that_call_the_function_judge_first_and_their_files_second() -> No
     assert selection.second_look(_mutant("f")) == [beside]
     for name in ("", "newer_than_the_measurement"):
         assert unrelated in selection.first_look(_mutant(name))
+
+
+def test_a_pytest_that_does_not_run_notices_nothing(tmp_path: Path) -> None:
+    """Neither an unknown option nor a test file that cannot be read at all says anything of a mutant."""
+    clone = Clone.__new__(Clone)
+    clone.root = tmp_path
+    (tmp_path / "test_broken.py").write_text("import nothing_of_this_name\n")
+    with pytest.raises(RuntimeError, match="pytest did not run"):
+        clone.pytest(["--no-such-option"], 20)
+    assert clone.pytest(["test_broken.py"], 20).first_failure == "test_broken.py"
+    with pytest.raises(RuntimeError, match="with or without a mutant"):
+        _only_the_change_breaks("test_broken.py", clone)
 
 
 def _judgement(verdict: str, key: str, code: str = "now") -> Judgement:

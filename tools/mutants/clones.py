@@ -74,8 +74,11 @@ class Clone:
         if process.exitcode == _NO_TESTS_COLLECTED:
             return Outcome(NO_TESTS)
         text = said.read_text(errors="replace")
-        first = _FIRST_FAILURE.search(text)
-        return Outcome(FAILED, first[1] if first else (text.strip().splitlines() or ["?"])[-1])
+        if first := _FIRST_FAILURE.search(text):
+            return Outcome(FAILED, first[1])
+        if (process.exitcode or 0) < 0:
+            return Outcome(FAILED, f"the interpreter ended by signal {-(process.exitcode or 0)}")
+        raise RuntimeError(f"pytest did not run: {(text.strip().splitlines() or ['?'])[-1]}")
 
 
 def _run_pytest(

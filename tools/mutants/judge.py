@@ -96,6 +96,8 @@ def _judge(mutant: Mutant, selection: Selection, clone: Clone, kept: Kept) -> Ju
         verdict, by, tests = _run(mutant, selection, clone)
     finally:
         path.write_text(text)
+    if verdict == NOTICED and "::" not in by:
+        _only_the_change_breaks(by, clone)
     judgement = Judgement(
         mutant.file, mutant.function, mutant.number, mutant.line, mutant.becomes(text), mutant.operator, verdict,
         by, tests, key, kept.code,
@@ -119,6 +121,12 @@ def _run(mutant: Mutant, selection: Selection, clone: Clone) -> tuple[str, str, 
         if outcome.verdict == NO_TESTS:
             raise RuntimeError(f"pytest finds none of the tests chosen for {mutant.file}: {tests[0].name}, …")
     return (SURVIVED if passed else UNREACHED), "", passed
+
+
+def _only_the_change_breaks(file: str, clone: Clone) -> None:
+    """A test file that cannot even be read says nothing of the mutant if it cannot be read without it either."""
+    if Path(clone.root / file).is_file() and clone.pytest(["--collect-only", file], _START).verdict == FAILED:
+        raise RuntimeError(f"{file} cannot be collected, with or without a mutant")
 
 
 def _patience(tests: Sequence[MeasuredTest]) -> int:
