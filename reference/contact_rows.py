@@ -105,7 +105,7 @@ def _rows_along(
 
 
 def write_contacts(
-    state: Any, found: ContactRows, impulse: Floats, friction: Floats, forced: Floats, dt: float
+    state: Any, found: ContactRows, impulse: Floats, friction: Floats, forced: NDArray[np.bool_], dt: float
 ) -> None:
     """Record in `state` the contacts that touch or carry an impulse; `forced` marks p as a force, not a blow.
 

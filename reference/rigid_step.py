@@ -10,9 +10,13 @@ One step of length dt from velocity v, with generalized force f and contact rows
     b_i = 0                 closed contact that does not; `stabilization` adds a share of −gap_i/dt where gap < 0
 
 Poisson's step adds e p to the contacts that approached, and solves once more with the same b: it has a solution where
-Newton's law has none (closed contacts that face each other, e > 0). Each contact may have its own e_i. Over a step the
-contacts do the work ½ pᵀ(J v + J v⁺): not positive in Newton's step where all that push approached; where the e_i
-differ and it is positive, the step is Poisson's too.
+Newton's law has none (closed contacts that face each other, e > 0). Each contact may have its own e_i.
+
+Newton's step can gain energy, and not only where the e_i differ: with one e for all, the rows that approach get
+J v⁺ = −e J v⁻ but those that separate J v⁺ >= 0, which is another e. A bar of 1 kg, one end falling at 1 m/s and the
+other rising at 0.1 m/s on closed contacts, e = 1: p = (0.65, 0.3) N s, and the end held at rest pays for 0.015 J. The
+contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) with the forces before them; where e > 0 and both are
+positive, the step is Poisson's too, which never gains.
 Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
 (1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
 """
@@ -77,8 +81,8 @@ def rigid_step(
     scheme : "moreau" leaves open contacts alone; "stewart-trinkle" keeps them from passing, by Poisson's law where
         e > 0; "automatic" treats an open contact as Stewart-Trinkle's step where its e = 0 and as Moreau's where e > 0
 
-    Where Newton's law has no solution (closed contacts that face each other, e > 0), or unequal e let it gain energy,
-    the step is Poisson's, and says so.
+    Where Newton's law has no solution (closed contacts that face each other, e > 0), or would gain energy, the step is
+    Poisson's, and says so.
 
     Raises
     ------
@@ -95,7 +99,8 @@ def rigid_step(
             if not np.any(restitution) or np.count_nonzero(gap <= 0.0) < 2:
                 raise
         else:
-            if np.unique(restitution).size <= 1 or not _gains(newton, contact_jacobian, gamma_minus):
+            # With e = 0 it is a projection that v = 0 satisfies: nothing to gain.
+            if not np.any(restitution) or not _gains(newton, contact_jacobian, gamma_minus, v_free):
                 return newton
     compression = velocity_bounds(gap, gamma_minus, 0.0, dt, 0.0 if not poisson else stabilization, scheme)
     compression = np.where(np.isfinite(bound), compression, -np.inf)
@@ -103,11 +108,15 @@ def rigid_step(
     return poisson_step(mass_matrix, v_free, contact_jacobian, compression, returning)
 
 
-def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats) -> bool:
-    """Whether the contacts did work ½ pᵀ(γ⁻ + γ⁺) above the rounding of its terms."""
-    gamma_plus = contact_jacobian @ step.velocity
-    size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_plus)))
-    return float(step.impulse @ (gamma_minus + gamma_plus)) > STEP_TOLERANCE * size
+def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
+    """Whether the contacts did work, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), above the rounding of its terms.
+
+    The scale knows the load as well: at rest γ⁻ is rounding of either sign, which must not make the load bounce.
+    """
+    gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
+    size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
+    work = min(float(step.impulse @ (gamma + gamma_plus)) for gamma in (gamma_minus, gamma_free))
+    return work > STEP_TOLERANCE * size
 
 
 def poisson_step(

@@ -53,7 +53,8 @@ class RigidConstraints:
     friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient
 
     Restitution is Newton's, of each pair as the scene says; Poisson's in "stewart-trinkle" with e > 0, and in steps
-    where Newton's law has no solution or, with unequal e and no friction, would gain energy.
+    without friction where Newton's law has no solution or would gain energy (with one e for all as well: an end that
+    rises and is struck is held at rest, not returned, and somebody pays). With friction Newton's law may gain.
     """
 
     margin: float = np.inf
@@ -75,14 +76,14 @@ class RigidConstraints:
             "stabilization": self.stabilization,
             "scheme": self.scheme,
             "friction": self.friction,
-            "restitution where Newton's law has no solution": "Poisson",
+            "restitution where Newton's law has no solution or gains energy": "Poisson",
         }
 
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """One step (see `iapb.contact.laws.ContactLaw`).
 
-        Impulses of contacts that approached faster than the scene's approach velocity are reported as collision
-        impulses, the rest as forces p/dt: only their sum is determined by the step.
+        Impulses of contacts that approached faster than the scene's approach velocity, and of those that they turned
+        round, are reported as collision impulses, the rest as forces p/dt: only their sum is determined by the step.
         """
         with one_thread():
             return self._advance(system, state, applied_force, dt)
@@ -93,7 +94,7 @@ class RigidConstraints:
         found = find_rows(system, q, v, self.margin)
         force = applied_force - _inner_forces(system, q, v)
         step = self._solve(system, mass, q, v, force, dt, found)
-        blows = (found.gamma < -system.scene.contact.approach_velocity) & (step.normal > 0.0)
+        blows = _blows(found.gamma, step.normal, system.scene.contact.approach_velocity)
         normal = found.jacobian.T * step.normal
         impulse = (normal + step.dragging)[:, blows].sum(axis=1)
         pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
@@ -129,6 +130,12 @@ def _restitution(system: Any, found: ContactRows) -> float | Floats:
     count = len(found.gap)
     pairs = np.stack([found.geometry.shape_a[:count], found.geometry.shape_b[:count]], axis=1)
     return restitution_by_pair(system.scene, pairs)
+
+
+def _blows(gamma: Floats, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
+    """Contacts (c,) that struck: those that approached and, if there are any, those that separated and were pushed."""
+    struck = (gamma < -approach_velocity) & (impulse > 0.0)
+    return struck | (struck.any() & (gamma > approach_velocity) & (impulse > 0.0))
 
 
 def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:

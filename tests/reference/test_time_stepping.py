@@ -136,6 +136,38 @@ def test_unequal_restitution_that_would_gain_energy_steps_by_poisson() -> None:
     assert (ENDS @ found.velocity).min() >= -1e-14
 
 
+@pytest.mark.parametrize("e", [0.97, 1.0])
+def test_equal_restitution_on_a_bar_that_turns_does_not_gain(e: float) -> None:
+    """One end falls at 1 m/s, the other rises at 0.1 m/s: Newton's step would make 0.015 J of nothing with e = 1."""
+    v = np.linalg.solve(ENDS, [-1.0, 0.1])
+    bound = velocity_bounds(np.zeros(2), ENDS @ v, e, DT)
+    newton = stepping.nearest_velocity(BAR, v, ENDS, bound)
+    found = step(BAR, v, [0.0, 0.0], ENDS, [0.0, 0.0], e)
+    before, avoided, after = (0.5 * float(u @ BAR @ u) for u in (v, newton.velocity, found.velocity))
+    if e == 1.0:
+        assert newton.impulse == pytest.approx([0.65, 0.3]) and avoided - before == pytest.approx(0.015)
+    assert avoided > before and after <= before * (1.0 + 1e-14)
+    assert found.restitution_law == POISSON and (ENDS @ found.velocity).min() >= -1e-14
+
+
+def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
+    """Speeds of 1e-17 m/s of both signs on the feet of a loaded box: it is carried, e = 1 or not."""
+    v = np.linalg.solve(ENDS, [-1e-17, 1e-17])
+    found = step(BAR, v, [-9.81, 0.0], ENDS, [0.0, 0.0], 1.0)
+    assert found.restitution_law == NEWTON and np.abs(found.velocity).max() <= 1e-15
+
+
+@pytest.mark.parametrize("equal", [0.3, 0.7, 1.0])
+@given(seed=st.integers(0, 10_000))
+def test_steps_with_equal_restitution_never_gain(equal: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    d, c = int(rng.integers(1, 7)), int(rng.integers(2, 7))
+    root, rows, v = rng.normal(size=(d, d)), rng.normal(size=(c, d)), rng.normal(size=d)
+    mass = root @ root.T + 0.1 * np.eye(d)
+    found = step(mass, v, np.zeros(d), rows, np.zeros(c), equal)
+    assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
+
+
 @given(st.integers(0, 10_000))
 def test_steps_with_unequal_restitution_never_gain(seed: int) -> None:
     rng = np.random.default_rng(seed)
