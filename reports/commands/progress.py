@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from reports.compiling import compiling_told
@@ -13,7 +14,7 @@ from reports.compiling import compiling_told
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-SILENCE = 30.0  # [s] after which a log gets another line
+SILENCE = 30.0  # [s] between two lines of a log
 
 
 @contextmanager
@@ -37,8 +38,8 @@ def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, 
 
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:
-        with compiling_told(to_log):
-            yield log_of_stages(to_log, begun)
+        with compiling_told(to_log), _reminded(StageLog(to_log, begun)) as log:
+            yield log
         return
     with _bars(console, transient) as bars, compiling_told(bars.console.print):
         tasks: dict[str, Any] = {begun: bars.add_task(begun, total=None)} if begun else {}
@@ -61,22 +62,50 @@ def _bars(console: Any, transient: bool) -> Progress:
                     redirect_stdout=sys.stdout.isatty())
 
 
-def log_of_stages(write: Callable[[str], None], begun: str = "") -> Callable[[str, int, int], None]:
-    """Return progress(stage, done, total) that writes a line as a stage begins, and after every SILENCE of its work."""
-    start, last, stages = time.monotonic(), [time.monotonic()], {begun}
+class StageLog:
+    """Progress as lines: one as a stage begins, and one for each reminder that finds it still at work.
 
-    def log(stage: str, done: int, total: int) -> None:
-        now = time.monotonic()
-        if stage not in stages:
-            stages.add(stage)
-            write(f"{stage} ...")
-        elif now - last[0] < SILENCE or done >= total:
-            return
-        else:
-            write(f"{stage}: {done:,} of {total:,} after {(now - start) / 60.0:.1f} min")
-        last[0] = now
+    Parameters
+    ----------
+    write : takes a line
+    begun : a stage that has been told of already
+    """
 
-    return log
+    def __init__(self, write: Callable[[str], None], begun: str = "") -> None:
+        self._write, self._stages, self._start = write, {begun}, time.monotonic()
+        self._now, self._reminded = ("", 0, 0), ""
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Take note of how far a stage is."""
+        self._now = (stage, done, total)
+        if stage not in self._stages:
+            self._stages.add(stage)
+            self._write(f"{stage} ...")
+
+    def remind(self) -> None:
+        """Say how far the work is, unless its stage has begun since the last time or is done."""
+        stage, done, total = self._now
+        if stage == self._reminded and done < total:
+            self._write(f"{stage}: {done:,} of {total:,} after {(time.monotonic() - self._start) / 60.0:.1f} min")
+        self._reminded = stage
+
+
+@contextmanager
+def _reminded(log: StageLog) -> Iterator[StageLog]:
+    """Remind a log every SILENCE from a thread of its own: a single step of the work may take minutes."""
+    over = Event()
+
+    def remind() -> None:
+        while not over.wait(SILENCE):
+            log.remind()
+
+    thread = Thread(target=remind, daemon=True)
+    thread.start()
+    try:
+        yield log
+    finally:
+        over.set()
+        thread.join()
 
 
 def to_log(line: str) -> None:

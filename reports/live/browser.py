@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import os
-import signal
 import time
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
@@ -31,7 +31,6 @@ _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
 
 def show_in_browser(name: str, coordinates: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
     """What the viewer's process does: serve the page of memory `name` until the loop's process is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the loop's, which then ends this process
     os.nice(_POLITENESS)
     parent = os.getppid()
     show(Window.opened(name, coordinates), scene, port, ready, lambda: os.getppid() == parent)
@@ -41,6 +40,8 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
     """Serve the scene until nobody wants it any more; send the port when a browser can come."""
     import viser
 
+    # A browser opens connections that it never uses: a traceback each, were they logged where nobody has set up a log.
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)
     with redirect_stdout(StringIO()):  # it would announce itself; the loop's own process says where to look
         server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
     server.gui.configure_theme(show_share_button=False)

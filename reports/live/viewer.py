@@ -17,6 +17,7 @@ from iapb.simulation import Simulation
 from reports.live.browser import HOST, show_in_browser
 from reports.live.hand import SpringHand
 from reports.live.window import Window
+from reports.workers import starting_a_process
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +49,8 @@ class Viewer:
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self.window.name, self.window.coordinates, self._scene, self._port, theirs)
         self.process = context.Process(target=show_in_browser, args=arguments, daemon=True, name="iapb viewer")
-        self.process.start()
+        with starting_a_process():  # Ctrl-C is the loop's, which then ends the viewer
+            self.process.start()
         theirs.close()
         try:
             if ours.poll(_START_SECONDS):

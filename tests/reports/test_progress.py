@@ -1,41 +1,43 @@
-"""Progress of long work in a log: a line per stage, then one after every stretch of silence."""
+"""Progress of long work: bars on a terminal; in a log a line per stage, and reminders while it goes on."""
 
 from __future__ import annotations
+
+import time
 
 import pytest
 
 from reports.commands import progress
-from reports.commands.progress import SILENCE, log_of_stages, stage_progress, step_progress
+from reports.commands.progress import StageLog, stage_progress, step_progress
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """A clock that tests set."""
-    now = [0.0]
+def test_a_log_tells_of_a_stage_that_begins_and_is_reminded_of_one_that_goes_on(monkeypatch):
+    lines, now = [], [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    return now
-
-
-def test_a_log_tells_how_far_the_work_is_after_every_silence(clock):
-    lines = []
-    log = log_of_stages(lines.append)
-    for done in range(1001):
-        clock[0] = 0.1 * done  # 100 s in all
-        log("impacts", done, 1000)
+    log = StageLog(lines.append)
+    log.remind()  # nothing has begun
+    log("impacts", 0, 1000)
+    log("impacts", 10, 1000)
+    log.remind()  # it has just begun
+    log("impacts", 300, 1000)
+    now[0] = 30.0
+    log.remind()
+    log("impacts", 1000, 1000)
+    log.remind()  # it is done
     log("trajectories", 0, 0)
-    assert lines == ["impacts ...", "impacts: 300 of 1,000 after 0.5 min", "impacts: 600 of 1,000 after 1.0 min",
-                     "impacts: 900 of 1,000 after 1.5 min", "trajectories ..."]  # fmt: skip
+    assert lines == ["impacts ...", "impacts: 300 of 1,000 after 0.5 min", "trajectories ..."]
 
 
-def test_a_stage_that_has_begun_before_is_silent_until_it_takes_long(clock):
-    lines = []
-    log = log_of_stages(lines.append, "steps")
-    log("steps", 1, 9)
-    clock[0] += 1.01 * SILENCE
-    log("steps", 2, 9)
-    clock[0] += 1.01 * SILENCE
-    log("steps", 9, 9)
-    assert lines == ["steps: 2 of 9 after 0.5 min"]
+def test_a_step_that_takes_long_is_reminded_of_while_it_lasts(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "SILENCE", 0.01)
+    said = ""
+    with step_progress("peg") as steps:
+        steps(2, 9)
+        for _ in range(1000):
+            time.sleep(0.01)
+            said += capsys.readouterr().err
+            if said:
+                break
+    assert said.startswith("peg: steps: 2 of 9 after 0.0 min\n")
 
 
 def test_where_stderr_is_no_terminal_lines_are_plain(capsys, monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import urllib.request
 
 import numpy as np
@@ -51,6 +52,21 @@ def test_it_serves_a_page_on_this_machine(viewer):
     assert viewer.address.startswith("http://127.0.0.1:")
     with urllib.request.urlopen(viewer.address, timeout=20) as page:
         assert page.status == 200 and b"<html" in page.read().lower()
+
+
+def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_its_end(module_peg, capfd):
+    shown = Viewer(module_peg(), port=18090)
+    address = shown.start()
+    port = int(address.rsplit(":", 1)[1])
+    for sent in (b"", b"neither HTTP nor a web socket\r\n\r\n"):
+        with socket.create_connection(("127.0.0.1", port)) as connection:
+            connection.sendall(sent)
+    os.kill(shown.process.pid, signal.SIGINT)
+    with urllib.request.urlopen(address, timeout=20) as page:
+        assert page.status == 200
+    shown.stop()
+    assert shown.process.exitcode == -signal.SIGTERM  # and not of the SIGINT
+    assert capfd.readouterr().err == ""
 
 
 def test_the_loop_does_not_wait_for_a_viewer_that_sleeps_and_lets_go_for_one_that_is_silent(
