@@ -51,7 +51,9 @@ def collect_provenance(
 
 def current_command() -> str:
     """Return the command line of this process; paths into this machine are cut to their last part."""
-    return shlex.join([Path(sys.argv[0]).name or "python", *(_without_place(word) for word in sys.argv[1:])])
+    program = Path(sys.argv[0])
+    name = "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name  # as python -m reports.cli
+    return shlex.join([name or "python", *(_without_place(word) for word in sys.argv[1:])])
 
 
 def _without_place(word: str) -> str:
@@ -81,9 +83,22 @@ def _facts() -> tuple[tuple[str, str], ...]:
 
 def package_version(package: str) -> str:
     """Return the version of an installed package, or ``unknown``."""
+    if package == "siconos":
+        return _siconos_version()
     try:
         return version(package)
     except PackageNotFoundError:
+        return UNKNOWN
+
+
+def _siconos_version() -> str:
+    """Siconos is a package of the system's Python, not of this one; the adapter that runs it knows."""
+    from iapb.errors import MissingDependencyError
+    from reference.simulators import find_simulator
+
+    try:
+        return find_simulator("siconos").version()
+    except MissingDependencyError:
         return UNKNOWN
 
 

@@ -21,6 +21,8 @@ FOLDERS: dict[str, tuple[str, ...]] = {
 PACKAGES: dict[str, tuple[str, ...]] = {
     "engines": ("mujoco", "pin", "pybullet", "drake", "siconos"),
     "mechanics": ("pin", "coal"),
+    "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",
+                        "pin", "siconos"),
     "haptic-rate": ("mujoco", "pybullet", "drake", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
     "cross-checks": ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon"),
 }

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.labels import label_marks
 from reports.figures.numbers import power_of_ten
-from reports.figures.style import INK, STYLES, line_arguments, styled
+from reports.figures.style import STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
 
 KEY, TITLE, INPUT = "effect-costs", "What leaving an effect out saves, and what it breaks", "effect_costs"
@@ -45,26 +46,18 @@ def _marks(rows: list[dict[str, Any]], scene: str) -> str:
         others = [(row[SAVED], max(row[ERROR], _NOTHING)) for row in rows if row[BEST] != "yes"]
         if others:
             axes.plot(*zip(*others, strict=True), **line_arguments(STYLES["cannot tell"]) | {"linestyle": "none"})
-        for number, (words, place) in enumerate(_labels(rows)):
-            right = number % 2 == 0  # neighbours in height on either side of their marks
-            axes.annotate(words, place, textcoords="offset points", xytext=(5, -2.5) if right else (-5, -2.5),
-                          fontsize=7.0, ha="left" if right else "right", color=INK)  # fmt: skip
         axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel=ERROR)
         axes.margins(x=0.35, y=0.12)
         axes.yaxis.set_major_locator(LogLocator(numticks=8))
         axes.yaxis.set_major_formatter(FuncFormatter(_tick))
         axes.yaxis.set_minor_locator(NullLocator())
+        label_marks(axes, [row[EFFECT].replace("_", " ") for row in rows],
+                    [(row[SAVED], max(row[ERROR], _NOTHING)) for row in rows])  # fmt: skip
         return to_svg(drawing, f"{KEY}-{scene}")
 
 
 def _tick(error: float, _: int) -> str:
     return power_of_ten(error) if error > _NOTHING else "none"
-
-
-def _labels(rows: list[dict[str, Any]]) -> list[tuple[str, tuple[float, float]]]:
-    """Name and place of each mark, from the lowest to the highest."""
-    places = [(row[EFFECT].replace("_", " "), (row[SAVED], max(row[ERROR], _NOTHING))) for row in rows]
-    return sorted(places, key=lambda label: label[1][::-1])
 
 
 RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="effects")

@@ -48,7 +48,7 @@ def _curves(numbers: Numbers, powers: Mapping[tuple[str, str], float], axis: str
             power = powers[method, axis]
             level = np.exp(np.mean(np.log(middle) - power * np.log(size)))
             axes.plot(size, level * size**power, color=look.color, linewidth=0.9)
-            axes.annotate(f"exponent {power:.2f}", (size[-1], middle[-1]),
+            axes.annotate(f"exponent {power + 0.0:.2f}".replace("-", "−"), (size[-1], middle[-1]),
                           textcoords="offset points", xytext=(-4, 7), ha="right", color=look.color)  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=axis, ylabel="time of one impact [µs]")
         plain_powers(axes)

@@ -14,11 +14,13 @@ from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
 from reports.pages.legend import swatch
-from reports.pages.records import OUTCOMES, Claim, Evidence, Topic, Verdict
+from reports.pages.records import OUTCOMES, REFUTED, Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
-from reports.pages.uses import runs_by_user
+from reports.pages.uses import anchor, runs_by_user
 from reports.pages.verdicts import verdicts
 
+# Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
+ROWS_SHOWN = 300
 # The mark that goes with each outcome: shape as well as colour.
 OUTCOME_MARKS = dict(zip(OUTCOMES, ("✓", "≈", "✕", "○", "…"), strict=True))
 OUTCOME_CLASSES = dict(zip(OUTCOMES, ("good", "limited", "bad", "open", "absent"), strict=True))
@@ -38,6 +40,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
         script=text, policy=policy(text), played=played(figures),
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
         subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
+        used={user for entry in evidence.manifest for user in entry.used_by},
     )
 
 
@@ -60,6 +63,15 @@ def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, s
     return {name: figure.key for figure in drawn if figure.panels[0].film for name in figure.inputs}
 
 
+def badge_words(verdict: Verdict, topics: Sequence[Topic]) -> str:
+    """Return what a verdict of the first page amounts to in words; of a topic's findings, how many fail."""
+    if verdict.link == "claims":
+        return verdict.outcome
+    findings = [finding for topic in topics if topic.id == verdict.link for finding in topic.findings]
+    failing = sum(finding.outcome == REFUTED for finding in findings)
+    return f"{failing} of {len(findings)} findings fail" if failing else FINDINGS[verdict.outcome]
+
+
 def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Numbers], ...]:
     """Return the tables of a topic, with their names, that no figure was drawn from."""
     drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
@@ -74,8 +86,10 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled, film=_film,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, tables_without=tables_without, runs_by_user=runs_by_user,
+        as_finding=FINDINGS.__getitem__, badge_words=badge_words, tables_without=tables_without,
+        runs_by_user=runs_by_user, anchor=anchor, title=lambda name: name[:1].upper() + name[1:],
     )
+    environment.globals["rows_shown"] = ROWS_SHOWN
     environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
     return environment
 

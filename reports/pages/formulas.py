@@ -27,8 +27,9 @@ def prose(text: str) -> Markup:
 
 
 def _powers(text: str) -> Markup:
-    """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶ and -1 has a true minus sign."""
-    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, str(escape(text)))))
+    """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶, -1 has a true minus sign and >= is one sign."""
+    signs = text.replace(">=", "≥").replace("<=", "≤")
+    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, str(escape(signs)))))
 
 
 def _power(match: re.Match[str]) -> str:

@@ -10,12 +10,16 @@ from reports.pages.records import Evidence
 
 @dataclass(frozen=True)
 class Section:
-    """`ready` tells whether there is something to show; otherwise the page says that it was not computed."""
+    """`ready` tells whether there is something to show; otherwise the page says that it was not computed.
+
+    tables : names of the manifest's tables that its numbers are kept in
+    """
 
     id: str
     title: str
     ready: Callable[[Evidence], bool]
     topic: bool = False  # drawn from a Topic, by the template that all of them share
+    tables: tuple[str, ...] = ()
 
     @property
     def template(self) -> str:
@@ -27,26 +31,27 @@ def _always(_: Evidence) -> bool:
 
 
 def _topic(id: str, title: str) -> Section:
-    return Section(id, title, lambda evidence: any(topic.id == id for topic in evidence.topics), topic=True)
+    return Section(id, title, lambda evidence: any(topic.id == id for topic in evidence.topics), True, (id,))
 
 
 SECTIONS: tuple[Section, ...] = (
     Section("idea", "The idea", _always),
-    Section("claims", "Claims ledger", lambda evidence: bool(evidence.claims)),
+    Section("claims", "Claims ledger", lambda evidence: bool(evidence.claims), tables=("claims",)),
     Section("figures", "Figures of the paper", _always),
     Section("couplings", "Device and tool", _always),
-    Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs)),
-    Section("properties", "Properties", lambda evidence: bool(evidence.properties)),
-    Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks)),
+    Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
+    Section("properties", "Properties", lambda evidence: bool(evidence.properties),
+            tables=("properties", "counterexamples", "bulk impacts")),
+    Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks), tables=("cross-checks",)),
     _topic("mechanics", "Linkages and free bodies"),
     _topic("scene-ledger", "The scenes"),
     _topic("complementarity", "Against complementarity"),
-    Section("accuracy", "Accuracy against time", _always),
-    Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases)),
+    Section("accuracy", "Accuracy against time", _always, tables=("accuracy",)),
+    Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases), tables=("hard cases",)),
     _topic("stability", "Stability of contact"),
     _topic("engines", "Other engines"),
     _topic("haptic-rate", "The haptic rate"),
-    Section("effects", "Effects", lambda evidence: bool(evidence.effects)),
+    Section("effects", "Effects", lambda evidence: bool(evidence.effects), tables=("effects",)),
     _topic("survival", "Runs that survive"),
     Section("provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
     Section("manifest", "Manifest", lambda evidence: bool(evidence.manifest)),

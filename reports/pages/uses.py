@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,11 @@ class RunsOf:
     runs: tuple[StoredFile, ...]
 
     @property
+    def id(self) -> str:
+        """Where the page lists them."""
+        return anchor(self.user)
+
+    @property
     def size(self) -> int:
         """Bytes of all of them."""
         return sum(run.size or 0 for run in self.runs)
@@ -24,6 +30,11 @@ class RunsOf:
     def missing(self) -> int:
         """How many are not whole files: the simulation gave up, or the file was removed."""
         return sum(run.status != "complete" for run in self.runs)
+
+
+def anchor(user: str) -> str:
+    """Return the id of the line of the manifest that lists a user's runs."""
+    return "runs-" + re.sub(r"[^A-Za-z0-9]+", "-", user)
 
 
 def runs_by_user(files: Sequence[StoredFile]) -> tuple[RunsOf, ...]:

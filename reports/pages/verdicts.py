@@ -20,6 +20,9 @@ SUBJECTS = (
     ("Cost", ("C19", "C22")),
 )
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
+# "part: in 24 of 36 trials, with ..." of a claim's `fails`, which parts its parts by "; ".
+_FAILURE = re.compile(r"^(?:(?P<part>.*): )?in (?P<count>all \d+|\d+ of \d+) trials")
+_SHOWN = 2  # parts that fail, in a line of the first page
 _SENTENCE_END = re.compile(r"(?<=\.)\s(?=[A-Z])")
 
 
@@ -34,7 +37,25 @@ def _verdict(subject: str, members: Sequence[Claim]) -> Verdict:
     worst = min(members, key=lambda claim: _WORST_FIRST.index(claim.outcome))
     held = sum(claim.outcome == REPRODUCED for claim in members)
     count = f"{held} of {len(members)} claims reproduced. " if 0 < held < len(members) else ""
-    return Verdict(subject, worst.outcome, f"{count}{worst.id}: {first_sentence(worst.headline)}", worst.id)
+    sentence = f"{count}{worst.id}: {_told(worst)}"
+    return Verdict(subject, worst.outcome, sentence, worst.id, worst.timed)
+
+
+def _told(claim: Claim) -> str:
+    """The first sentence of what was found, without the count of trials where those that failed are named."""
+    fails = failures(claim.fails)
+    found = claim.headline.partition(" (holds in ")[0] if fails else claim.headline
+    return first_sentence(found) + fails
+
+
+def failures(fails: str) -> str:
+    """Return in how many trials a claim fails, for each of its parts the first of which are named; empty for none."""
+    found = [match for match in map(_FAILURE.match, fails.split("; ")) if match]
+    if len(found) == 1 and not found[0]["part"]:
+        return f" Fails in {found[0]['count']} trials."
+    parts = [f"{match['part']} in {match['count']} trials" for match in found]
+    more = f"; and {len(parts) - _SHOWN} more" if len(parts) > _SHOWN else ""
+    return f" Fails: {'; '.join(parts[:_SHOWN])}{more}." if parts else ""
 
 
 def first_sentence(text: str) -> str:

@@ -145,6 +145,19 @@ def test_paths_of_a_machine_are_cut_from_the_command(word: str, kept: str, monke
     assert provenance.current_command() == f"iapb run {kept}"
 
 
+def test_a_command_started_as_a_module_has_its_own_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", [str(provenance._ROOT / "reports" / "cli.py"), "reproduce"])
+    assert provenance.current_command() == "iapb reproduce"
+
+
+def test_the_version_of_siconos_is_that_of_its_adapter(monkeypatch: pytest.MonkeyPatch) -> None:
+    from reference.simulators import siconos_adapter
+
+    for told, shown in (("4.4.0", "4.4.0"), ("", provenance.NOT_INSTALLED)):
+        monkeypatch.setattr(siconos_adapter, "_version", lambda told=told: told)
+        assert provenance.collect_provenance(packages=("siconos",))["siconos"] == shown
+
+
 def test_uncommitted_changes_are_a_patch_with_new_files_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import subprocess
 

@@ -159,7 +159,7 @@ def test_each_outcome_is_counted(full: Evidence) -> None:
 @pytest.mark.parametrize(("text", "shown"), [
     ("at most 2.0e-16 of it", "at most 2.0 · 10<sup>−16</sup> of it"), ("1e8", "10<sup>8</sup>"),
     ("0.0e+00", "0"), ("-3e+00", "−3"), ("e in [-1, 1]", "e in [−1, 1]"), ("2005-06", "2005-06"),
-    ("key a1e5b", "key a1e5b"),
+    ("key a1e5b", "key a1e5b"), ("p >= 0 <= q", "p ≥ 0 ≤ q"),
 ])
 def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
     assert str(prose(text)).replace("\u202f", " ") == shown

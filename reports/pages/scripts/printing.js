@@ -2,7 +2,7 @@
 let opened = [];
 
 window.addEventListener("beforeprint", () => {
-  opened = [...document.querySelectorAll("details.claim:not([open]), details.proof:not([open]), figure > details:not([open])")];
+  opened = [...document.querySelectorAll("details.claim:not([open]), details.proof:not([open], .runs-of), figure > details:not([open])")];
   opened.forEach((details) => { details.open = true; });
 });
 window.addEventListener("afterprint", () => opened.forEach((details) => { details.open = false; }));

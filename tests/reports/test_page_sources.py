@@ -1,0 +1,97 @@
+"""What each number of the page was made from, by runs, tables and commands; and what the page leaves to its files."""
+
+from __future__ import annotations
+
+import pytest
+
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
+from reports.pages.records import (
+    LIMITED,
+    REFUTED,
+    REPRODUCED,
+    Claim,
+    Evidence,
+    Finding,
+    HardCase,
+    StoredFile,
+    Topic,
+    Verdict,
+)
+from reports.pages.sections import SECTIONS
+from reports.pages.verdicts import failures, verdicts
+
+RUNS = tuple(
+    StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))
+    for n in range(3)
+)  # fmt: skip
+KEPT = (StoredFile("claims", "tables/claims-1.h5", "k", "c" * 64, "iapb reproduce"),
+        StoredFile("hard cases", "tables/hard_cases-1.h5", "k", "c" * 64, "iapb reproduce"))  # fmt: skip
+CLAIMS = (Claim("C10", "s", "p", REPRODUCED, "h"), Claim("C19", "s", "p", REPRODUCED, "h", numbers=Numbers(
+    ("a", "t"), ((1, 2.0),), timed=("t",))))  # fmt: skip
+
+
+def test_a_claim_names_its_runs_and_each_run_its_command():
+    page = build_page(Evidence(claims=CLAIMS, manifest=(*RUNS, *KEPT)), ())
+    body = page.split('<details id="C10"')[1].split("</details>")[0]
+    assert '<a href="#runs-C10">3 runs</a>' in body
+    listed = page.split('id="runs-C10"')[1].split("</details>")[0]
+    assert all(run.file in listed and run.command in listed for run in RUNS)
+
+
+def test_a_claim_without_runs_and_a_claim_on_times_say_so():
+    page = build_page(Evidence(claims=CLAIMS), ())
+    body = page.split('<details id="C19"')[1]
+    assert "keeps no runs; times are of the machine" in body
+
+
+def test_a_section_names_the_files_its_numbers_are_kept_in():
+    case = HardCase("bar", "bar", "ours", "impact", "w", "l", "e", Numbers(("method", "outcome"), (("svd", "stable"),)))
+    page = build_page(Evidence(claims=CLAIMS, hard_cases=(case,), manifest=KEPT), ())
+    assert "<code>tables/claims-1.h5</code>" in page.split('<section id="claims"')[1].split("</section>")[0]
+    assert "<code>tables/hard_cases-1.h5</code>" in page.split('<section id="hard-cases"')[1].split("</section>")[0]
+
+
+def test_a_figure_names_its_runs_and_the_command_that_draws_it():
+    drawn = Figure("one", "", "t", "c", (Panel("<svg />", "alt"),), None, (), ("C10", "a table"))
+    recipe = Recipe("one", "", "t", (), lambda inputs: drawn)
+    page = build_page(Evidence(manifest=RUNS), (recipe,))
+    assert 'From <a href="#runs-C10">C10</a>, a table. Again: <code>iapb reproduce --figure one</code>' in page
+
+
+def test_every_section_of_numbers_names_a_table():
+    drawn_from_runs = {"idea", "figures", "couplings", "provenance", "manifest"}
+    assert {section.id for section in SECTIONS if not section.tables} == drawn_from_runs
+
+
+def test_a_long_table_is_cut_and_says_where_the_rest_is():
+    rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
+    for shown, told in ((rows, True), (rows[:-1], False)):
+        page = build_page(Evidence(topics=(Topic("mechanics", "t", "l", (), {"trees": Numbers(("x",), shown)}),)), ())
+        assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} rows" in page) == told
+        assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
+
+
+@pytest.mark.parametrize(
+    ("fails", "told"),
+    [
+        ("", ""), ("in all 5 trials", " Fails in all 5 trials."),
+        ("x: in 21 of 72 trials, with tilt 0.03, 0.1 rad; y: a: in 3 of 42 trials, with b 1 m",
+         " Fails: x in 21 of 72 trials; y: a in 3 of 42 trials."),
+        ("a: in 1 of 2 trials; b: in 1 of 2 trials; c: in 1 of 2 trials",
+         " Fails: a in 1 of 2 trials; b in 1 of 2 trials; and 1 more."),
+    ],
+)  # fmt: skip
+def test_where_a_claim_fails_in_few_words(fails, told):
+    assert failures(fails) == told
+
+
+def test_the_first_page_says_where_and_not_twice():
+    claim = Claim("C20", "s", "p", LIMITED, "Held. (holds in 1 of 2 trials)", fails="x: in 1 of 2 trials, with a")
+    assert verdicts((claim,))[0].sentence == "C20: Held. Fails: x in 1 of 2 trials."
+
+
+def test_a_topic_with_failing_findings_counts_them():
+    topic = Topic("mechanics", "t", "l", (Finding("a", REPRODUCED), Finding("b", REFUTED)), {}, "v")
+    assert badge_words(Verdict("t", REFUTED, "v", "mechanics"), (topic,)) == "1 of 2 findings fail"
+    assert badge_words(Verdict("t", LIMITED, "v", "proofs"), (topic,)) == "holds within limits"
