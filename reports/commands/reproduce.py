@@ -51,6 +51,8 @@ def make_report(out: Path, depth: str) -> None:
     size, files = path.stat().st_size / 1e6, len(evidence.manifest)
     print(f"\n{path} ({size:.1f} MB, from {files} run and table files) in {time.perf_counter() - started:.0f} s.")
     print(f"Beside it: {', '.join(file.name for file in beside)}.")
+    if any(topic.failed for topic in evidence.topics):
+        raise typer.Exit(1)
 
 
 def _write_figure(key: str, out: Path, depth: str) -> None:

@@ -20,7 +20,7 @@ from reports.evidence import (
 from reports.evidence.depends import depends_of
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage, evidence_version
-from reports.evidence.topics import TOPICS, compute_topic
+from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.evidence.verdicts import verdicts
 from reports.figures.figure import Numbers
 from reports.pages.records import (
@@ -79,7 +79,11 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
 
 
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
-    topic: Topic = kept.stage(name, Topic, lambda done: compute_topic(name, runner, depth, done))
+    """One topic; where it fails the others are still worth their hours, and the next time only this one is tried."""
+    try:
+        topic: Topic = kept.stage(name, Topic, lambda done: compute_topic(name, runner, depth, done))
+    except Exception as failure:
+        topic = failed_topic(name, failure, kept.folder)
     return topic
 
 

@@ -137,6 +137,7 @@ class Topic:
     lead : two or three sentences that say what is asked and how
     tables : by name; a figure asks for one as "<id>/<name>", and those that none asks for are printed
     verdict : the sentence of the first page, empty for none; its outcome is the worst of the findings
+    failed : nothing was found, because computing it stopped
     """
 
     id: str
@@ -145,6 +146,7 @@ class Topic:
     findings: tuple[Finding, ...]
     tables: Mapping[str, Numbers] = field(default_factory=dict)
     verdict: str = ""
+    failed: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,53 @@
+"""A topic that cannot be computed costs the report that topic alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.evidence import gather
+from reports.evidence.verdicts import verdicts
+from reports.pages.records import NOT_COMPUTED, Evidence, Finding, Topic
+from reports.runner import Runner
+
+COMPUTED = Topic("engines", "Other engines", "", (Finding("all well", "reproduced"),), verdict="all well")
+
+
+def kept(folder: Path) -> gather._Kept:
+    return gather._Kept(folder / "tables", "quick", lambda stage, done, total: None, Runner(folder / "runs"))
+
+
+def test_the_reason_is_said_and_the_next_time_it_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compute(name: str, *rest: object) -> Topic:
+        raise RuntimeError("the disk went away\nand more")
+
+    stages = kept(tmp_path)
+    monkeypatch.setattr(gather, "compute_topic", compute)
+    failed = gather._topic(stages, "engines", stages.runner, "quick")
+    assert failed.failed and failed.id == "engines"
+    assert [finding.outcome for finding in failed.findings] == [NOT_COMPUTED]
+    assert "RuntimeError: the disk went away" in failed.verdict and "and more" not in failed.verdict
+    assert "in compute" in (tmp_path / "tables" / "engines-failed.txt").read_text()
+    monkeypatch.setattr(gather, "compute_topic", lambda *given: COMPUTED)
+    assert gather._topic(stages, "engines", stages.runner, "quick") == COMPUTED
+
+
+def test_the_first_page_says_so(tmp_path: Path) -> None:
+    from reports.evidence.topics import failed_topic
+
+    failed = failed_topic("haptic-rate", ValueError(), tmp_path)
+    said = verdicts(Evidence(inputs={}, topics=(failed,)))
+    assert [(verdict.outcome, verdict.link) for verdict in said] == [(NOT_COMPUTED, "haptic-rate")]
+
+
+def test_ctrl_c_is_no_failure_of_a_topic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def compute(name: str, *rest: object) -> Topic:
+        raise KeyboardInterrupt
+
+    stages = kept(tmp_path)
+    monkeypatch.setattr(gather, "compute_topic", compute)
+    with pytest.raises(KeyboardInterrupt):
+        gather._topic(stages, "engines", stages.runner, "quick")
