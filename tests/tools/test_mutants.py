@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -12,11 +13,11 @@ pytest.importorskip("cosmic_ray")
 
 from cosmic_ray.mutating import mutate_code
 
-from tools.mutants.clones import Clone
+from tools.mutants.clones import FAILED, PASSED, Clone, Outcome
 from tools.mutants.explained import Explanation, explanations
 from tools.mutants.judge import NOTICED, SURVIVED, Judgement, Kept, _only_the_change_breaks
 from tools.mutants.operators import OPERATORS
-from tools.mutants.report import likely_range, score, unexplained
+from tools.mutants.report import enough, likely_range, score, score_of_changes, sentences, unexplained
 from tools.mutants.selection import MeasuredTest, Selection
 from tools.mutants.sites import Mutant, places, sample
 
@@ -83,16 +84,22 @@ def test_tests_that_call_the_function_judge_first_and_their_files_second() -> No
         assert unrelated in selection.first_look(_mutant(name))
 
 
-def test_a_pytest_that_does_not_run_notices_nothing(tmp_path: Path) -> None:
-    """Neither an unknown option nor a test file that cannot be read at all says anything of a mutant."""
+def test_a_pytest_that_does_not_run_notices_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor does a test file that cannot be read with or without it."""
     clone = Clone.__new__(Clone)
     clone.root = tmp_path
-    (tmp_path / "test_broken.py").write_text("import nothing_of_this_name\n")
     with pytest.raises(RuntimeError, match="pytest did not run"):
         clone.pytest(["--no-such-option"], 20)
-    assert clone.pytest(["test_broken.py"], 20).first_failure == "test_broken.py"
-    with pytest.raises(RuntimeError, match="with or without a mutant"):
-        _only_the_change_breaks("test_broken.py", clone)
+    (tmp_path / "test_broken.py").write_text("import nothing_of_this_name\n")
+    for verdict, raises in ((FAILED, pytest.raises(RuntimeError, match="with or without")), (PASSED, nullcontext())):
+        monkeypatch.setattr(Clone, "pytest", lambda *_, said=verdict: Outcome(said))
+        with raises:
+            _only_the_change_breaks("test_broken.py", clone)
+
+
+def test_a_number_that_one_more_does_not_change_is_no_place() -> None:
+    found = [mutant.becomes("best = 1e300\nn = 1e3\n") for mutant in places("a.py", "best = 1e300\nn = 1e3\n")]
+    assert found == ["n = 1001.0", "n = 999.0"]
 
 
 def _judgement(verdict: str, key: str, code: str = "now") -> Judgement:
@@ -117,6 +124,16 @@ def test_only_the_explained_change_of_the_explained_line_is_excused() -> None:
     assert unexplained(judged, [dataclasses.replace(explanation, becomes="x = 0")]) == [survivor]
     assert unexplained(judged, [dataclasses.replace(explanation, line="y = 1")]) == [survivor]
     assert score(judged) == 0.5
+
+
+def test_what_changes_nothing_is_left_out_of_the_customary_score_but_what_is_harmless_is_not() -> None:
+    judged = [_judgement(SURVIVED, "1"), *(_judgement(NOTICED, str(k)) for k in range(2, 5))]
+    table = [Explanation("iapb/a.py", "x = 1", "equivalent", "because")]
+    assert (score(judged), score_of_changes(judged, table)) == (0.75, 1.0)
+    assert enough(judged, table) and not enough(judged, [])
+    harmless = [dataclasses.replace(table[0], kind="harmless")]
+    assert score_of_changes(judged, harmless) == 0.75 and not enough(judged, harmless)
+    assert any(sentence.startswith("Not enough: 90%") for sentence in sentences(judged, harmless, 10))
 
 
 def test_likely_range_narrows_with_the_sample_and_stays_within_one() -> None:

@@ -9,7 +9,7 @@ import sys
 from tools.mutants.clones import REPOSITORY, Clone, git, prepare
 from tools.mutants.explained import explanations
 from tools.mutants.judge import Judgement, Kept, code_version, judge_all
-from tools.mutants.report import WANTED, score, sentences, unexplained, write
+from tools.mutants.report import enough, sentences, write
 from tools.mutants.selection import measured
 from tools.mutants.sites import Mutant, all_places, sample
 
@@ -35,7 +35,7 @@ def main() -> int:
     table = explanations()
     write(REPOSITORY / "out" / "mutants.json", judged, table, asked.seed, commit)
     print("\n".join(sentences(judged, table, number)))
-    return int(score(judged) < WANTED or bool(unexplained(judged, table)))
+    return int(not enough(judged, table))
 
 
 def _arguments() -> argparse.Namespace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 from typing import Any
 
@@ -43,15 +44,25 @@ def _is_first_length(number: Any) -> bool:
     return bool(number.value == "0" and bracket.value == "[" and bracket.get_previous_leaf().value == "shape")
 
 
+def _swallows_one(number: str) -> bool:
+    value = ast.literal_eval(number)
+    return bool(value + 1 == value)
+
+
 def _operator_of(statement: Any) -> str:
     return str(statement.children[1].get_code().strip())
 
 
 class Constant(NumberReplacer):
-    """A number ± 1: constants, indices and the ends of ranges; but `shape[-1]` for `shape[0]` changes no vector."""
+    """A number ± 1: constants, indices and the ends of ranges.
+
+    But `shape[-1]` for `shape[0]` changes no vector, and 1e300 + 1 is 1e300.
+    """
 
     def mutation_positions(self, node: Any) -> Iterator[Any]:
         positions = list(super().mutation_positions(node))
+        if positions and _swallows_one(node.value):
+            return
         yield from positions[:1] if positions and _is_first_length(node) else positions
 
 

@@ -29,6 +29,17 @@ def score(judged: Sequence[Judgement]) -> float:
     return sum(one.killed for one in judged) / len(judged)
 
 
+def score_of_changes(judged: Sequence[Judgement], table: list[Explanation]) -> float:
+    """The customary score: the share among those that change something, without the survivors shown equivalent."""
+    equivalent = sum(_kind(one, table) == "equivalent" for one in survivors(judged))
+    return sum(one.killed for one in judged) / max(1, len(judged) - equivalent)
+
+
+def enough(judged: Sequence[Judgement], table: list[Explanation]) -> bool:
+    """As many noticed as wanted, and every survivor explained?"""
+    return score_of_changes(judged, table) >= WANTED and not unexplained(judged, table)
+
+
 def likely_range(share: float, count: int) -> tuple[float, float]:
     """Wilson's 95 % interval for the share among all mutants, of which `count` were drawn."""
     z = _LIKELY**2 / count
@@ -51,8 +62,10 @@ def sentences(judged: Sequence[Judgement], table: list[Explanation], places: int
         f"{share:.1%} of {count} mutants were noticed ({too_long} of them because a test did not end).",
         f"For a sample that no test was written for, that puts the share among all {places} that could be drawn "
         f"between {low:.0%} and {high:.0%} (95 % confidence); another seed draws another sample.",
-        f"Without the {equivalent} survivors that change nothing it is {(count * share) / (count - equivalent):.1%}; "
+        f"Without the {equivalent} survivors that change nothing it is {score_of_changes(judged, table):.1%}; "
         f"{open_ones} of {len(survivors(judged))} survivors have no explanation.",
+        f"{'Enough' if enough(judged, table) else 'Not enough'}: {WANTED:.0%} of those that change something are "
+        "wanted, and a reason for each survivor.",
     ]
     return lines
 

@@ -173,6 +173,34 @@ def test_a_shape_at_an_offset_touches_as_one_at_the_origin_of_a_moved_body(a: in
     assert touching > 3
 
 
+@pytest.mark.parametrize("a", [0, 1])
+@pytest.mark.parametrize("b", [0, 1, 2])
+@pytest.mark.parametrize("spatial", [False, True])
+@pytest.mark.parametrize("factor", [2.0**-40, 2.0**40])
+def test_the_unit_of_length_changes_no_bit(a: int, b: int, spatial: bool, factor: float) -> None:
+    """Metres, picometres, or light minutes: a power of two rounds nothing, and no length is built in."""
+    rng = np.random.default_rng(10)
+    kinds, pose = (SPATIAL, spatial_pose) if spatial else (PLANAR, planar_pose)
+    plain, scaled = (arrays_of(on(0, kinds[a]), on(1, kinds[b])), arrays_of(longer(kinds[a], factor, 0),
+                                                                            longer(kinds[b], factor, 1)))
+    touching = 0
+    for _ in range(25):
+        R, p = (np.ascontiguousarray(np.array(part)) for part in zip(*(pose(rng, 0.5) for _ in range(2)), strict=True))
+        count, one = found(plain, R, p, 0.2)
+        same, other = found(scaled, R, factor * p, factor * 0.2)
+        assert same == count
+        touching += count
+        for name, size in (("point", factor), ("gap", factor), ("normal", 1.0), ("feature", 1)):
+            np.testing.assert_array_equal(getattr(other, name)[:count], size * getattr(one, name)[:count])
+    assert touching > 0
+
+
+def longer(shape: Any, factor: float, body: int) -> Any:
+    """The same shape in another unit of length."""
+    lengths = {"radius", "center", "vertices", "size", "point"} & set(shape.__dict__)
+    return on(body, type(shape)(**{**shape.__dict__, **{n: factor * np.asarray(getattr(shape, n)) for n in lengths}}))
+
+
 # --- a ball and a box, written out -----------------------------------------------------------------------------
 
 
