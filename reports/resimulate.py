@@ -13,7 +13,7 @@ from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 
-# name of a law -> (module, class); a run of any other law says what is missing
+# name of a law -> (module, class); any other law is made again where a world has it
 LAWS = {
     "impulse-augmented penalty": ("iapb.contact.laws", "ImpulseAugmented"),
     "impulse-augmented penalty with impact friction": ("iapb.contact.laws", "ImpulseAugmented"),
@@ -67,12 +67,22 @@ def scene_of(run: Run) -> Scene:
 
 
 def law_of(run: Run) -> Any:
-    """The contact law of a run with its settings."""
-    if run.law not in LAWS:
-        raise ArgumentError("law", run.law, one_of(run.law, LAWS) + " (any other law is not in the file)")
-    module, name = LAWS[run.law]
-    kind = getattr(import_module(module), name)
-    return kind(**_known(kind, run.law_settings))
+    """The contact law of a run with its settings: one of LAWS, or that of the world that the run names."""
+    if run.law in LAWS:
+        module, name = LAWS[run.law]
+        kind = getattr(import_module(module), name)
+        return kind(**_known(kind, run.law_settings))
+    law = _law_of_world(run.world)
+    if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
+        raise ArgumentError("law", run.law, one_of(run.law, LAWS) + ", or a world's (any other law is not in the file)")
+    return law
+
+
+def _law_of_world(name: str) -> Any:
+    """The law of a world of reference/worlds.py, None where there is no such world."""
+    from reference.worlds import WORLDS, find_world
+
+    return find_world(name).law if name in WORLDS else None
 
 
 def coupling_of(run: Run) -> Coupling:

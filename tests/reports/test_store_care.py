@@ -135,6 +135,22 @@ def test_a_run_of_an_unknown_law_cannot_be_made_again(tmp_path: Path) -> None:
         repeat_run(tmp_path / "mine.h5")
 
 
+def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from iapb.contact.laws import Penalty
+    from reference import worlds
+
+    class Mine(Penalty):
+        name = "springs of mine"
+
+    monkeypatch.setitem(worlds.WORLDS, "mine", lambda rendering: worlds.World("mine", Mine(), "four-channel"))
+    Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "mine")
+    path = next(tmp_path.glob("*.h5"))
+    assert repeat_run(path).same
+    monkeypatch.setattr(Mine, "settings", {"stiffness": "another"})
+    with pytest.raises(ArgumentError, match="springs of mine"):
+        repeat_run(path)
+
+
 def test_the_command_speaks_and_its_status_tells(filled: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from reports.cli import main
 
