@@ -102,6 +102,13 @@ def test_a_number_that_one_more_does_not_change_is_no_place() -> None:
     assert found == ["n = 1001.0", "n = 999.0"]
 
 
+def test_the_last_entry_of_one_is_no_other() -> None:
+    text = "port.clock[0] = log.logged[0]\nrow[0] = 2\n"
+    found = {mutant.becomes(text) for mutant in places("a.py", text) if mutant.operator == "Constant"}
+    assert found == {"port.clock[1] = log.logged[0]", "port.clock[0] = log.logged[1]", "row[1] = 2", "row[-1] = 2",
+                     "row[0] = 3", "row[0] = 1"}  # fmt: skip
+
+
 def _judgement(verdict: str, key: str, code: str = "now") -> Judgement:
     return Judgement("iapb/a.py", "f", 3, "x = 1", "x = 2", "Constant", verdict, key=key, code=code)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from cosmic_ray.operators.number_replacer import NumberReplacer
@@ -38,10 +40,17 @@ _FROM_COSMIC_RAY = (
 )
 
 
-def _is_first_length(number: Any) -> bool:
-    """Is this the 0 of `shape[0]`?"""
+# Arrays of one entry, as the records of the kernels declare them: `clock: np.ndarray  # (1,) int64`.
+_DECLARED = re.compile(r"^ +(\w+): np\.ndarray  # \(1,\)", re.MULTILINE)
+_ENGINE = Path(__file__).resolve().parents[2] / "iapb"
+ONE_ENTRY = {name for path in _ENGINE.glob("*/kernels/*.py") for name in _DECLARED.findall(path.read_text())}
+
+
+def _ends_of_one(number: Any) -> bool:
+    """Is this the 0 of `shape[0]`, or of an array of one entry?"""
     bracket = number.get_previous_leaf()
-    return bool(number.value == "0" and bracket.value == "[" and bracket.get_previous_leaf().value == "shape")
+    of = bracket.get_previous_leaf() if number.value == "0" and bracket.value == "[" else None
+    return of is not None and of.value in ONE_ENTRY | {"shape"}
 
 
 def _swallows_one(number: str) -> bool:
@@ -56,14 +65,14 @@ def _operator_of(statement: Any) -> str:
 class Constant(NumberReplacer):
     """A number ± 1: constants, indices and the ends of ranges.
 
-    But `shape[-1]` for `shape[0]` changes no vector, and 1e300 + 1 is 1e300.
+    But the last entry of one is its first (`shape[-1]` of a vector too), and 1e300 + 1 is 1e300.
     """
 
     def mutation_positions(self, node: Any) -> Iterator[Any]:
         positions = list(super().mutation_positions(node))
         if positions and _swallows_one(node.value):
             return
-        yield from positions[:1] if positions and _is_first_length(node) else positions
+        yield from positions[:1] if positions and _ends_of_one(node) else positions
 
 
 class _OtherToken(Operator):

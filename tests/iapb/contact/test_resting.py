@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -113,3 +115,12 @@ def test_wrong_constants_are_named():
         assert caught.value.argument in wrong
     with pytest.raises(ArgumentError, match="friction_velocity"):
         resting_forces(MECHANISM, found, q, STIFFNESS, friction=0.5, friction_velocity=0.0)
+
+
+def test_what_is_found_cannot_be_replaced() -> None:
+    q = np.zeros(6)
+    found = find_contacts(MECHANISM, SHAPES, q, q)
+    forces = resting_forces(MECHANISM, found, q, STIFFNESS, DAMPING)
+    for answer in (found, forces):
+        with pytest.raises(FrozenInstanceError):
+            setattr(answer, next(iter(answer.__dataclass_fields__)), None)

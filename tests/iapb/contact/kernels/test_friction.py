@@ -93,6 +93,21 @@ def test_two_tangents_along_one_line_are_moved_by_projected_steps() -> None:
 
 
 @TANGENTS
+@pytest.mark.parametrize("factor", [2.0**-40, 2.0**40])
+def test_the_unit_of_mass_changes_no_bit_of_a_sweep(size: int, factor: float) -> None:
+    """Rows B and velocities grow by a, impulses fall by a: sticking, sliding and what is singular stay as they are."""
+    rng = np.random.default_rng(12)
+    for _ in range(10):
+        rows, slip, inertia = problem(rng, size)
+        radius, p = rng.exponential(0.5, 3), rng.normal(size=3 * size) * 0.1
+        other = p / factor
+        friction_sweeps(rows, slip, radius, inertia, p, np.zeros(7), np.zeros(size), 3, 0.0)
+        friction_sweeps(factor * rows, factor * slip, radius / factor, factor**2 * inertia, other, np.zeros(7),
+                        np.zeros(size), 3, 0.0)
+        assert np.array_equal(p / factor, other)
+
+
+@TANGENTS
 def test_inertia_is_the_largest_eigenvalue_of_its_rows(size: int) -> None:
     rng = np.random.default_rng(3)
     rows, _, inertia = problem(rng, size, count=8)

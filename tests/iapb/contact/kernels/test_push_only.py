@@ -72,3 +72,18 @@ def test_the_impulses_grow_with_the_speeds_bit_for_bit() -> None:
         found.append(np.concatenate([p, residual]) / factor)
     assert np.any(found[0][:8] > 0.0)
     np.testing.assert_array_equal(found[1:], found[:1] * 2)
+
+
+def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
+    """Forty normals about one direction, struck along it: several rows stop pushing at once, the nearest goes first."""
+    d, c = 10, 40
+    for seed in (25, 90, 101, 103, 109, 110, 133):
+        rng = np.random.default_rng(seed)
+        rows = rng.normal(size=(c, d)) + rng.normal(size=d)
+        columns = np.ascontiguousarray((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
+        b = -0.3 * columns.sum(axis=1) + rng.normal(size=d)
+        p, residual = np.zeros(c), np.zeros(d)
+        assert push_only(columns, c, b, p, residual, make_push_work(d, c))
+        speeds, size = columns.T @ residual, np.linalg.norm(b)
+        assert p.min() >= 0.0 and speeds.min() >= -1e-11 * size
+        assert np.abs(p * speeds).max() <= 1e-10 * size * (1.0 + p.max())
