@@ -12,7 +12,7 @@ IMPACTS = {"quick": 100_000, "full": 1_000_000}
 COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
 KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
 ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60  # cases of a law; of one that simulates each; with a fault
-TRAJECTORIES, TRAJECTORY_STEPS = 60, 300
+TRAJECTORIES, IN_SPACE, TRAJECTORY_STEPS = 60, 40, 300
 SEED = 20050601
 Progress = Callable[[int, int], None]
 
@@ -68,11 +68,13 @@ def _trajectory_laws() -> Iterator[Property]:
 
     from verification.properties.planted_trajectory import PLANTED_TRAJECTORY_FAULTS, first_occasion
     from verification.properties.scenes import draw_scene
+    from verification.properties.scenes_space import draw_spatial_scene
     from verification.properties.tally import residual_count
     from verification.properties.trajectory_laws import TRAJECTORY_LAWS, Trajectory, judge_run
 
     rng = np.random.default_rng(SEED)
     scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
+    scenes += [draw_spatial_scene(rng, TRAJECTORY_STEPS) for _ in range(IN_SPACE)]
     judged = [dict(judge_run(scene.simulate())) for scene in scenes]
     for name, law in TRAJECTORY_LAWS.items():
         found = residual_count(residuals[name] for residuals in judged if name in residuals)

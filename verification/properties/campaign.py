@@ -22,20 +22,22 @@ from verification.properties.engine_laws import ENGINE_LAWS
 from verification.properties.families import draw_case, with_unequal_restitution
 from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.scenes import draw_scene
+from verification.properties.scenes_space import draw_spatial_scene
 from verification.properties.struck import Struck, strike
 from verification.properties.tally import LawCount, RunningCount, residual_of
 from verification.properties.trajectory_laws import judge_run
 
-IMPACTS, UNEQUAL, TRAJECTORIES = "impacts", "unequal restitution", "trajectories"
-PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS)  # the order enters the seeds: add at the end
+IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"
+PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the order enters the seeds: add at the end
+SCENES = {TRAJECTORIES: draw_scene, IN_SPACE: draw_spatial_scene}
 # Laws of one call, which all of them share: put to every impact. The others compare it with calls on variants of the
 # impact, up to three and an SVD each; they are put to one impact in ONE_IN, each law to its own choice of them.
 OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
 ONE_IN = 10
 # Cases of a part for each impact or trajectory asked for, and cases per batch (a few seconds of work).
 _SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0.1, "hand_port": 0.02}
-_PER_TRAJECTORY = {"group_splitting": 0.2, "device_port": 0.1}
-BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, "group_splitting": 20, "device_port": 20}
+_PER_TRAJECTORY = {IN_SPACE: 0.4, "group_splitting": 0.2, "device_port": 0.1}
+BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, IN_SPACE: 50, "group_splitting": 20, "device_port": 20}
 _BATCH = 2000
 # Counterexamples kept of each law and batch. All are counted, and all are kept unless a resolver breaks the law in more
 # than one case in forty: then the first say what is wrong with it, and a million files would say no more.
@@ -100,8 +102,8 @@ def _batches(part: str, total: int) -> Iterator[Batch]:
 def drawn(part: str, index: int, subject: Subject) -> Any:
     """Return case `index` of a part: always the same one."""
     rng = np.random.default_rng([subject.seed, PARTS.index(part), index])
-    if part == TRAJECTORIES:
-        return draw_scene(rng)
+    if part in SCENES:
+        return SCENES[part](rng)
     if part in ENGINE_LAWS:
         return ENGINE_LAWS[part].draw(rng)
     case = draw_case(rng, subject.largest_condition)
@@ -123,7 +125,7 @@ def residuals(
 
     With the case's `index` an impact is put to the laws that it has been chosen for, without it to all.
     """
-    if part == TRAJECTORIES:
+    if part in SCENES:
         try:
             run = case.simulate()
         except IapbError:  # refused by name before the first step: nothing to judge

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from iapb.run import Run
+from iapb.system import System
 from verification.properties.scenes import SceneCase
 
 Fault = Callable[[SceneCase], Run | None]
@@ -52,9 +53,11 @@ def lost_gravity(case: SceneCase) -> Run | None:
 
 def moved_by_the_old_velocity(case: SceneCase) -> Run:
     """Positions of explicit Euler beside velocities of semi-implicit Euler."""
-    run = case.simulate()
-    moved = run.q[:1] + run.dt * np.cumsum(run.v[:-1], axis=0)
-    return replace(run, q=np.concatenate([run.q[:1], moved]))
+    run, mechanism = case.simulate(), System(case.scene()).mechanism
+    q = [run.q[0]]
+    for v in run.v[:-1]:
+        q.append(mechanism.integrate(q[-1], v, run.dt))
+    return replace(run, q=np.array(q))
 
 
 def missing_half(case: SceneCase) -> Run | None:
@@ -78,7 +81,9 @@ def unclamped_penalty(case: SceneCase) -> Run | None:
 def unclamped_friction(case: SceneCase) -> Run | None:
     """Friction proportional to speed, without the bound of Coulomb's law."""
     run = case.simulate()
-    if not np.any(run.contacts.friction_force):
+    contacts, mu = run.contacts, run.scene_resolved["contact"]["friction"]
+    length = np.linalg.norm(contacts.friction_force, axis=1)
+    if not np.any((length > 0.0) & (length > 0.9 * mu * contacts.normal_force)):  # nothing slides
         return None
     return replace(run, contacts=replace(run.contacts, friction_force=1.5 * run.contacts.friction_force))
 

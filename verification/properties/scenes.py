@@ -53,13 +53,18 @@ def draw_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     values["duration"] = steps / values["rate"]
     if rng.random() < 0.5:
         values["gravity"] = [0.0, -9.81]
-    values["contact"] = _contact(rng, least_mass, 1.0 / values["rate"])
+    values["contact"] = draw_contact(rng, least_mass, 1.0 / values["rate"])
     held = rng.random() < 0.4
     if held:
         _add_hand(rng, values)
+    return SceneCase(values, *draw_world(rng, held))
+
+
+def draw_world(rng: np.random.Generator, held: bool) -> tuple[str, str]:
+    """The law that moves a scene, and how its impulses meet the limits of a device."""
     impulses = rng.random() < 0.8
     rendering = str(rng.choice(RENDERINGS)) if held and impulses else "full"
-    return SceneCase(values, "IAPB" if impulses else "PB", rendering)
+    return "IAPB" if impulses else "PB", rendering
 
 
 def _bodies(rng: np.random.Generator) -> list[Values]:
@@ -107,7 +112,8 @@ def _walls(rng: np.random.Generator) -> list[Values]:
     return walls
 
 
-def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
+def draw_contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
+    """Constants of contact for a lightest body [kg] and a step [s]."""
     stiffness = min(10.0 ** rng.uniform(2.0, 5.0), (STIFFEST / dt) ** 2 * least_mass)
     damping = rng.choice([0.0, 0.3, 1.0]) * np.sqrt(stiffness * least_mass)
     contact: Values = {
@@ -133,16 +139,20 @@ def _add_hand(rng: np.random.Generator, values: Values) -> None:
     if rng.random() < 0.3:
         return
     mass, inertia = values["bodies"][0]["mass"], values["bodies"][0]["inertia"]
+    add_coupling(rng, values, np.array([mass, mass, inertia]), [15.0, 15.0, 1.0])
+
+
+def add_coupling(rng: np.random.Generator, values: Values, inertia: np.ndarray, limits: list[float]) -> None:
+    """A four-channel controller for a tool of these inertias, and a device with limits, delay and quantised sensors."""
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
-    per_coordinate = np.array([mass, mass, inertia])
     values["couplings"] = {"four_channel": {
-        "stiffness": [float(f"{x:.6g}") for x in per_coordinate * rate**2 * 0.3],
-        "damping": [float(f"{x:.6g}") for x in per_coordinate * rate]}}  # fmt: skip
+        "stiffness": [float(f"{x:.6g}") for x in inertia * rate**2 * 0.3],
+        "damping": [float(f"{x:.6g}") for x in inertia * rate]}}  # fmt: skip
     device: Values = {}
     if rng.random() < 0.7:
-        device["force_limit"] = [15.0, 15.0, 1.0]
+        device["force_limit"] = limits
     if rng.random() < 0.3:
         device["delay"] = int(rng.integers(1, 3))
     if rng.random() < 0.3:
-        device["position_resolution"] = [1e-5, 1e-5, 1e-4]
+        device["position_resolution"] = [1e-5 if limit > 1.0 else 1e-4 for limit in limits]
     values["device"] = device

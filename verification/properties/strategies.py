@@ -101,3 +101,27 @@ def _discs(draw: st.DrawFn, k: int) -> Values:
     return {"name": f"disc_{k}", "joint": "planar", "mass": 10.0 ** draw(st.integers(-2, 1)), "inertia": 1e-3,
             "shapes": [{"kind": "circle", "radius": 0.05}], "position": [0.1 * k, -0.1, 0.0],
             "velocity": [float(x) for x in v]}  # fmt: skip
+
+
+@st.composite
+def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
+    """A short scene in space of whole numbers: a ball, and a box that stands or is thrown, over a floor by a side."""
+    v = [draw(st.lists(st.integers(-3, 3), min_size=6, max_size=6)) for _ in range(2)]
+    turn = draw(st.sampled_from([[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, 0.8], [0.5, 0.5, 0.5, 0.5]]))
+    common = {"joint": "free_flyer", "mass": 10.0 ** draw(st.integers(-1, 1)), "inertia": [1e-3] * 3}
+    bodies = [
+        common | {"name": "ball", "shapes": [{"kind": "sphere", "radius": 0.05}], "velocity": [float(x) for x in v[0]],
+                  "position": [0.0, 0.0, draw(st.sampled_from([0.05, 0.15])), 0.0, 0.0, 0.0, 1.0]},
+        common | {"name": "box", "shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}],
+                  "velocity": [float(x) for x in v[1]], "position": [0.12, 0.0, 0.05, *turn]},
+    ]  # fmt: skip
+    contact = {
+        "stiffness": 10.0 ** draw(st.integers(1, 3)), "damping": float(draw(st.sampled_from([0, 1]))),
+        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
+    }  # fmt: skip
+    walls = [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]},
+             {"name": "side", "kind": "half_space", "point": [0.2, 0, 0], "normal": [-1, 0, 0]}]  # fmt: skip
+    values = {"name": "small_scene_in_space", "dimensions": 3, "rate": 1000.0, "duration": steps / 1000.0,
+              "bodies": bodies, "walls": walls, "gravity": draw(st.sampled_from([None, [0.0, 0.0, -10.0]])),
+              "contact": contact}  # fmt: skip
+    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))

@@ -11,16 +11,18 @@ from hypothesis import given, settings
 from reports.store import read_run, write_run
 from verification.properties.planted_trajectory import PLANTED_TRAJECTORY_FAULTS, first_occasion
 from verification.properties.scenes import SceneCase, draw_scene
-from verification.properties.strategies import scenes
+from verification.properties.scenes_space import draw_spatial_scene
+from verification.properties.strategies import scenes, scenes_in_space
 from verification.properties.trajectory_laws import TRAJECTORY_LAWS, Trajectory, judge_run
+from verification.properties.trajectory_laws.impact_energy import _gain
 
 STEPS = 200
 
 
-@pytest.fixture(scope="module")
-def drawn() -> list[SceneCase]:
+@pytest.fixture(scope="module", params=[draw_scene, draw_spatial_scene], ids=["in the plane", "in space"])
+def drawn(request: pytest.FixtureRequest) -> list[SceneCase]:
     rng = np.random.default_rng(7)
-    return [draw_scene(rng, STEPS) for _ in range(60)]
+    return [request.param(rng, STEPS) for _ in range(60)]
 
 
 def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
@@ -37,6 +39,33 @@ def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
 def test_small_scenes_keep_every_law(case: SceneCase) -> None:
     for _, residual in judge_run(case.simulate()):
         assert residual.passed, residual
+
+
+@settings(max_examples=20)
+@given(case=scenes_in_space())
+def test_small_scenes_in_space_keep_every_law(case: SceneCase) -> None:
+    for _, residual in judge_run(case.simulate()):
+        assert residual.passed, residual
+
+
+def test_scenes_in_space_have_boxes_balls_stacks_and_linkages_that_touch() -> None:
+    rng = np.random.default_rng(3)
+    drawn = [draw_spatial_scene(rng, STEPS) for _ in range(40)]
+    kinds = {shape["kind"] for case in drawn for body in case.values["bodies"] for shape in body["shapes"]}
+    joints = {body["joint"] for case in drawn for body in case.values["bodies"]}
+    assert kinds == {"box", "sphere"} and joints == {"free_flyer", "revolute", "spherical"}
+    stacked = next(case for case in drawn if any(body["name"] == "above" for body in case.values["bodies"]))
+    run = stacked.simulate()
+    names = np.array([*run.body_names, "world"])
+    first = slice(run.contacts.offsets[0], run.contacts.offsets[1])
+    met = {(names[a], names[b]) for a, b in zip(run.contacts.body_a[first], run.contacts.body_b[first], strict=True)}
+    assert {frozenset(pair) for pair in met} >= {frozenset({"below", "world"}), frozenset({"below", "above"})}
+
+
+def test_a_gain_beyond_the_range_of_double_double_is_judged_exactly() -> None:
+    before, after = np.array([1e70, 1e-5]), np.array([1e70, 1e-5])
+    assert _gain(np.eye(2), before, after) == 0.0
+    assert _gain(np.eye(2), before, 2.0 * after) == 3.0
 
 
 @pytest.mark.parametrize("law", TRAJECTORY_LAWS)

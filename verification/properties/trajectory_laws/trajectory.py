@@ -65,7 +65,7 @@ class Trajectory:
         """B + G (n, d) of (1) at the beginning of each step, after the impulse."""
         system, q = self.system, self.run.q[:-1]
         out = np.zeros_like(self.v_struck)
-        if not system.mechanism.has_constant_mass_matrix:
+        if system.mechanism.has_velocity_terms:
             out += system.mechanism.biases(q, self.v_struck)
         if np.any(system.gravity):
             out += np.array([system.mechanism.gravity(at, system.gravity) for at in q])
