@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -10,7 +11,7 @@ from typing import Any
 
 import typer
 
-from iapb.errors import IapbError
+from iapb.errors import ArgumentError, IapbError
 
 # command -> module of reports.commands that holds a function of the same name
 COMMANDS = ("run", "live", "effects", "inspect", "schema", "prove", "verify", "compare", "bench", "sweep", "store",
@@ -56,11 +57,16 @@ def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
+    given = sys.argv[1:] if arguments is None else arguments
+    if arguments is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        # The signal that ends a process politely, of a batch system or a time limit, counts as Ctrl-C: files are kept.
+        signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
+        _refuse_empty(given)
         for name in COMMANDS:
             if name not in {command.name for command in app.registered_commands}:
                 _register(name)
-        status = app(args=arguments, standalone_mode=False)
+        status = app(args=given, standalone_mode=False)
     except KeyboardInterrupt:
         print("iapb: stopped; what was finished is kept.", file=sys.stderr)
         status = 130
@@ -74,6 +80,15 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is None:
         sys.exit(status or 0)
     return status or 0
+
+
+def _refuse_empty(arguments: list[str]) -> None:
+    """Refuse an empty value, as a shell makes of a variable that is not set: as a path it would be this folder."""
+    for i, text in enumerate(arguments):
+        before = arguments[i - 1] if i and arguments[i - 1].startswith("--") else f"argument {i + 1}"
+        name = before if not text else text[:-1]
+        if not text or (text.startswith("--") and text.find("=") == len(text) - 1):
+            raise ArgumentError(name, "", "a value that is not empty (a shell variable that is not set?)")
 
 
 def _sentence(error: IapbError | OSError) -> str:

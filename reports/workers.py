@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
+from threading import Thread
 from typing import Any
 
 from iapb.errors import IapbError
 from reports.compiling import tell_from_worker
+
+_WATCH = 1.0  # [s] between two looks at whether the parent is still there
 
 
 @contextmanager
@@ -36,6 +41,18 @@ class _Pool(ProcessPoolExecutor):
             return super().submit(function, *arguments, **options)
 
 
+def _begin(told: Any, parent: int) -> None:
+    """Initialise a worker, which otherwise would wait for ever for a parent that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+    tell_from_worker(told)
+
+
 @contextmanager
 def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Give `count` processes that start Python anew; whatever ends this early ends them, at once.
@@ -49,7 +66,7 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """
     others, context = set(active_children()), get_context("spawn")
     told = context.Value("b", False)
-    pool = _Pool(count, mp_context=context, initializer=tell_from_worker, initargs=(told,))
+    pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(told, os.getpid()))
     try:
         yield pool
     except BrokenProcessPool as error:

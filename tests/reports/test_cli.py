@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -152,6 +153,10 @@ def test_debug_shows_the_traceback(tmp_path):
         (["inspect", "."], ".: a folder, not a file"),
         (["compare", "--only-problems", "--problems", "."], "a folder with problem files"),
         (["compare", "--export", "/dev/null/folder"], "iapb: /dev/null/folder: Not a directory"),
+        (["run", "peg_corner", "--out", ""], "--out = '': expected a value that is not empty"),
+        (["run", "peg_corner", "--out="], "--out = '': expected a value that is not empty"),
+        (["run", ""], "argument 2 = '': expected a value that is not empty"),
+        (["store", "check", ""], "argument 3 = ''"),
         (["prove", "no_such_statement"], "no_such_statement"),
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),
@@ -211,6 +216,16 @@ def test_ctrl_c_outside_a_run_is_told_and_ends_with_130(iapb, monkeypatch):
     monkeypatch.setattr("iapb.scene.scene_schema", stopped)
     status, _, err = iapb("schema")
     assert status == 130 and err == "iapb: stopped; what was finished is kept.\n"
+
+
+def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(tmp_path):
+    command = [sys.executable, "-m", "reports.cli", "live", "peg_corner", "--seconds", "600", "--out", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert "Under way" in process.stdout.readline()
+        time.sleep(1.0)
+        process.terminate()
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130 and "Stopped: interrupted" in out and len(list(tmp_path.glob("*.h5"))) == 2
 
 
 def test_a_fault_of_ours_is_not_hidden(monkeypatch):

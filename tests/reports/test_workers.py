@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 
@@ -36,6 +39,29 @@ def test_what_stops_the_work_ends_the_workers_in_the_middle_of_theirs():
         [worker] = set(active_children()) - others
         raise KeyboardInterrupt
     assert worker.exitcode == -signal.SIGTERM
+
+
+ORPHANING = """
+import os, signal
+from reports.workers import worker_pool
+if __name__ == "__main__":
+    with worker_pool(1) as pool:
+        print(pool.submit(os.getpid).result(60), flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_worker_whose_parent_was_killed_ends(tmp_path):
+    script = tmp_path / "orphaning.py"
+    script.write_text(ORPHANING)
+    done = subprocess.run([sys.executable, script], stdout=subprocess.PIPE, text=True, check=False,
+                          env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})  # fmt: skip
+    worker = Path("/proc") / done.stdout.strip()
+    for _ in range(600):
+        if not worker.exists():
+            break
+        time.sleep(0.1)
+    assert done.returncode == -signal.SIGKILL and worker.name.isdecimal() and not worker.exists()
 
 
 def test_a_killed_worker_is_one_of_our_errors():

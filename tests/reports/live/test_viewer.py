@@ -61,6 +61,9 @@ def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_
     for sent in (b"", b"neither HTTP nor a web socket\r\n\r\n"):
         with socket.create_connection(("127.0.0.1", port)) as connection:
             connection.sendall(sent)
+            connection.shutdown(socket.SHUT_WR)
+            while connection.recv(4096):  # until the server has done with it
+                pass
     os.kill(shown.process.pid, signal.SIGINT)
     with urllib.request.urlopen(address, timeout=20) as page:
         assert page.status == 200
