@@ -19,11 +19,6 @@ def tool_positions(run: Run) -> Floats:
     return run.q[:, slice(*run.tool_coordinates)]
 
 
-def device_positions(run: Run) -> Floats:
-    """Return the device's coordinates (n + 1, d_t)."""
-    return run.device_q
-
-
 def distance_between(run: Run, other: Run) -> Floats:
     """Return the root mean square difference of the two device trajectories, per coordinate (d_t,)."""
     count = min(len(run.device_q), len(other.device_q))

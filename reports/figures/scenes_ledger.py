@@ -29,7 +29,7 @@ from reports.figures.svg import to_svg
 KEY, TITLE = "scene-ledger", "Every scene at a glance"
 CONTACTS, OVER_TIME = "scene-ledger/contact and time", "scene-ledger/books over time"
 CAPTION = (
-    "A row per scene, time from left to right. The black line is all energy so far: at the start, and put in by the "
+    "A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by the "
     "hand and the coupling. Under it lies where that energy is: still in motion, in height and springs, or lost in "
     "impacts, contact damping and friction. Where the colours do not reach the line the steps in time swallowed "
     "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap "

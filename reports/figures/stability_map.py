@@ -17,7 +17,7 @@ MAPS, DAMPINGS = "stability/maps", "stability/dampings"
 CAPTION = (
     "Each place is a wall, stiffer to the right, more damped upwards; the lowest row has no damping. Look for the blue "
     "rings: walls that only come to rest with impulses, mostly stiff ones with little damping. No mark: neither law "
-    "holds it. Walls under the black line are passive for every hand; a device without damping has none."
+    "holds it. Walls under the dashed line are passive for every hand; a device without damping has none."
 )
 LEGEND = (("both laws", LineStyle(MUTED, "o", (), 0.0)), ("only impulses", LineStyle(BLUE, "o", (), 0.0, filled=False)),
           ("only penalties", LineStyle(VERMILION, "s", (), 0.0)), ("b = KT/2 + B", LineStyle(INK, "", (4, 2), 1.2)))
