@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.energy import energy_ledger, impact_losses, passivity_deficit, port_energy
+from iapb.mechanics.energy import displacements, energy_ledger, impact_losses, passivity_deficit, port_energy
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 
@@ -110,3 +110,12 @@ def test_shapes_that_do_not_belong_together_are_named():
         energy_ledger(mechanism, FIELD, q, v, forces | {"hand": np.zeros((3, 2))}, impulse)
     with pytest.raises(ArgumentError, match="q of shape"):
         energy_ledger(mechanism, FIELD, q[:, :1], v, forces, impulse)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2, 5])
+def test_n_places_have_n_minus_one_displacements_between_them(steps):
+    mechanism, rng = arm(), np.random.default_rng(0)
+    q = rng.normal(size=(steps, 2))
+    found = displacements(mechanism, q)
+    assert found.shape == (max(steps - 1, 0), 2)
+    assert found == pytest.approx(np.diff(q, axis=0).reshape(-1, 2), abs=1e-15)

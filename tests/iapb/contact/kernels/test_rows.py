@@ -10,7 +10,13 @@ import pytest
 from iapb.compiled import block
 from iapb.contact.geometry import make_contact_buffer
 from iapb.contact.kernels.resting import resting_force
-from iapb.contact.kernels.rows import contact_velocities, direction_row, relative_jacobian_rows, velocity_at
+from iapb.contact.kernels.rows import (
+    contact_velocities,
+    direction_row,
+    relative_jacobian_rows,
+    tangent_of,
+    velocity_at,
+)
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.kernels import forward_kinematics
 from iapb.mechanics.mechanism import Mechanism
@@ -95,3 +101,15 @@ def test_resting_forces_act_on_both_bodies_at_the_point(seed: int, clamped: bool
     resting_force(arrays, workspace, contacts, 0, K, B, clamped, mu, threshold, penalty, drag)
     assert contacts.normal_force[0] == 0.0 and not contacts.friction_force[0].any() and not penalty.any()
     assert True in seen
+
+
+def test_tangents_span_what_the_normal_leaves() -> None:
+    """Orthonormal to every normal; the first also to the axis that is farthest from the normal."""
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        n = rng.normal(size=3) * rng.permutation([0.1, 1.0, 3.0])
+        n /= np.linalg.norm(n)
+        first, second = (np.array(tangent_of(tuple(n), which, 2)) for which in range(2))
+        assert np.array([n, first, second]) @ np.array([n, first, second]).T == pytest.approx(np.eye(3), abs=1e-14)
+        assert first[np.argmin(np.abs(n))] == 0.0
+        assert np.cross(n, first) == pytest.approx(second, abs=1e-14)

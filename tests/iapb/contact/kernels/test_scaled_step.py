@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.gather import pair_restitution
+from iapb.contact.kernels.gather import gather_restitution, pair_restitution
 from iapb.contact.kernels.step import OK, advance
 from iapb.contact.laws import ImpulseAugmented
 from iapb.scene import scene_from_text
@@ -93,3 +93,23 @@ def test_of_two_shapes_the_smaller_restitution_counts_and_the_scene_s_where_neit
     own = np.array([none, 0.8, 0.3, 1.0])
     for a, b, expected in ((0, 1, 0.8), (1, 0, 0.8), (1, 2, 0.3), (0, 0, 0.5), (0, 3, 1.0), (3, 1, 0.8)):
         assert pair_restitution(own, a, b, 0.5) == expected
+
+
+@pytest.mark.parametrize("shapes", [(0, 1), (0, 0), (1, 1), (0, 2), (2, 2), (2, 1, 0)])
+def test_rows_that_agree_in_restitution_are_no_case_for_poisson(shapes: tuple[int, ...]) -> None:
+    """The smallest e of the rows, and whether they differ at all."""
+    own = {0: 0.2, 1: 0.7, 2: E}  # the third body gives none: the scene's
+    bodies = "".join(f"  - {{name: b{k}, {DISC}, restitution: {own[k]}}}\n" for k in range(2))
+    system = System(scene_from_text(
+        f"name: unlike\nrate: 100\nduration: 0.1\nbodies:\n{bodies}  - {{name: b2, {DISC}}}\n"
+        "walls: [{name: floor, kind: half_plane, point: [0, -9], normal: [0, 1]}]\n"
+        f"contact: {{stiffness: 0, restitution: {E}}}\n"
+    ))  # fmt: skip
+    world, state = system.world_under(ImpulseAugmented()), system.make_state()
+    for row, shape in enumerate(shapes):  # each against the floor
+        state.rows[row] = row
+        state.contacts.shape_a[row], state.contacts.shape_b[row] = shape, 3
+    smallest, differ = gather_restitution(world, state, len(shapes))
+    expected = [own[shape] for shape in shapes]
+    assert smallest == min(expected) and bool(differ) == (min(expected) < max(expected))
+    assert state.row_restitution[: len(shapes)].tolist() == expected
