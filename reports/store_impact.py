@@ -157,7 +157,7 @@ def read_broken_impact(path: Path | str) -> BrokenImpact | None:
         moves = read_values(group, "translations", place) if "translations" in group else None
         head = dict(group.attrs)
         rows = tuple(int(x) for x in read_values(file["impacts"], "rows", place))
-    return _broken(texts, arrays, moves, head, rows, place)
+        return _broken(texts, arrays, moves, head, rows, place)
 
 
 def _broken(texts: dict[str, str], arrays: dict[str, Any], moves: Any, head: dict[str, Any], rows: tuple[int, ...],
@@ -165,12 +165,13 @@ def _broken(texts: dict[str, str], arrays: dict[str, Any], moves: Any, head: dic
     from verification.properties.case import ImpactCase
     from verification.properties.struck import Struck
 
-    after, e = arrays.pop("velocity_after"), arrays.pop("restitution")
-    try:
-        case = ImpactCase(**arrays, restitution=float(head["equal_restitution"]), family=str(head["family"]),
-                          translations=moves, unequal=None if head["one_restitution"] else e)  # fmt: skip
-        return BrokenImpact(Struck(case, rows, after, str(head["complaint"])), str(head["resolver"]), texts["law"],
-                            texts["statement"], float(head["residual"]), float(head["tolerance"]),
-                            json.loads(texts["found"]), texts["test"])  # fmt: skip
-    except (KeyError, IndexError, ValueError) as error:
-        raise RunFileError(f"{place}: /{STRUCK} is no impact: {error!r}") from error
+    after, e, found = arrays.pop("velocity_after"), arrays.pop("restitution"), json.loads(texts["found"])
+    d = len(arrays["velocity"])
+    shapes = (arrays["mass_matrix"].shape, arrays["contact_jacobian"].shape[1:], after.shape)
+    if shapes != ((d, d), (d,), (len(rows), d)) or not {"part", "index", "request"} <= set(found):
+        raise RunFileError(f"{place}: /{STRUCK} is no impact")
+    case = ImpactCase(**arrays, restitution=float(head["equal_restitution"]), family=str(head["family"]),
+                      translations=moves, unequal=None if head["one_restitution"] else e)  # fmt: skip
+    return BrokenImpact(Struck(case, rows, after, str(head["complaint"])), str(head["resolver"]), texts["law"],
+                        texts["statement"], float(head["residual"]), float(head["tolerance"]), found,
+                        texts["test"])  # fmt: skip

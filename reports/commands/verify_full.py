@@ -38,8 +38,8 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
     print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
     found = campaign.counterexamples()
     if found:
-        print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law, a run each, for iapb "
-              "inspect FILE. Judged again by:")
+        print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law. Impacts and "
+              "trajectories are runs, for iapb inspect FILE. Judged again by:")
     for path in found[:_SHOWN]:
         print(f"  iapb verify --recheck {path}")
     return kept

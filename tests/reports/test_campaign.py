@@ -85,11 +85,12 @@ def test_a_trajectory_is_kept_as_its_run(tmp_path: Path) -> None:
     assert judged["simulated again: impulse_momentum"].passed
 
 
-def test_a_case_that_is_no_impact_is_drawn_again(tmp_path: Path) -> None:
-    case = drawn("hand_port", 3, SOUND.subject())
-    residual = residuals("hand_port", case, SOUND.subject())[0]["hand_port"]
-    path = keep_counterexample(tmp_path, Found("hand_port", "hand_port", 3, residual, case), SOUND)
-    assert list(recheck(path)) == [("hand_port", residual)]
+@pytest.mark.parametrize("part", ["hand_port", "device_port", "device_limits", "group_splitting"])
+def test_a_case_that_is_no_impact_is_drawn_again(part: str, tmp_path: Path) -> None:
+    case = drawn(part, 3, SOUND.subject())
+    residual = residuals(part, case, SOUND.subject())[0][part]
+    path = keep_counterexample(tmp_path, Found(part, part, 3, residual, case), SOUND)
+    assert list(recheck(path)) == [(part, residual)]
 
 
 def test_the_plan_covers_every_part_once() -> None:

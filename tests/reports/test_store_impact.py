@@ -126,6 +126,26 @@ def test_a_resolver_that_raises_leaves_no_velocity_and_its_words(tmp_path: Path)
     assert read_run(path).impacts.approaching.tolist() == [-1]
 
 
+@pytest.mark.parametrize("spoiled", ["mass_matrix", "velocity_after", "found", "residual", "contact_jacobian"])
+def test_a_file_that_lacks_a_part_or_has_it_in_another_shape_is_refused(spoiled: str, kept: Path) -> None:
+    import h5py
+
+    with new_file(kept.with_name("spoiled.h5"), replace=True) as file, h5py.File(kept) as good:
+        file.attrs.update(good.attrs)
+        for name in good:
+            good.copy(name, file)
+        group = file["struck"]
+        if spoiled == "residual":
+            del group.attrs[spoiled]
+        elif spoiled == "found":
+            group[spoiled][()] = "{}"
+        else:
+            del group[spoiled]
+            group[spoiled] = np.zeros(3)
+    with pytest.raises(RunFileError):
+        read_broken_impact(kept.with_name("spoiled.h5"))
+
+
 def test_of_a_law_that_is_broken_all_the_time_the_first_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
