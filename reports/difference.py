@@ -20,8 +20,10 @@ from reports.numbers_file import ReportNumbers
 EXACT, CLOSE, DIFFERS, TIMING, ONLY_OLD, ONLY_NEW = "exact", "close", "differs", "timing", "only old", "only new"
 # Another processor rounds and orders sums differently: some 1e-16 a step, grown by a thousand steps of a simulation.
 TOLERANCE = 1e-9
-# Below this a number of the report is itself rounding: errors of 1e-16 need not repeat to any digit.
+# A difference below this is rounding: errors of 1e-16 need not repeat to any digit, nor a solver's 1e-11 to three.
 ROUNDING = 1e-12
+# What a cell says of something that was not tried because something smaller took too long (reference.complementarity).
+LEFT_OUT = "left out"
 
 _PART_END = re.compile("[/,]")
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -64,11 +66,6 @@ class Difference:
         """The cells in a state, the largest gap first."""
         return tuple(sorted((cell for cell in self.cells if cell.state == state), key=lambda cell: -cell.gap))
 
-    @property
-    def largest_gap(self) -> float:
-        """Largest relative difference among those that agree within the tolerance."""
-        return max((cell.gap for cell in self.of(CLOSE)), default=0.0)
-
     def by_part(self) -> dict[str, Counter[str]]:
         """Number of cells in each state, by part of the report: what stands before the first / or comma of a table."""
         found: dict[str, Counter[str]] = {}
@@ -78,7 +75,7 @@ class Difference:
 
 
 def compare_reports(old: ReportNumbers, new: ReportNumbers, tolerance: float = TOLERANCE) -> Difference:
-    """Compare two reports; numbers are close within `tolerance` of the larger, or where both are below ROUNDING."""
+    """Compare two reports; numbers are close within `tolerance` of the larger, or within ROUNDING."""
     both = [name for name in old.tables if name in new.tables]
     cells = [cell for name in both for cell in _cells(name, old.tables[name], new.tables[name], tolerance)]
     runs = {command: new.runs[command] == content for command, content in old.runs.items() if command in new.runs}
@@ -103,12 +100,17 @@ def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator
                 by_time = timed_rows
             else:
                 state, gap = compare_values(first[column], second[column], tolerance)
-                by_time = column in timed
+                by_time = column in timed or LEFT_OUT in (first[column], second[column])
             yield Cell(table, column, row, first.get(column), second.get(column), TIMING if by_time else state, gap)
 
 
 def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Rows of both by name: their number where there are equally many, else their first cell and which of those."""
+    """Rows of both by name: their number where there are equally many, else their first cell and which of those.
+
+    Where times decide which rows there are, a row is known by all that is not timed.
+    """
+    if old.timed_rows or new.timed_rows:
+        return _named(_distinct(_untimed_cells(old)), old), _named(_distinct(_untimed_cells(new)), new)
     if len(old.rows) == len(new.rows):
         names = [f"{number}: {row[0]}" if row else str(number) for number, row in enumerate(old.rows, 1)]
         return _named(names, old), _named(names, new)
@@ -117,6 +119,11 @@ def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[s
 
 def _first_cells(table: Numbers) -> list[str]:
     return [str(row[0]) if row else "" for row in table.rows]
+
+
+def _untimed_cells(table: Numbers) -> list[str]:
+    kept = [index for index, column in enumerate(table.columns) if column not in table.timed]
+    return [", ".join(str(row[index]) for index in kept) for row in table.rows]
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
@@ -160,13 +167,13 @@ def _is_number(value: Any) -> bool:
 
 
 def _gap(old: float, new: float) -> float:
-    """Relative difference; none where both are rounding."""
+    """Relative difference; none where it is rounding."""
     if old == new:
         return 0.0
     largest = max(abs(old), abs(new))
     if not math.isfinite(largest):
         return math.inf
-    return 0.0 if largest <= ROUNDING else abs(old - new) / largest
+    return 0.0 if abs(old - new) <= ROUNDING else abs(old - new) / largest
 
 
 def _printed_gap(old: str, new: str) -> float:

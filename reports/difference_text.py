@@ -1,17 +1,18 @@
-"""What a comparison of two reports says: sentences, and a short table of what differs."""
+"""What a comparison of two reports says: sentences, a table by part, and a line for each of the largest differences."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, TIMING, Cell, Difference
+from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, ROUNDING, TIMING, Cell, Difference
 from reports.provenance import PEERS
 
 # Columns of the table by part of the report, each with the states that it counts.
 PARTS = (("the same", (EXACT,)), ("within the tolerance", (CLOSE,)), ("differ", (DIFFERS,)),
          ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)))  # fmt: skip
-SHOWN = 20  # rows of the table; the rest is counted
+SHOWN = 20  # lines; the rest is counted
 _WIDEST = 34  # letters of a cell
 # What must be equal for all to come out the same to the last bit. The lock fixes the BLAS, the processor its kernels;
 # of what is compared with, some is outside of the lock.
@@ -23,7 +24,7 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
     exact, close, differs = (found.count(state) for state in (EXACT, CLOSE, DIFFERS))
     judged = exact + close + differs
     yield (f"Of {judged} numbers and words in both reports, {exact} are exactly the same, {close} agree within "
-           f"{tolerance:.0e} (by {found.largest_gap:.1e} at most), and {differs} differ.")  # fmt: skip
+           f"{tolerance:.0e} or {ROUNDING:.0e}, whichever is more, and {differs} differ.")  # fmt: skip
     yield f"{found.count(TIMING)} measured times, and what is made from them, are not judged."
     old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
     if old or new or found.tables_old or found.tables_new:
@@ -37,10 +38,12 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
            "behind one only.")  # fmt: skip
 
 
-def table(found: Difference, state: str = DIFFERS) -> Iterator[tuple[str, str, str, str, str, str]]:
-    """Rows (table, row, column, old, new, relative difference) of what differs most, SHOWN at most."""
-    for cell in found.of(state)[:SHOWN]:
-        yield cell.table, _short(cell.row), _short(cell.column), *_values(cell), f"{cell.gap:.1e}"
+def lines(found: Difference) -> Iterator[str]:
+    """A line for each of what differs most, SHOWN at most: where it stands, both values, the relative difference."""
+    for cell in found.of(DIFFERS)[:SHOWN]:
+        old, new = _values(cell)
+        share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
+        yield f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: {old} -> {new}{share}"
 
 
 def parts(found: Difference) -> Iterator[tuple[str, ...]]:

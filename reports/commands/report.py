@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -47,26 +46,20 @@ def report(
 
 
 def print_difference(found: Difference, tolerance: float) -> None:
-    """Print the sentences, a table by part of the report, and what differs most."""
-    from reports.difference import DIFFERS
-    from reports.difference_text import PARTS, SHOWN, parts, sentences, table
-
-    _print_table("Numbers and words by part of the report", ("part", *(name for name, _ in PARTS)), parts(found))
-    count = found.count(DIFFERS)
-    if count:
-        _print_table(f"The largest {min(count, SHOWN)} of {count} differences",
-                     ("table", "row", "column", "old", "new", "relative"), table(found))  # fmt: skip
-    for sentence in sentences(found, tolerance):
-        print(sentence)
-
-
-def _print_table(title: str, headings: Iterable[str], rows: Iterable[tuple[str, ...]]) -> None:
+    """Print a table by part of the report, what differs most, and the sentences."""
     from rich.console import Console
     from rich.table import Table
 
-    shown = Table(title=title)
-    for heading in headings:
-        shown.add_column(heading)
-    for row in rows:
-        shown.add_row(*row)
-    Console().print(shown)
+    from reports.difference import DIFFERS
+    from reports.difference_text import PARTS, SHOWN, lines, parts, sentences
+
+    by_part = Table("part", *(name for name, _ in PARTS), title="Numbers and words by part of the report")
+    by_part.columns[0].no_wrap, by_part.columns[0].min_width = True, 15
+    for row in parts(found):
+        by_part.add_row(*row)
+    Console().print(by_part)
+    count = found.count(DIFFERS)
+    if count:
+        print(f"The largest {min(count, SHOWN)} of {count} differences:")
+    for text in (*(f"  {line}" for line in lines(found)), *sentences(found, tolerance)):
+        print(text)

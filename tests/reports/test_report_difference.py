@@ -20,7 +20,7 @@ from reports.difference import (
     compare_reports,
     compare_values,
 )
-from reports.difference_text import SHOWN, parts, sentences, table, unlike
+from reports.difference_text import SHOWN, lines, parts, sentences, unlike
 from reports.figures.figure import Numbers
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
 
@@ -90,6 +90,26 @@ def test_the_parts_of_a_report_are_counted_apart():
 def test_what_is_rounding_itself_need_not_repeat():
     assert compare_values(2.2e-16, 4.4e-16, 1e-9)[0] == CLOSE
     assert compare_values(2.2e-16, 1e-11, 1e-9)[0] == DIFFERS
+    assert compare_values(2.0862968e-11, 2.0865977e-11, 1e-9)[0] == CLOSE
+    assert compare_values(1.0, 1.0 + 1e-8, 1e-9)[0] == DIFFERS
+
+
+def test_what_was_left_out_for_its_time_in_one_of_them_is_not_judged():
+    outcomes = ("solved", "left out"), ("solved", "refused")
+    for (old, new), state in zip(outcomes, (TIMING, DIFFERS), strict=True):
+        pair = [replace(REPORT, tables={"t": Numbers(("solver",), ((said,),))}) for said in (old, new)]
+        assert [cell.state for cell in compare_reports(*pair).cells] == [state]
+
+
+def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
+    def table(*sizes):
+        rows = tuple(("pinv", size, 2.0 * size, True) for size in sizes)
+        return Numbers(("method", "contacts", "time [µs]", "stable"), rows, timed=("time [µs]",), timed_rows=True)
+
+    pair = [replace(REPORT, tables={"t": one}) for one in (table(1, 60, 300), table(1, 300, 600))]
+    found = compare_reports(*pair)
+    assert found.count(DIFFERS) == 0 and found.count(EXACT) == 6  # three judged cells of each of the two in common
+    assert found.count(TIMING) == 10  # the times of those two, and two rows of four cells of one alone
 
 
 def test_a_row_more_does_not_shift_the_others():
@@ -115,12 +135,11 @@ def test_sentences_count_everything():
     assert "16 numbers and words" in text and "15 are exactly" in text and "1 differ" in text
     assert "Only in the old report: claims." in text and "Only in the new report: extra." in text
     assert "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only." in text
-    [row] = table(found)
-    assert row == ("claims/C07", "1: factored", "gain", "1.5", "2.0", "2.5e-01")
+    assert list(lines(found)) == ["claims/C07, row 1: factored, gain: 1.5 -> 2.0 (2.5e-01 of it)"]
     many = Numbers(("x",), tuple((float(i),) for i in range(1, 100)))
     twice = replace(many, rows=tuple((2 * x,) for (x,) in many.rows))
     pair = [ReportNumbers({"t": one}, {}, {}, "quick") for one in (many, twice)]
-    assert len(list(table(compare_reports(*pair)))) == SHOWN
+    assert len(list(lines(compare_reports(*pair)))) == SHOWN
 
 
 def test_what_keeps_runs_from_repeating_is_named():

@@ -53,7 +53,8 @@ def judge_problems(study: ProblemStudy) -> list[Judged]:
     solved = [any(verdict == "solved" for _, verdict in line.verdicts) for line in study.lines]
     solved += [False for _ in study.unread]
     verdict = REPRODUCED if all(solved) else LIMITED
-    return [Judged("problems", sentence, verdict) for sentence in sentences.problems(study)]
+    # who is asked at all depends on how long he took before
+    return [Judged("problems", sentence, verdict, timed=True) for sentence in sentences.problems(study)]
 
 
 def _single_contact(study: ComparisonStudy) -> str:
