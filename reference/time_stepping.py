@@ -82,8 +82,9 @@ class RigidConstraints:
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """One step (see `iapb.contact.laws.ContactLaw`).
 
-        Impulses of contacts that approached faster than the scene's approach velocity, and of those that they turned
-        round, are reported as collision impulses, the rest as forces p/dt: only their sum is determined by the step.
+        Impulses of contacts that approached faster than the scene's approach velocity, and of those that bodies pass
+        the blow on to, are reported as collision impulses, the rest as forces p/dt: only their sum is determined by
+        the step. The loads of a step with a blow are among its impulses: with e near 1 they may outweigh its loss.
         """
         with one_thread():
             return self._advance(system, state, applied_force, dt)
@@ -94,7 +95,7 @@ class RigidConstraints:
         found = find_rows(system, q, v, self.margin)
         force = applied_force - _inner_forces(system, q, v)
         step = self._solve(system, mass, q, v, force, dt, found)
-        blows = _blows(found.gamma, step.normal, system.scene.contact.approach_velocity)
+        blows = _blows(mass, found, step.normal, system.scene.contact.approach_velocity)
         normal = found.jacobian.T * step.normal
         impulse = (normal + step.dragging)[:, blows].sum(axis=1)
         pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
@@ -132,10 +133,21 @@ def _restitution(system: Any, found: ContactRows) -> float | Floats:
     return restitution_by_pair(system.scene, pairs)
 
 
-def _blows(gamma: Floats, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
-    """Contacts (c,) that struck: those that approached and, if there are any, those that separated and were pushed."""
-    struck = (gamma < -approach_velocity) & (impulse > 0.0)
-    return struck | (struck.any() & (gamma > approach_velocity) & (impulse > 0.0))
+def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
+    """Contacts (c,) that struck: those that approached, and all that push and are tied to them by bodies (W_ij ≠ 0).
+
+    Without the others the middle of a cradle would resist a blow by a force, and the impact alone could gain energy.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    pushes = impulse > 0.0
+    struck = pushes & (found.gamma < -approach_velocity)
+    if not struck.any() or np.array_equal(struck, pushes):
+        return struck
+    rows = found.jacobian[pushes]
+    _, island = connected_components(rows @ np.linalg.solve(mass, rows.T) != 0.0, directed=False)
+    struck[pushes] = np.isin(island, island[struck[pushes]])
+    return struck
 
 
 def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:

@@ -155,3 +155,22 @@ def test_an_elastic_bar_that_turns_on_its_ends_gains_no_energy() -> None:
     energy = run.energy["kinetic"]
     assert len(run.impacts.step) >= 1 and run.impacts.energy_lost.min() >= -1e-12
     assert np.diff(energy).max() <= 1e-12 * energy[0]
+
+
+BALLS = (
+    "{name: b%d, joint: prismatic, axis: [1, 0], mass: 1, shapes: [{kind: circle, radius: 0.1}], position: [%g],"
+    " velocity: [%g]}"
+)
+
+
+def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none() -> None:
+    """One of three equal balls strikes two that touch, e = 0: they go on at a third, 1/3 J is lost; two stand apart."""
+    line = [BALLS % (k, x, v) for k, (x, v) in enumerate([(0.0, 1.0), (0.2, 0.0), (0.4, 0.0), (5.0, 0.0), (5.2, 0.0)])]
+    scene = scene_from_text(
+        f"{{name: line, rate: 1000, duration: 0.01, bodies: [{', '.join(line)}], contact: {{restitution: 0}},"
+        " hand: {body: b3, force: [3, 0, 0]}}"
+    )
+    run = simulate(scene, RigidConstraints(), steps=5)
+    assert len(run.impacts.step) == 1 and run.impacts.energy_lost[0] == pytest.approx(1.0 / 3.0, rel=1e-12)
+    assert run.impacts.v_plus[0, :3] == pytest.approx([1.0 / 3.0] * 3) and not run.impacts.impulse[0, 3:].any()
+    assert run.penalty_force[0, 3:] == pytest.approx([-1.5, 1.5], rel=1e-9)  # the pushed pair shares the hand's force
