@@ -27,6 +27,7 @@ Result = TypeVar("Result")
 REPOSITORY = Path(__file__).resolve().parents[2]
 PASSED, FAILED, TIMED_OUT, NO_TESTS = "passed", "failed", "timed out", "no tests"
 _FIRST_FAILURE = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+_COUNTED = re.compile(r"\b[1-9]\d* (failed|error)")
 _NO_TESTS_COLLECTED = 5  # exit code of pytest
 _PROCESSES = multiprocessing.get_context("forkserver")
 _LOADED_ONCE = [
@@ -76,9 +77,12 @@ class Clone:
         text = said.read_text(errors="replace")
         if first := _FIRST_FAILURE.search(text):
             return Outcome(FAILED, first[1])
+        last = (text.strip().splitlines() or ["?"])[-1]
         if (process.exitcode or 0) < 0:
             return Outcome(FAILED, f"the interpreter ended by signal {-(process.exitcode or 0)}")
-        raise RuntimeError(f"pytest did not run: {(text.strip().splitlines() or ['?'])[-1]}")
+        if _COUNTED.search(last):
+            return Outcome(FAILED, last)
+        raise RuntimeError(f"pytest did not run: {last}")
 
 
 def _run_pytest(

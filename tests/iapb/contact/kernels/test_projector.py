@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
+from iapb.contact.kernels.projector import _next_direction, orthonormal_basis, projected_change, unit_columns
 
 
 def basis_of(rows: np.ndarray, u: np.ndarray, tolerance: float = 1e-10, budget: int = 99) -> np.ndarray:
@@ -54,3 +54,27 @@ def test_a_budget_gives_the_beginning_of_the_same_basis(budget: int) -> None:
     rng = np.random.default_rng(1)
     rows, u = rng.normal(size=(6, 4)), rng.normal(size=4)
     assert np.array_equal(basis_of(rows, u, budget=budget), basis_of(rows, u)[:budget])
+
+
+@pytest.mark.parametrize("share", [1.0, 2.0**-30, 2.0**30])
+def test_a_row_in_the_span_gives_no_direction_whatever_its_length(share: float) -> None:
+    """Nothing is left of it, exactly: no direction, and no number that is none."""
+    basis = np.array([[0.0, 1.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.0]])
+    columns = np.ascontiguousarray(share * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).T)
+    assert not _next_direction(columns, 0, basis, 1)
+    assert np.array_equal(basis[1], [0.0, 0.0, 0.0])
+    basis[1] = (0.6, 0.0, 0.8)
+    assert _next_direction(columns, 1, basis, 2)
+    assert abs(basis[2]) == pytest.approx([0.8, 0.0, 0.6], abs=1e-15)
+
+
+def test_columns_of_any_length_become_unit_and_none_stays_none() -> None:
+    rng = np.random.default_rng(2)
+    columns = rng.normal(size=(4, 9)) * 10.0 ** np.arange(-4.0, 5.0)
+    columns[:, 3] = 0.0
+    expected, length = columns.copy(), np.full(9, np.nan)
+    unit_columns(columns, 8, length)
+    norms = np.linalg.norm(expected, axis=0)
+    assert length[:8] == pytest.approx(norms[:8], rel=1e-15) and np.isnan(length[8])
+    norms[[3, 8]] = 1.0
+    assert columns == pytest.approx(expected / norms, rel=1e-14)
