@@ -9,6 +9,7 @@ import numpy as np
 
 from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
+from iapb.mechanics.kernels.vectors import load, store
 from iapb.run import ContactTable, ImpactTable
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
@@ -90,36 +91,41 @@ def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: in
 @kernel
 def write_step(record, k, step, state, port):
     """Copy step number `step` into line k of the chunk."""
-    copy_into(record.q[k], state.q)
-    copy_into(record.v[k], state.v)
-    copy_into(record.device_q[k], port.device_q)
-    copy_into(record.device_v[k], port.device_v)
-    copy_into(record.hand_force[k], port.hand_force)
-    copy_into(record.coupling_force[k], port.coupling_force)
-    copy_into(record.penalty_force[k], state.penalty_force)
-    copy_into(record.friction_force[k], state.friction_force)
-    copy_into(record.impulse[k], state.impulse)
-    copy_into(record.environment_force[k], port.environment_force)
-    copy_into(record.device_force[k], port.device_force)
+    for i in range(state.q.shape[0]):
+        record.q[k, i] = state.q[i]
+    for i in range(state.v.shape[0]):  # one loop: eight short ones would cost more than what they copy
+        record.v[k, i] = state.v[i]
+        record.hand_force[k, i] = port.hand_force[i]
+        record.coupling_force[k, i] = port.coupling_force[i]
+        record.penalty_force[k, i] = state.penalty_force[i]
+        record.friction_force[k, i] = state.friction_force[i]
+        record.impulse[k, i] = state.impulse[i]
+        record.environment_force[k, i] = port.environment_force[i]
+    for i in range(port.device_q.shape[0]):
+        record.device_q[k, i] = port.device_q[i]
+    for i in range(port.device_v.shape[0]):
+        record.device_v[k, i] = port.device_v[i]
+        record.device_force[k, i] = port.device_force[i]
     record.state[k] = contact_state(state, port.tool_tree)
     _write_contacts(record, k, state)
-    _write_impacts(record, step, state)
+    if state.impacts.logged[0] > 0:
+        _write_impacts(record, step, state)
 
 
 @kernel
 def _write_contacts(record, k, state):
-    contacts = state.contacts
-    record.contact_count[k] = state.contact_count[0]
-    for i in range(state.contact_count[0]):
-        m = record.used[0]
+    contacts, count, m = state.contacts, state.contact_count[0], record.used[0]
+    record.contact_count[k] = count
+    record.used[0] = m + count
+    for i in range(count):
         record.body_a[m], record.body_b[m] = contacts.body_a[i], contacts.body_b[i]
-        copy_into(record.point[m], contacts.point[i])
-        copy_into(record.normal[m], contacts.normal[i])
-        copy_into(record.contact_friction[m], contacts.friction_force[i])
+        store(record.point, m, load(contacts.point, i))
+        store(record.normal, m, load(contacts.normal, i))
+        store(record.contact_friction, m, load(contacts.friction_force, i))
         record.gap[m], record.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
         record.normal_force[m] = contacts.normal_force[i]
         record.contact_impulse[m], record.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
-        record.used[0] = m + 1
+        m += 1
 
 
 @kernel

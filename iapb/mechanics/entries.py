@@ -31,9 +31,13 @@ class Scratch(threading.local):
     Attributes
     ----------
     workspace : for the mechanism as it is
-    parts : the moving parts alone, with that workspace
+    parts : the moving parts alone, with a workspace of their own
     """
 
     def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
-        self.workspace: Block = block(Workspace(*(array.copy() for array in workspace)))
-        self.parts: Block = block(Evaluation(parts, self.workspace))
+        self.workspace: Block = block(_copied(workspace))
+        self.parts: Block = block(Evaluation(parts, _copied(workspace)))
+
+
+def _copied(workspace: Workspace) -> Workspace:
+    return Workspace(*(array.copy() for array in workspace))

@@ -83,25 +83,37 @@ def whiten_columns(lower, columns, count):
 @kernel
 def solve_mass(lower, force, acceleration):
     """Solve M a = f through both triangles; `force` may be the same array as `acceleration`."""
-    d = force.shape[0]
-    for k in range(d):
+    _solve_block(lower, 0, force.shape[0], force, acceleration)
+
+
+@kernel
+def _solve_block(lower, start, stop, force, acceleration):
+    """`solve_mass` on coordinates start .. stop.
+
+    Zeros of L are passed over: a multiplication by zero would make each coordinate wait for the one before. So would
+    a division: 1 / L_kk waits for nothing. Backwards the entry that was computed last comes last in its sum.
+    """
+    for k in range(start, stop):
         total = force[k]
-        for j in range(k):
-            total -= lower[k, j] * acceleration[j]
-        acceleration[k] = total / lower[k, k]
-    for k in range(d - 1, -1, -1):
+        for j in range(start, k):
+            factor = lower[k, j]
+            if factor != 0.0:
+                total -= factor * acceleration[j]
+        acceleration[k] = total * (1.0 / lower[k, k])
+    for k in range(stop - 1, start - 1, -1):
         total = acceleration[k]
-        for i in range(k + 1, d):
-            total -= lower[i, k] * acceleration[i]
-        acceleration[k] = total / lower[k, k]
+        for i in range(stop - 1, k, -1):
+            factor = lower[i, k]
+            if factor != 0.0:
+                total -= factor * acceleration[i]
+        acceleration[k] = total * (1.0 / lower[k, k])
 
 
 @kernel
 def solve_tree_blocks(lower, start, stop, force, acceleration):
     """The same for a block diagonal M, tree by tree: linear in their number, to the same last bit."""
     for t in range(start.shape[0]):
-        i, j = start[t], stop[t]
-        solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])
+        _solve_block(lower, start[t], stop[t], force, acceleration)
 
 
 @kernel

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from iapb.compiled import kernel
+from iapb.contact.kernels.spatial_frames import copy_contact
+from iapb.mechanics.kernels.vectors import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least this: 31.8
@@ -16,19 +18,14 @@ _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
 @kernel
 def squared_distance(first, i, second, j):
     """Squared distance of the points of two contacts [m²]."""
-    total = 0.0
-    for axis in range(3):
-        difference = first.point[i, axis] - second.point[j, axis]
-        total += difference * difference
-    return total
+    apart = subtract(load(first.point, i), load(second.point, j))
+    return dot(apart, apart)
 
 
 @kernel
 def same_surface(first, i, second, j, cosine):
     """Is it the same pair of bodies, with aligned normals? (The pair may be listed the other way round.)"""
-    aligned = 0.0
-    for axis in range(3):
-        aligned += first.normal[i, axis] * second.normal[j, axis]
+    aligned = dot(load(first.normal, i), load(second.normal, j))
     a, b = first.body_a[i], first.body_b[i]
     if a == second.body_a[j] and b == second.body_b[j]:
         return aligned >= cosine
@@ -42,6 +39,8 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     Deepest first: a contact stays unless one that stays lies deeper and closer than `distance`. So those that
     stay are at least `distance` apart, in their former order, and each one dropped has its deeper neighbour.
     """
+    if not _any_near(contacts, count, distance, cosine):
+        return count
     contacts.mark[:count] = _UNDECIDED
     kept = 0
     while True:
@@ -54,12 +53,28 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
         contacts.mark[deepest] = _KEPT
         kept += 1
         for i in range(count):
-            near = contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, cosine)
-            if near and squared_distance(contacts, deepest, contacts, i) < distance * distance:
+            if contacts.mark[i] == _UNDECIDED and _is_near(contacts, deepest, i, distance, cosine):
                 contacts.mark[i] = _DROPPED
     if kept < count:
         _close_ranks(contacts, count)
     return kept
+
+
+@kernel
+def _is_near(contacts, i, j, distance, cosine):
+    """Are two contacts on one surface and closer than `distance`?"""
+    near = squared_distance(contacts, i, contacts, j) < distance * distance
+    return near and same_surface(contacts, i, contacts, j, cosine)
+
+
+@kernel
+def _any_near(contacts, count, distance, cosine):
+    """Is there anything to collapse? Mostly there is not, and this is the cheaper question."""
+    for i in range(count):
+        for j in range(i):
+            if _is_near(contacts, i, j, distance, cosine):
+                return True
+    return False
 
 
 @kernel
@@ -70,12 +85,7 @@ def _close_ranks(contacts, count):
         if contacts.mark[i] != _KEPT:
             continue
         if row < i:
-            contacts.shape_a[row], contacts.shape_b[row] = contacts.shape_a[i], contacts.shape_b[i]
-            contacts.body_a[row], contacts.body_b[row] = contacts.body_a[i], contacts.body_b[i]
-            contacts.feature[row], contacts.gap[row] = contacts.feature[i], contacts.gap[i]
-            for axis in range(3):
-                contacts.point[row, axis] = contacts.point[i, axis]
-                contacts.normal[row, axis] = contacts.normal[i, axis]
+            copy_contact(contacts, row, i)
         row += 1
 
 
@@ -140,9 +150,11 @@ def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_t
     for t in range(group_of_tree.shape[0]):
         group_of_tree[t] = t
     for i in range(count):
+        if contacts.body_b[i] < 0 or not contacts.gap[i] <= 0.0:
+            continue
         a = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
         b = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
-        if contacts.gap[i] <= 0.0 and a >= 0 and b >= 0:
+        if a >= 0 and b >= 0:
             join(group_of_tree, a, b)
     for t in range(group_of_tree.shape[0]):
         group_of_tree[t] = group_of_tree[group_of_tree[t]]  # smaller trees are settled already
@@ -177,16 +189,19 @@ def classify(
         state_of_tree[t] = FREE
         if spreading[t]:
             spreading[group_of_tree[t]] = True
+    approaching = False
     for i in range(count):
         group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
-        contacts.collides[i] = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -approach_velocity
+        collides = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -approach_velocity
+        contacts.collides[i] = collides
+        approaching = approaching or collides
         if contacts.gap[i] > 0.0 or group < 0:
             continue
-        if contacts.collides[i] and (contacts.is_new[i] or spreading[group]):
+        if collides and (contacts.is_new[i] or spreading[group]):
             state_of_tree[group] = COLLIDING
         elif state_of_tree[group] == FREE:
             state_of_tree[group] = RESTING
-    for i in range(count):
+    for i in range(count if approaching else 0):
         group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
         if group < 0 or state_of_tree[group] != COLLIDING:
             contacts.collides[i] = False

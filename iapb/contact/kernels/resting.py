@@ -7,7 +7,7 @@ import math
 from iapb.compiled import kernel
 from iapb.contact.kernels.rows import add_body_row
 from iapb.mechanics.kernels.jacobians import add_point_force
-from iapb.mechanics.kernels.vectors import dot, load, scale
+from iapb.mechanics.kernels.vectors import dot, load, scale, store
 
 
 @kernel
@@ -47,7 +47,7 @@ def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction,
 def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
     """The same for contact i alone."""
     contacts.normal_force[i] = 0.0
-    contacts.friction_force[i] = 0.0
+    store(contacts.friction_force, i, (0.0, 0.0, 0.0))
     if contacts.gap[i] > 0.0:
         return
     force = normal_force(contacts.gap[i], contacts.normal_velocity[i], stiffness, damping, clamped)
@@ -65,7 +65,6 @@ def add_friction(m, w, contacts, i, friction, friction_velocity, drag):
     x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)
     speed = math.sqrt(dot(tangential, tangential))
     force = scale(friction_share(contacts.normal_force[i], speed, friction, friction_velocity), tangential)
-    for axis in range(3):
-        contacts.friction_force[i, axis] = force[axis]
+    store(contacts.friction_force, i, force)
     add_point_force(m, w, contacts.body_a[i], x, force, drag)
     add_point_force(m, w, contacts.body_b[i], x, scale(-1.0, force), drag)

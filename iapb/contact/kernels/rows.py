@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
-from iapb.mechanics.kernels.jacobians import motion_at
-from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
+from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, store, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at and below this
 # share of what it was computed from. Kinematics round by about 2e-16 a joint, so that n and j are known to
@@ -20,33 +19,26 @@ ROW_NOISE = 1e-13
 
 
 @kernel
-def row_entry(m, w, k, x, n):
-    """Entry n·j of dof k for the world point x and unit normal n, exact zero where it is only rounding.
-
-    |n·j| <= ROW_NOISE ‖j‖ is noise for a translation. For a rotation j = a × (x − o), and the lever x − o is
-    known no better than the coordinates it is the difference of, so their size counts too: a contact struck
-    at the joint itself has no lever at all.
-    """
-    j = motion_at(m, w, k, x)
-    entry = dot(n, j)
-    square = dot(j, j)
-    if m.dof_rotates[k]:
-        o = load(w.position, m.dof_body[k])
-        square += dot(x, x) + dot(o, o)
-    return 0.0 if entry * entry <= ROW_NOISE * ROW_NOISE * square else entry
-
-
-@kernel
 def add_body_row(m, w, body, x, n, factor, out):
     """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
 
+    Entry n·j, j the motion of x, is left out where it is only rounding: |n·j| <= ROW_NOISE ‖j‖ for a translation.
+    For a rotation j = a × (x − o), and the lever x − o is known no better than the coordinates it is the difference
+    of, so their size counts too: a contact struck at the joint itself has no lever at all.
     Dofs that carry both bodies of a self-collision get the same number added and subtracted: exact zero.
     """
     if body < 0:
         return
     k = m.last_dof[body]
     while k >= 0:
-        out[k] += factor * row_entry(m, w, k, x, n)
+        j, square = load(w.axis, k), 1.0
+        if m.dof_rotates[k]:
+            o = load(w.position, m.dof_body[k])
+            j = cross(j, subtract(x, o))
+            square = dot(j, j) + dot(x, x) + dot(o, o)
+        entry = dot(n, j)
+        if not entry * entry <= ROW_NOISE * ROW_NOISE * square:  # NaN is no noise
+            out[k] += factor * entry
         k = m.dof_parent[k]
 
 
@@ -97,28 +89,43 @@ def relative_jacobian_rows(m, w, contacts, count, out):
 
 
 @kernel
-def velocity_at(m, w, body, x, v):
-    """Velocity J v of the world point x as fixed to the body [m/s]; zero for the static world."""
-    total = (0.0, 0.0, 0.0)
+def twist(m, w, body, v):
+    """Origin p of a body, velocity of p and angular velocity; zeros for the static world.
+
+    A point x fixed to the body moves with u + ω × (x − p).
+    """
+    p = u = omega = (0.0, 0.0, 0.0)
     if body < 0:
-        return total
+        return p, u, omega
+    p = load(w.position, body)
     k = m.last_dof[body]
     while k >= 0:
-        total = add(total, scale(v[k], motion_at(m, w, k, x)))
+        rate = scale(v[k], load(w.axis, k))
+        if m.dof_rotates[k]:
+            omega = add(omega, rate)
+            rate = cross(rate, subtract(p, load(w.position, m.dof_body[k])))
+        u = add(u, rate)
         k = m.dof_parent[k]
-    return total
+    return p, u, omega
 
 
 @kernel
 def contact_velocities(m, w, v, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each contact."""
+    points, normals, tangentials = contacts.point, contacts.normal, contacts.tangential_velocity
+    a = b = -1  # bodies whose twists are at hand: contacts of one pair follow each other
+    p_a, u_a, omega_a = p_b, u_b, omega_b = twist(m, w, -1, v)
     for i in range(count):
-        x, n = load(contacts.point, i), load(contacts.normal, i)
-        relative = subtract(
-            velocity_at(m, w, contacts.body_a[i], x, v), velocity_at(m, w, contacts.body_b[i], x, v)
-        )
+        if contacts.body_a[i] != a:
+            a = contacts.body_a[i]
+            p_a, u_a, omega_a = twist(m, w, a, v)
+        if contacts.body_b[i] != b:
+            b = contacts.body_b[i]
+            p_b, u_b, omega_b = twist(m, w, b, v)
+        x, n = load(points, i), load(normals, i)
+        relative = add(u_a, cross(omega_a, subtract(x, p_a)))
+        if b >= 0:
+            relative = subtract(relative, add(u_b, cross(omega_b, subtract(x, p_b))))
         normal_velocity = dot(n, relative)
-        tangential = subtract(relative, scale(normal_velocity, n))
         contacts.normal_velocity[i] = normal_velocity
-        for axis in range(3):
-            contacts.tangential_velocity[i, axis] = tangential[axis]
+        store(tangentials, i, subtract(relative, scale(normal_velocity, n)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from iapb.compiled import kernel
+from iapb.mechanics.kernels.vectors import store as store_vector
 
 # A feature number is (kind << 40) | (vertex << 20) | edge: vertex i of one shape against edge j of the other.
 # 20 bits hold a million vertices; shapes with more would need a different narrow phase anyway.
@@ -74,11 +75,7 @@ def store(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
     buffer.body_a[count] = shapes.body[a]
     buffer.body_b[count] = shapes.body[b]
     buffer.feature[count] = feature
-    buffer.point[count, 0] = x
-    buffer.point[count, 1] = y
-    buffer.point[count, 2] = 0.0
-    buffer.normal[count, 0] = nx
-    buffer.normal[count, 1] = ny
-    buffer.normal[count, 2] = 0.0
+    store_vector(buffer.point, count, (x, y, 0.0))
+    store_vector(buffer.normal, count, (nx, ny, 0.0))
     buffer.gap[count] = gap
     return count + 1

@@ -6,7 +6,7 @@ Vectors are tuples (see `iapb.mechanics.kernels.vectors`). Body -1 is the world:
 from __future__ import annotations
 
 from iapb.compiled import kernel
-from iapb.mechanics.kernels.vectors import add, column, load, transform
+from iapb.mechanics.kernels.vectors import add, column, load, store, transform
 
 
 @kernel
@@ -35,9 +35,8 @@ def store_in_space(buffer, count, shapes, a, b, feature, point, normal, gap):
     buffer.body_a[count] = shapes.body[a]
     buffer.body_b[count] = shapes.body[b]
     buffer.feature[count] = feature
-    for axis in range(3):
-        buffer.point[count, axis] = point[axis]
-        buffer.normal[count, axis] = normal[axis]
+    store(buffer.point, count, point)
+    store(buffer.normal, count, normal)
     buffer.gap[count] = gap
     return count + 1
 
@@ -48,6 +47,5 @@ def copy_contact(buffer, target, source):
     buffer.shape_a[target], buffer.shape_b[target] = buffer.shape_a[source], buffer.shape_b[source]
     buffer.body_a[target], buffer.body_b[target] = buffer.body_a[source], buffer.body_b[source]
     buffer.feature[target], buffer.gap[target] = buffer.feature[source], buffer.gap[source]
-    for axis in range(3):
-        buffer.point[target, axis] = buffer.point[source, axis]
-        buffer.normal[target, axis] = buffer.normal[source, axis]
+    store(buffer.point, target, load(buffer.point, source))
+    store(buffer.normal, target, load(buffer.normal, source))

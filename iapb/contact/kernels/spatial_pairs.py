@@ -13,7 +13,7 @@ from iapb.contact.geometry import BOX, HALF_SPACE, SPHERE
 from iapb.contact.kernels.box_pair import boxes
 from iapb.contact.kernels.shape_frames import vertex_feature
 from iapb.contact.kernels.spatial_frames import store_in_space, world_axis, world_center
-from iapb.mechanics.kernels.vectors import add, dot, scale, subtract
+from iapb.mechanics.kernels.vectors import add, dot, load, scale, subtract
 
 
 @kernel
@@ -70,11 +70,12 @@ def box_half_space(shapes, a, b, R, p, margin, buffer, count):
     x = scale(shapes.half_size[a, 0], world_axis(shapes, a, 0, R))
     y = scale(shapes.half_size[a, 1], world_axis(shapes, a, 1, R))
     z = scale(shapes.half_size[a, 2], world_axis(shapes, a, 2, R))
+    over_x, over_y, over_z = dot(x, normal), dot(y, normal), dot(z, normal)
     for corner in range(8):
         sx, sy, sz = 1.0 - 2.0 * (corner & 1), 1.0 - (corner & 2), 1.0 - 0.5 * (corner & 4)
-        arm = add(scale(sx, x), add(scale(sy, y), scale(sz, z)))
-        gap = height + dot(arm, normal)
+        gap = height + (sx * over_x + (sy * over_y + sz * over_z))
         if gap <= margin:
+            arm = add(scale(sx, x), add(scale(sy, y), scale(sz, z)))
             point = subtract(add(center, arm), scale(0.5 * gap, normal))
             count = store_in_space(buffer, count, shapes, a, b, vertex_feature(0, corner, 0), point, normal, gap)
             if count < 0:
@@ -87,8 +88,11 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
     """A sphere and a box: one contact at the box's nearest point; a centre inside leaves by the nearest face."""
     center = world_center(shapes, sphere, R, p)
     apart = subtract(center, world_center(shapes, box, R, p))
+    half, radius = load(shapes.half_size, box), shapes.radius[sphere]
+    reach = half[0] + half[1] + half[2] + radius + margin
+    if dot(apart, apart) > reach * reach:
+        return count
     axes = (world_axis(shapes, box, 0, R), world_axis(shapes, box, 1, R), world_axis(shapes, box, 2, R))
-    half = (shapes.half_size[box, 0], shapes.half_size[box, 1], shapes.half_size[box, 2])
     inside, region, outward = True, 0, (0.0, 0.0, 0.0)
     exit_distance, exit_region, exit_normal = math.inf, 0, (0.0, 0.0, 1.0)
     for k in range(3):
@@ -106,7 +110,6 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
         distance, region, normal = -exit_distance, exit_region, exit_normal
     else:
         normal = (outward[0] / distance, outward[1] / distance, outward[2] / distance)
-    radius = shapes.radius[sphere]
     gap = distance - radius
     if gap > margin:
         return count

@@ -6,14 +6,14 @@ from iapb.compiled import kernel
 from iapb.haptics.kernels.port import NO_COUPLING, UNILATERAL
 from iapb.haptics.kernels.sensors import measure
 from iapb.mechanics.kernels import add_point_force, difference, forward_kinematics
+from iapb.mechanics.kernels.vectors import add, dot, load, transform
 
 
 @kernel
 def couple(world, state, port):
     """Forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
-    port.applied[:] = 0.0
     if port.tool_tree < 0:
-        return
+        return  # `applied` holds the zeros that it was made with
     feel_hand(world, state, port)
     if port.coupling != NO_COUPLING:
         measure(world, port)
@@ -51,18 +51,14 @@ def pushes(port):
 @kernel
 def press(mechanism, body, held, port, out):
     """out += J_hᵀF_h for the wrench at the held point."""
-    rotation, origin, arm = body.rotation[held], body.position[held], port.hand_point
-    point = (
-        origin[0] + rotation[0, 0] * arm[0] + rotation[0, 1] * arm[1] + rotation[0, 2] * arm[2],
-        origin[1] + rotation[1, 0] * arm[0] + rotation[1, 1] * arm[1] + rotation[1, 2] * arm[2],
-        origin[2] + rotation[2, 0] * arm[0] + rotation[2, 1] * arm[1] + rotation[2, 2] * arm[2],
-    )
-    add_point_force(mechanism, body, held, point, port.wrench[:3], out)
+    wrench, arm = port.wrench, port.hand_point
+    force, torque = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    point = add(load(body.position, held), transform(body.rotation, held, (arm[0], arm[1], arm[2])))
+    add_point_force(mechanism, body, held, point, force, out)
     k = mechanism.last_dof[held]
     while k >= 0:
         if mechanism.dof_rotates[k]:
-            for axis in range(3):
-                out[k] += body.axis[k, axis] * port.wrench[3 + axis]
+            out[k] += dot(load(body.axis, k), torque)
         k = mechanism.dof_parent[k]
 
 

@@ -32,7 +32,7 @@ class MechanismArrays(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of the kernels, world axes. `forward_kinematics` fills the first four."""
+    """Scratch of the kernels for one mechanism, world axes. `forward_kinematics` fills the first four."""
 
     rotation: NDArray[np.float64]  # (n, 3, 3) body axes as columns
     position: NDArray[np.float64]  # (n, 3) [m] body origin
@@ -47,7 +47,7 @@ class Workspace(NamedTuple):
     linear_acceleration: NDArray[np.float64]  # (n, 3) of the body origin, minus gravity
     force: NDArray[np.float64]  # (n, 3) that the joint transmits to the body
     moment: NDArray[np.float64]  # (n, 3) about the body origin
-    at_rest: NDArray[np.float64]  # (d,) zeros: the acceleration that leaves only the bias
+    placed_q: NDArray[np.float64]  # (2 d,) first nq: where the first four are; NaN: nowhere yet
 
 
 class Evaluation(NamedTuple):
@@ -58,7 +58,8 @@ class Evaluation(NamedTuple):
 
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:
-    """Return zeroed scratch for a mechanism with that many bodies and dofs."""
+    """Return scratch for a mechanism with that many bodies and dofs (no joint has more than two entries in q a dof)."""
     rows, frames = (bodies, 3), (bodies, 3, 3)
-    shapes = (frames, rows, rows, (dofs, 3), (bodies,), rows, frames, *([rows] * 6), (dofs,))
-    return Workspace(*(np.zeros(shape) for shape in shapes))
+    shapes = (frames, rows, rows, (dofs, 3), (bodies,), rows, frames, *([rows] * 6))
+    nowhere = np.full(2 * dofs, np.nan)
+    return Workspace(*[*(np.zeros(shape) for shape in shapes), nowhere])

@@ -15,6 +15,7 @@ from iapb.mechanics.kernels.vectors import (
     load,
     scale,
     store,
+    store_columns,
     subtract,
     transform,
     transform_back,
@@ -32,11 +33,12 @@ def start_composite(m, w, b):
     """Composite of b <- body b alone, inertia turned into world axes: R I R^T."""
     w.composite_mass[b] = m.mass[b]
     store(w.composite_center, b, load(w.center, b))
-    for r in range(3):
-        row = (w.rotation[b, r, 0], w.rotation[b, r, 1], w.rotation[b, r, 2])
-        image = transform(w.rotation, b, transform(m.inertia, b, row))
-        for s in range(3):
-            w.composite_inertia[b, r, s] = image[s]
+    rotation = w.rotation[b]
+    x, y, z = load(rotation, 0), load(rotation, 1), load(rotation, 2)
+    image_x, image_y, image_z = transform(m.inertia, b, x), transform(m.inertia, b, y), transform(m.inertia, b, z)
+    xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
+    xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
+    store_columns(w.composite_inertia, b, (xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 @kernel
@@ -49,10 +51,12 @@ def merge_composite(w, into, b):
     share = m2 / total if total > 0.0 else 0.0
     mu = m1 * share
     square = dot(r, r)
-    for row in range(3):
-        for column in range(3):
-            parallel = (square if row == column else 0.0) - r[row] * r[column]
-            w.composite_inertia[into, row, column] += w.composite_inertia[b, row, column] + mu * parallel
+    xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
+    xx, yy, zz = mu * (square - r[0] * r[0]), mu * (square - r[1] * r[1]), mu * (square - r[2] * r[2])
+    inertia, own = w.composite_inertia[into], w.composite_inertia[b]
+    accumulate(inertia, 0, add(load(own, 0), (xx, xy, xz)))
+    accumulate(inertia, 1, add(load(own, 1), (xy, yy, yz)))
+    accumulate(inertia, 2, add(load(own, 2), (xz, yz, zz)))
     w.composite_mass[into] = total
     store(w.composite_center, into, add(c1, scale(share, r)))
 
@@ -172,23 +176,51 @@ def body_accelerations(m, w, v, dv, g):
 
 
 @kernel
+def newton_euler(m, w, b, omega, alpha, a):
+    """Force and moment about its origin that give body b its motion; a is the acceleration of its origin.
+
+    With r = c - p: f = m (a + alpha x r + omega x (omega x r)) and, the inertia I being given in body axes,
+    n = R (I R^T alpha + R^T omega x I R^T omega) + r x f.
+    """
+    r = subtract(load(w.center, b), load(w.position, b))
+    f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
+    own_omega, own_alpha = transform_back(w.rotation, b, omega), transform_back(w.rotation, b, alpha)
+    h = transform(m.inertia, b, own_omega)
+    n = transform(w.rotation, b, add(transform(m.inertia, b, own_alpha), cross(own_omega, h)))
+    store(w.force, b, f)
+    store(w.moment, b, add(n, cross(r, f)))
+
+
+@kernel
 def inverse_dynamics(m, w, v, dv, g, out):
     """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler."""
     body_velocities(m, w, v)
     body_accelerations(m, w, v, dv, g)
     for b in range(m.kind.shape[0]):
         omega, alpha = load(w.angular_velocity, b), load(w.angular_acceleration, b)
-        r = subtract(load(w.center, b), load(w.position, b))
-        a = add(load(w.linear_acceleration, b), add(cross(alpha, r), cross(omega, cross(omega, r))))
-        f = scale(m.mass[b], a)
-        h = turned_inertia(m, w, b, omega)
-        n = add(turned_inertia(m, w, b, alpha), cross(omega, h))
-        store(w.force, b, f)
-        store(w.moment, b, add(n, cross(r, f)))
+        newton_euler(m, w, b, omega, alpha, load(w.linear_acceleration, b))
     project_forces(m, w, out)
 
 
 @kernel
 def bias(m, w, v, out):
-    """out (d,) <- B(q, v): Coriolis and centripetal generalized forces."""
-    inverse_dynamics(m, w, v, w.at_rest, (0.0, 0.0, 0.0), out)
+    """out (d,) <- B(q, v): Coriolis and centripetal generalized forces, `inverse_dynamics` without dv/dt and weight."""
+    zero = (0.0, 0.0, 0.0)
+    for b in range(m.kind.shape[0]):
+        parent = m.parent[b]
+        u, s = relative_motion(m, w, b, v)
+        omega, alpha, a = s, zero, zero
+        if parent >= 0:
+            carried = load(w.angular_velocity, parent)
+            carried_alpha = load(w.angular_acceleration, parent)
+            r = subtract(load(w.position, b), load(w.position, parent))
+            omega, alpha = add(carried, s), add(carried_alpha, cross(carried, s))
+            a = add(load(w.linear_acceleration, parent), cross(carried_alpha, r))
+            a = add(a, cross(carried, add(cross(carried, r), scale(2.0, u))))
+        if m.kind[b] == FREE_FLYER or m.kind[b] == PLANAR_SE2:
+            a = add(a, cross(s, u))
+        store(w.angular_velocity, b, omega)
+        store(w.angular_acceleration, b, alpha)
+        store(w.linear_acceleration, b, a)
+        newton_euler(m, w, b, omega, alpha, a)
+    project_forces(m, w, out)

@@ -107,11 +107,24 @@ def move_joint(m, q, w, b):
 
 
 @kernel
+def is_placed(q, w):
+    """Are the bodies at q already, to the last bit? (Those without coordinates are placed each time.)"""
+    for k in range(q.shape[0]):
+        if q[k] != w.placed_q[k]:
+            return False
+    return q.shape[0] > 0
+
+
+@kernel
 def forward_kinematics(m, q, w):
-    """Fill rotation, position, center and axis of the workspace w for the configuration q.
+    """Fill rotation, position, center and axis of the workspace w for the configuration q, if they are not yet at q.
 
     Quaternions and (cos, sin) pairs must have length one; kernels do not check.
     """
+    if is_placed(q, w):
+        return
+    for k in range(q.shape[0]):
+        w.placed_q[k] = q[k]
     for b in range(m.kind.shape[0]):
         place_joint_frame(m, w, b)
         if m.kind[b] != FIXED:

@@ -13,18 +13,17 @@ def load(rows, i):
 
 @kernel
 def store(rows, i, a):
-    """Write a into row i of an (n, 3) array."""
-    rows[i, 0] = a[0]
-    rows[i, 1] = a[1]
-    rows[i, 2] = a[2]
+    """Write a into row i of an (n, 3) array, whose place is worked out once."""
+    row = rows[i]
+    row[0] = a[0]
+    row[1] = a[1]
+    row[2] = a[2]
 
 
 @kernel
 def accumulate(rows, i, a):
     """Add a to row i of an (n, 3) array."""
-    rows[i, 0] += a[0]
-    rows[i, 1] += a[1]
-    rows[i, 2] += a[2]
+    store(rows, i, add(load(rows, i), a))
 
 
 @kernel
@@ -86,10 +85,10 @@ def column(frames, i, k):
 @kernel
 def store_columns(frames, i, x, y, z):
     """frames[i] <- [x y z]."""
-    for r in range(3):
-        frames[i, r, 0] = x[r]
-        frames[i, r, 1] = y[r]
-        frames[i, r, 2] = z[r]
+    frame = frames[i]
+    store(frame, 0, (x[0], y[0], z[0]))
+    store(frame, 1, (x[1], y[1], z[1]))
+    store(frame, 2, (x[2], y[2], z[2]))
 
 
 @kernel
