@@ -6,6 +6,7 @@ the row space of A. `factored` applies P through an orthonormal basis; `gram_pin
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -129,10 +130,9 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
 
 
 def _method(method: Any) -> tuple[Any, bool]:
-    offered = {name: entry for name, entry in METHODS.items() if name != "poisson"}
-    if not isinstance(method, str) or method not in offered:
-        raise ArgumentError("method", method, one_of(method, offered))
-    return offered[method].solve, offered[method].clamped
+    if not isinstance(method, str) or method not in METHODS or method == "poisson":
+        raise ArgumentError("method", method, one_of(method, [name for name in METHODS if name != "poisson"]))
+    return METHODS[method]
 
 
 def _check_options(method: str, budget: Any, tolerance: Any, problem: ImpactInput) -> None:
@@ -153,11 +153,11 @@ def _as_impact(problem: ImpactInput, answer: Whitened, *, method: str, law: str,
     momentum = problem.unscale_momentum(answer.momentum)
     impulses = problem.unscale_impulses(answer.impulses)
     for quantity, array in (("velocity", velocity), ("generalized_impulse", momentum), ("impulses", impulses)):
-        if not np.all(np.isfinite(array)):
+        if not np.isfinite(array).all():
             raise RangeError(quantity, f"the {method} impact of these magnitudes is above 1.8e308")
     _, change = kinetic_energies(problem.mass_matrix, problem.velocity, answer.v_plus)
     energy_change = problem.unscale_energy(change)
-    if not np.isfinite(energy_change):
+    if not math.isfinite(energy_change):
         raise RangeError("energy_change", "the kinetic energy of these magnitudes is above 1.8e308")
     return Impact(velocity, momentum, impulses, answer.rank, energy_change, answer.clamp, status, method, law,
                   rows_used)

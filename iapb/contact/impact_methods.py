@@ -73,7 +73,7 @@ def factored(problem: ImpactInput, budget: int, clamped: bool, tolerance: float 
     v_plus, momentum, share = np.empty(d), np.empty(d), _tolerance(problem, tolerance)
     rank, clamp = factored_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.restitution, c,
                                   share, budget, clamped, work, v_plus, momentum)
-    ended_early = rank == budget < d and bool(np.any(work.size[:c] > share * share))
+    ended_early = rank == budget < d and bool((work.size[:c] > share * share).any())
     return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp, not ended_early)
 
 
@@ -85,7 +85,7 @@ def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
     """
     c, size = problem.contacts, _row_size(problem)
     impulses = size * _least_norm_of(work, work.length[:c] * size, rank, work.change)
-    if np.all(size == 1.0):
+    if (size == 1.0).all():
         return impulses
     left = work.change - (work.rows[:, :c] * work.length[:c]) @ impulses
     return impulses + _least_norm_of(work, work.length[:c], rank, left)
@@ -93,10 +93,10 @@ def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
 
 def _row_size(problem: ImpactInput) -> Floats:
     """2^−r (c,), largest 1: the caller's rows are these multiples of the scaled ones, up to one common factor."""
-    present = np.any(problem.contact_jacobian != 0.0, axis=1)
-    least = np.min(problem.row_exponent, where=present, initial=np.iinfo(np.int64).max)
+    present = problem.contact_jacobian.any(axis=1)
+    least = np.min(problem.row_exponent, where=present, initial=np.iinfo(np.int32).max)
     exponent = np.where(present, least - problem.row_exponent, 0)
-    return np.ldexp(1.0, np.maximum(exponent, -1000).astype(np.int32))  # below 2^-1000 a row is as good as absent
+    return np.ldexp(1.0, np.maximum(exponent, -1000))  # below 2^-1000 a row is as good as absent
 
 
 def _least_norm_of(work: ImpactWork, length: Floats, rank: int, change: Floats) -> Floats:

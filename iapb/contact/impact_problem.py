@@ -7,6 +7,7 @@ row scale by a power of two changes no bit of the result.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from iapb.contact.kernels.cholesky import cholesky
 from iapb.errors import ArgumentError
 
 Floats = NDArray[np.float64]
+Exponents = NDArray[np.int32]
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) is rounding of whoever computed M, and the symmetric part is used.
 _SYMMETRY_TOLERANCE = 1e-9
@@ -33,8 +35,8 @@ class ImpactInput:
     velocity: Floats  # (d,) scaled
     restitution: float
     unequal: Floats | None  # (c,) where restitution differs between contacts
-    coordinate_exponent: NDArray[np.int64]  # s (d,)
-    row_exponent: NDArray[np.int64]  # r (c,)
+    coordinate_exponent: Exponents  # s (d,)
+    row_exponent: Exponents  # r (c,)
     velocity_exponent: int  # k
 
     @property
@@ -61,7 +63,10 @@ class ImpactInput:
 
     def unscale_energy(self, energy: float) -> float:
         """Energy in the caller's units."""
-        return float(_ldexp(np.array([energy]), np.array([2 * self.velocity_exponent]))[0])
+        try:
+            return math.ldexp(energy, 2 * self.velocity_exponent)
+        except OverflowError:
+            return math.copysign(math.inf, energy)
 
 
 def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
@@ -89,20 +94,22 @@ def _is_empty_list(rows: ArrayLike) -> bool:
 def _finite(name: str, value: Any, dimensions: int) -> Floats:
     try:
         given = np.asarray(value)
-        array = np.array(given, dtype=np.float64) if given.dtype.kind != "c" else None
+        array = given.astype(np.float64, copy=False) if given.dtype.kind != "c" else None
     except (TypeError, ValueError):
         array = None
     if array is None:
         raise ArgumentError(name, value, "an array of real numbers")
     if array.ndim != dimensions:
         raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ArgumentError(f"{name}[{', '.join(map(str, where))}]", float(array[where]), "a finite number")
     return array
 
 
 def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, Floats | None]:
+    if isinstance(restitution, float) and -1.0 <= restitution <= 1.0:
+        return float(restitution), None
     e = np.asarray(restitution)
     if e.dtype.kind not in "fiu":
         raise ArgumentError("restitution", restitution, "a real number or one per contact")
@@ -123,45 +130,53 @@ def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, 
     return 0.0, values
 
 
-def _exponents(array: Floats) -> NDArray[np.int64]:
+def _exponents(array: Floats) -> Exponents:
     """Binary exponent of every entry; zeros get one that never is a maximum."""
-    exponents = np.frexp(array)[1].astype(np.int64)
-    return np.where(array == 0.0, _LOWEST_EXPONENT, exponents)
+    mantissa, exponents = np.frexp(array)
+    exponents[mantissa == 0.0] = _LOWEST_EXPONENT
+    return exponents
 
 
-def _ldexp(array: Floats, exponent: Any) -> Floats:
+def _ldexp(array: Floats, exponent: Exponents) -> Floats:
     """array · 2^exponent; overflow becomes infinity for the caller to refuse.
 
     Exponents are sums of a few of doubles, far inside int32; the marks of zeros, some -1e5 each, are too.
     """
     with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(array, exponent.astype(np.int32))
+        return np.ldexp(array, exponent)
 
 
 def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -> ImpactInput:
-    diagonal = np.diag(M)
-    if not np.all(diagonal > 0.0):
+    diagonal = M.diagonal()
+    if not diagonal.min() > 0.0:
         k = int(np.argmin(diagonal))
         raise ArgumentError(f"mass_matrix[{k}, {k}]", float(diagonal[k]), "a positive diagonal entry")
-    s = -(_exponents(diagonal) // 2)
-    scaled_mass = _ldexp(M, s[:, None] + s[None, :])
-    if not np.all(np.abs(scaled_mass) <= 2.0):  # |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds for every positive definite matrix
-        i, j = np.unravel_index(int(np.argmax(np.abs(scaled_mass))), M.shape)
+    s = -(np.frexp(diagonal)[1] // 2)
+    mass, lower = _factored(M, _ldexp(M, s[:, None] + s))
+    k = int((_exponents(v) - s).max(initial=_LOWEST_EXPONENT))
+    k = 0 if k <= _LOWEST_EXPONENT // 2 else k
+    row = -(_exponents(J) + s).max(axis=1, initial=_LOWEST_EXPONENT)
+    row[np.abs(row) > abs(_LOWEST_EXPONENT) // 2] = 0  # a row of zeros
+    return ImpactInput(
+        mass_matrix=mass, lower=lower, contact_jacobian=_ldexp(J, row[:, None] + s), velocity=_ldexp(v, -(s + k)),
+        restitution=e, unequal=unequal, coordinate_exponent=s, row_exponent=row, velocity_exponent=k)
+
+
+def _factored(M: Floats, scaled: Floats) -> tuple[Floats, Floats]:
+    """The symmetric part of the scaled M and its Cholesky factor; M as given is for messages."""
+    if not (scaled.max() <= 2.0 and scaled.min() >= -2.0):  # |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
+        i, j = np.unravel_index(int(np.argmax(np.abs(scaled))), M.shape)
         raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]), "a positive definite matrix")
-    if np.max(np.abs(scaled_mass - scaled_mass.T), initial=0.0) > _SYMMETRY_TOLERANCE:
-        i, j = np.unravel_index(int(np.argmax(np.abs(scaled_mass - scaled_mass.T))), M.shape)
-        raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]),
-                            f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
-    symmetric = np.ascontiguousarray(0.5 * (scaled_mass + scaled_mass.T))
+    symmetric = np.ascontiguousarray(scaled)
+    if not (scaled == scaled.T).all():
+        skew = np.abs(scaled - scaled.T)
+        if skew.max() > _SYMMETRY_TOLERANCE:
+            i, j = np.unravel_index(int(np.argmax(skew)), M.shape)
+            raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]),
+                                f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
+        symmetric = np.ascontiguousarray(0.5 * (scaled + scaled.T))
     lower = np.zeros_like(symmetric)
     pivot = cholesky(symmetric, lower)
     if pivot:
         raise ArgumentError("mass_matrix", M, f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)")
-    k = int(np.max(_exponents(v) - s, initial=_LOWEST_EXPONENT))
-    k = 0 if k <= _LOWEST_EXPONENT // 2 else k
-    row = -np.max(_exponents(J) + s[None, :], axis=1, initial=_LOWEST_EXPONENT) if len(J) else np.zeros(0, np.int64)
-    row = np.where(np.abs(row) > abs(_LOWEST_EXPONENT) // 2, 0, row)
-    return ImpactInput(
-        mass_matrix=symmetric, lower=lower, contact_jacobian=_ldexp(J, row[:, None] + s[None, :]),
-        velocity=_ldexp(v, -(s + k)), restitution=e, unequal=unequal,
-        coordinate_exponent=s, row_exponent=row.astype(np.int64), velocity_exponent=k)
+    return symmetric, lower

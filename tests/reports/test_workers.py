@@ -54,9 +54,10 @@ if __name__ == "__main__":
 def test_a_worker_whose_parent_was_killed_ends(tmp_path):
     script = tmp_path / "orphaning.py"
     script.write_text(ORPHANING)
-    done = subprocess.run([sys.executable, script], stdout=subprocess.PIPE, text=True, check=False,
-                          env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})  # fmt: skip
-    worker = Path("/proc") / done.stdout.strip()
+    with (tmp_path / "said").open("w") as said:  # a pipe would stay open as long as the worker lives
+        done = subprocess.run([sys.executable, script], stdout=said, stderr=said, check=False,
+                              env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})  # fmt: skip
+    worker = Path("/proc") / (tmp_path / "said").read_text().strip()
     for _ in range(600):
         if not worker.exists():
             break

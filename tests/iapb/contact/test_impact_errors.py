@@ -34,6 +34,7 @@ def call(**changed: object) -> object:
         ("mass_matrix", [[1.0, 0.0], [0.0, 0.0]], "mass_matrix[1, 1]"),
         ("mass_matrix", [[1.0, 0.0], [0.0, -1.0]], "mass_matrix[1, 1]"),
         ("mass_matrix", [[1.0, 3.0], [3.0, 1.0]], "mass_matrix[0, 1]"),
+        ("mass_matrix", [[1.0, -3.0], [-3.0, 1.0]], "mass_matrix[0, 1]"),
         ("mass_matrix", [[1.0, 1.1], [1.1, 1.0]], "mass_matrix"),
         ("mass_matrix", [[1.0, 1.0], [1.0, 1.0]], "mass_matrix"),
         ("mass_matrix", [[1e-300, 1e300], [1e300, 1e-300]], "mass_matrix[0, 1]"),

@@ -17,6 +17,15 @@ def impact_of(seed: int, d: int = 5, c: int = 7) -> tuple[np.ndarray, np.ndarray
     return root @ root.T + np.eye(d), rows, rng.normal(size=d)
 
 
+def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> None:
+    mass, rows, v = impact_of(3)
+    skew = 1e-11 * np.triu(mass, 1)
+    given = resolve_impact(mass + skew, rows, v, 0.4)
+    symmetric = resolve_impact(mass + 0.5 * (skew + skew.T), rows, v, 0.4)
+    assert np.allclose(given.velocity, symmetric.velocity, rtol=1e-14, atol=1e-14)
+    assert not np.allclose(given.velocity, resolve_impact(mass, rows, v, 0.4).velocity, rtol=1e-14, atol=1e-14)
+
+
 POWERS = st.lists(st.integers(-60, 60), min_size=7, max_size=7)
 
 
