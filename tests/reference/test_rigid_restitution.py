@@ -1,4 +1,4 @@
-"""Restitution in one rigid step, one e for all or one for each contact: what is returned, and that nothing is gained."""
+"""Restitution in one rigid step, one e for all or one for each: what is returned, and that nothing is gained."""
 
 from __future__ import annotations
 
