@@ -15,6 +15,7 @@ from iapb.contact.kernels import resting as kernels
 from iapb.contact.resting import resting_forces
 from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.scene import Scene
 
 STIFFNESS, DAMPING = 1000.0, 50.0  # the paper's walls
 
@@ -124,3 +125,13 @@ def test_what_is_found_cannot_be_replaced() -> None:
     for answer in (found, forces):
         with pytest.raises(FrozenInstanceError):
             setattr(answer, next(iter(answer.__dataclass_fields__)), None)
+
+
+def test_the_threshold_that_is_not_said_is_that_of_a_scene() -> None:
+    q, v = np.zeros(6), np.array([0.3, -0.2, 0.1, 0.0, 0.0, 0.0])
+    threshold = Scene.model_fields["contact"].get_default(call_default_factory=True).friction_velocity
+    found = find_contacts(MECHANISM, SHAPES, q, v)
+    said = resting_forces(MECHANISM, found, q, STIFFNESS, friction=0.3, friction_velocity=threshold)
+    assert len(found) > 0 and np.any(said.friction_force != 0.0)
+    left_out = resting_forces(MECHANISM, found, q, STIFFNESS, friction=0.3)
+    np.testing.assert_array_equal(left_out.friction_force, said.friction_force)
