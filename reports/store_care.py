@@ -43,7 +43,7 @@ class FileState:
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Read every result file below a folder whole, seals and content hashes included; nothing is changed.
+    """Read every result file below a folder (or this file) whole, seals and content hashes included; change nothing.
 
     `progress` is called as progress(files read, files in all).
     """
@@ -56,6 +56,8 @@ def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[F
 
 
 def _files(folder: Path) -> Iterator[Path]:
+    if folder.is_file():  # one that is named counts, whatever its name
+        yield folder
     for path in sorted(folder.rglob("*")):
         if path.is_file() and (path.suffix == ".h5" or path.name.endswith((PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX))):
             yield path

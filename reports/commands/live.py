@@ -46,12 +46,13 @@ def live(
     from reports.live.measure import summary
     from reports.live.setup import live_simulation
 
-    if not rate > 0.0:
+    if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:
         raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
     source = load_scene(find_scene(scene))
     source = source.with_values(parsed(set_)) if set_ else source
+    out.mkdir(parents=True, exist_ok=True)  # where it cannot be, that is said before and not after the run
     with compiling_told(to_log):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)
         name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"

@@ -28,7 +28,7 @@ _ACTION = ("check: read every file whole. repair: check, set damaged files aside
 
 def store(
     action: Annotated[Action, typer.Argument(help=_ACTION)],
-    where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (again).")] = Path("out"),
+    where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (check, again).")] = Path("out"),
     dry_run: Annotated[bool, typer.Option("--dry-run", help="gc: only say what would be removed.")] = False,
 ) -> None:
     """Look after the run and table files below a folder."""
@@ -36,6 +36,8 @@ def store(
 
     if not where.exists():
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
+    if where.is_file() and action in (Action.repair, Action.gc):
+        raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")
     {Action.check: _check, Action.repair: _repair, Action.gc: _gc, Action.again: _again}[action](where, dry_run)
 
 

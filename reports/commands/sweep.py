@@ -10,7 +10,7 @@ import typer
 
 def sweep(
     study: Annotated[str, typer.Argument(help="A study file, or the name of one that comes with the project.")],
-    workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one per core.", min=0)] = 0,
+    workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one per core.", min=0, max=512)] = 0,
     scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler to use instead.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the sweeps.")] = Path("out/sweeps"),
 ) -> None:

@@ -16,12 +16,12 @@ def verify(
     = ENGINE,
     impacts: Annotated[int | None, typer.Option(min=1, help="Random impacts; default 5000, with --full 1,000,000.")]
     = None,
-    seed: Annotated[int, typer.Option(help="Seed of the draw.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the draw.")] = 0,
     unequal: Annotated[bool, typer.Option("--unequal", help="Also give it a restitution per contact.")] = False,
     full: Annotated[bool, typer.Option("--full", help="A million impacts and thousands of trajectories; what was done "
                                        "before is kept, and can be gone on with after a stop.")] = False,
     trajectories: Annotated[int, typer.Option(min=0, help="Random scenes of --full.")] = 5000,
-    workers: Annotated[int, typer.Option(min=1, help="Processes of --full.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=512, help="Processes of --full.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the batches of --full.")] = Path("out/verify"),
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
     simulator: Annotated[list[str] | None, typer.Option(

@@ -49,7 +49,8 @@ def test_every_command_explains_itself(command, iapb):
 
 @pytest.mark.parametrize("arguments", [["walk"], ["run"], ["run", "peg_corner", "--speed", "3"], ["inspect"], [],
                                        ["verify", "--scene", "elastic_cradle"],
-                                       ["inspect", "run.h5", "--impacts", "-3"],
+                                       ["inspect", "run.h5", "--impacts", "-3"], ["verify", "--seed", "-1"],
+                                       ["sweep", "corner_tilt", "--workers", "99999999"],
                                        ["live", "peg_corner", "--view", "--port", "99999999"]])
 def test_wrong_usage_ends_with_2_and_says_what_is_wrong(arguments, iapb):
     status, out, err = iapb(*arguments)
@@ -157,6 +158,8 @@ def test_debug_shows_the_traceback(tmp_path):
         (["run", "peg_corner", "--out="], "--out = '': expected a value that is not empty"),
         (["run", ""], "argument 2 = '': expected a value that is not empty"),
         (["store", "check", ""], "argument 3 = ''"),
+        (["live", "peg_corner", "--rate", "inf"], "--rate = inf: expected a number"),
+        (["live", "peg_corner", "--seconds", "0.1", "--out", "/dev/null/folder"], "/dev/null/folder: Not a directory"),
         (["prove", "no_such_statement"], "no_such_statement"),
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),
@@ -186,6 +189,16 @@ def test_a_file_that_is_no_run_is_refused(iapb, tmp_path):
     path.write_text("not HDF5")
     status, _, err = iapb("inspect", path)
     assert status == 1 and str(path) in err
+
+
+def test_the_store_checks_a_file_that_is_named_and_cares_for_folders_only(iapb, tmp_path):
+    path = tmp_path / "notes.txt"
+    path.write_text("not HDF5")
+    status, out, _ = iapb("store", "check", path)
+    assert status == 1 and "1 files: 1 damaged" in out
+    for action in ("gc", "repair"):
+        status, _, err = iapb("store", action, path)
+        assert status == 1 and f"a folder of results: {action} is not for one file" in err and path.is_file()
 
 
 def test_effects_lists_each_with_its_reason(iapb):
