@@ -236,3 +236,12 @@ def test_naming_the_pairs_finds_their_contacts_alone():
             everything.shape_a, everything.shape_b, strict=True)]  # fmt: skip
         assert np.array_equal(some.gap, everything.gap[chosen])
         assert np.array_equal(some.point, everything.point[chosen])
+
+
+def test_finding_contacts_collapses_those_closer_than_the_distance_given():
+    """Corners of a box, 0.2 and 0.1 m apart, on a floor: both stay, or the deeper one."""
+    mechanism, shapes = Mechanism([free_body()]), make_shapes([box((0.2, 0.1), body=0), FLOOR])
+    for distance, count in ((0.0, 2), (0.19, 2), (0.21, 1)):
+        found = find_contacts(mechanism, shapes, [0.0, 0.04, 0.01], np.zeros(3), cluster_distance=distance)
+        assert len(found) == count
+        assert found.gap.min() == pytest.approx(0.04 - 0.05 * math.cos(0.01) - 0.1 * math.sin(0.01))
