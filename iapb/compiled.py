@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, typeof
+from numba import typeof
 from numba.core import cgutils, config, imputils, types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
@@ -32,7 +32,7 @@ from numba.extending import (
     unbox,
 )
 
-from iapb.inlining import called_from_kernels
+from iapb.inlining import compile_as_whole
 
 
 def _source_stamp() -> str:
@@ -59,10 +59,9 @@ def _stamp_of(function: Callable[..., Any]) -> str:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function as a kernel (see the file's docstring); cached until any file with kernels changes."""
-    compiled = njit(fastmath=False, _nrt=False)(function)
     if config.DISABLE_JIT:
-        return compiled
-    called_from_kernels(compiled)
+        return function
+    compiled = compile_as_whole(function, fastmath=False, _nrt=False)
     compiled.enable_caching()
     compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
     return compiled

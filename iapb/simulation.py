@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.compiled import Entry
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
@@ -80,6 +81,7 @@ class Simulation:
         blocks = (self.world, self.state, self.port)
         self.link = None if device is None else DeviceLink(device, *blocks)
         self.stepper = Stepper(*blocks, self.link)
+        self._steps = Entry(compiled_steps)
         self.steps_done = 0
 
     @property
@@ -155,7 +157,7 @@ class Simulation:
         A law in Python does so in a first step, here that of a twin; one that may keep a state of its own is let be.
         """
         if self.compiled and self.link is None:
-            compiled_steps(self.world, self.state, self.port, record, self.steps_done, 0)
+            self._steps(self.world, self.state, self.port, record, self.steps_done, 0)
         elif self.link is None and _is_frozen(self.law):
             with suppress(IapbError):  # this simulation's own first step will say so
                 twin = Simulation(self.scene, self.law, self.coupling)
@@ -164,7 +166,7 @@ class Simulation:
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
         """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
         if self.compiled and self.link is None:
-            done, status = compiled_steps(self.world, self.state, self.port, record, self.steps_done, steps)
+            done, status = self._steps(self.world, self.state, self.port, record, self.steps_done, steps)
             self.steps_done += done
             return done, IapbError(FAILURES[status]) if status else None
         for k in range(steps):

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from numba.core import config
 
-from iapb.inlining import called_from_kernels
+from iapb.inlining import compile_as_whole
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """As the engine's, but not cached: from the cache nothing would be compiled."""
-    compiled = njit(function)
-    called_from_kernels(compiled)
-    return compiled
+# as the engine's, but not cached: from the cache nothing would be compiled
+kernel = compile_as_whole
 
 
 @kernel
@@ -54,8 +49,8 @@ def _sum(values: Any) -> Any:
 
 def test_the_bitcode_is_compiled_with_the_options_of_the_kernel() -> None:
     """Asked of the options: once numba has refused to allocate, it refuses everywhere in the process."""
-    compiled = njit(_square.py_func, _nrt=False, fastmath=False)
-    called_from_kernels(compiled)
+    compiled = compile_as_whole(_square.py_func, _nrt=False)
+    assert compiled.targetoptions["_nrt"] is False
     assert compiled.get_overload.__self__.targetoptions["_nrt"] is False
 
 

@@ -60,9 +60,10 @@ def contact_state(state, tool_tree):
 @kernel
 def clear(state):
     """Forget the forces and impulses of the step before."""
-    state.penalty_force[:] = 0.0
-    state.friction_force[:] = 0.0
-    state.impulse[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.penalty_force[k] = 0.0
+        state.friction_force[k] = 0.0
+        state.impulse[k] = 0.0
     state.impacts.logged[0] = 0
 
 
@@ -128,9 +129,10 @@ def remember(state):
 def move(world, state, applied):
     """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
     copy_into(state.start_q, state.q)
-    copy_into(state.start_v, state.v)
-    state.mean_v[:] = 0.0
-    state.mean_acceleration[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.start_v[k] = state.v[k]
+        state.mean_v[k] = 0.0
+        state.mean_acceleration[k] = 0.0
     for stage in range(world.stage_weight.shape[0]):
         if stage > 0 and not go_to_stage(world, state, world.dt * world.stage_fraction[stage]):
             return NOT_POSITIVE_DEFINITE
@@ -180,8 +182,9 @@ def accelerate(world, state, applied, stage):
 @kernel
 def rest(world, state, stage):
     """(4)-(6) at the contacts of every group that is not colliding: there the impulse holds the constraint."""
-    state.stage_penalty[:] = 0.0
-    state.stage_friction[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.stage_penalty[k] = 0.0
+        state.stage_friction[k] = 0.0
     if not world.switches.contacts:
         return
     contacts, count = state.contacts, state.contact_count[0]
@@ -193,7 +196,8 @@ def rest(world, state, stage):
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0
-        contacts.friction_force[i] = 0.0
+        for axis in range(3):
+            contacts.friction_force[i, axis] = 0.0
         group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
                                  state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:

@@ -51,8 +51,9 @@ def test_units_of_coordinates_by_powers_of_two_change_no_bit(seed: int, powers: 
     assert scaled.energy_change == plain.energy_change
 
 
-@given(seed=st.integers(0, 10_000), speed=st.integers(-400, 400), mass_power=st.integers(-200, 200))
+@given(seed=st.integers(0, 10_000), speed=st.integers(-400, 300), mass_power=st.integers(-200, 200))
 def test_unit_of_time_and_of_mass(seed: int, speed: int, mass_power: int) -> None:
+    """Up to energies of 2^1000: above 2^1024 there is no number for them, which is an error by name."""
     mass, rows, v = impact_of(seed)
     plain = resolve_impact(mass, rows, v, 0.4)
     quick = resolve_impact(np.ldexp(mass, 2 * mass_power), rows, np.ldexp(v, speed), 0.4)
