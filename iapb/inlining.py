@@ -18,8 +18,8 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
-# Cost up to which LLVM inlines a call; its own 225 keeps the effects of a step apart. Measured on resting steps: 500 and
-# 1,000 are alike, from 5,000 on the peg's takes a tenth longer.
+# Cost up to which LLVM inlines a call; its own 225 keeps the effects of a step apart. Measured on resting steps: 500
+# and 1,000 are alike, from 5,000 on the peg's takes a tenth longer.
 _INLINE_UP_TO = 500
 
 
