@@ -58,9 +58,8 @@ def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
     given = sys.argv[1:] if arguments is None else arguments
-    if arguments is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        # The signal that ends a process politely, of a batch system or a time limit, counts as Ctrl-C: files are kept.
-        signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    if arguments is None:
+        signal.signal(signal.SIGTERM, _end_politely)
     try:
         _refuse_empty(given)
         for name in COMMANDS:
@@ -80,6 +79,14 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is None:
         sys.exit(status or 0)
     return status or 0
+
+
+def _end_politely(*_: object) -> None:
+    """SIGTERM, as of a batch system or a time limit, counts as Ctrl-C: files are kept. In the background, where a shell
+    ignores Ctrl-C, it does too."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        raise KeyboardInterrupt
+    signal.raise_signal(signal.SIGINT)
 
 
 def _refuse_empty(arguments: list[str]) -> None:

@@ -20,7 +20,7 @@ from reports.pages.uses import anchor, runs_by_user
 from reports.pages.verdicts import verdicts
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
-ROWS_SHOWN = 300
+ROWS_SHOWN = 200
 # The mark that goes with each outcome: shape as well as colour.
 OUTCOME_MARKS = dict(zip(OUTCOMES, ("✓", "≈", "✕", "○", "…"), strict=True))
 OUTCOME_CLASSES = dict(zip(OUTCOMES, ("good", "limited", "bad", "open", "absent"), strict=True))

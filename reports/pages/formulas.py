@@ -7,6 +7,8 @@ import re
 from markupsafe import Markup, escape
 
 _INLINE = re.compile(r"\$([^$]+)\$")
+_REFERENCE = re.compile(r"&#x([0-9A-Fa-f]+);")
+_GROUP_OF_ONE = re.compile(r"<mrow>(<(m[ion])>[^<]*</\2>)</mrow>")
 _POWER = re.compile(r"(?<![\w.])(-?\d(?:\.\d+)?)e([+-]?\d{1,3})(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
@@ -15,7 +17,14 @@ def formula(latex: str, display: str = "block") -> Markup:
     """Return the MathML of a formula."""
     from latex2mathml.converter import convert
 
-    return Markup(convert(latex, display=display))
+    return Markup(_shortened(convert(latex, display=display)))
+
+
+def _shortened(mathml: str) -> str:
+    """The same formula in half the bytes: signs as themselves, no group of one, no namespace that HTML implies."""
+    text = _REFERENCE.sub(lambda reference: str(escape(chr(int(reference.group(1), 16)))), mathml)
+    text = _GROUP_OF_ONE.sub(r"\1", text.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
+    return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
 
 
 def prose(text: str) -> Markup:

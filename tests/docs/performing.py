@@ -55,7 +55,11 @@ def _command(words: list[str]) -> None:
     if words[0] == "iapb":
         from reports.cli import main
 
-        main(words[1:])
+        told = io.StringIO()
+        with redirect_stderr(told):
+            failed = main(words[1:])
+        if failed:
+            print(_without_progress(told.getvalue()), end="")
     elif words[0] == "cat":
         print(Path(words[1]).read_text(encoding="utf-8"), end="")
     elif words[0] == "pytest":
@@ -64,6 +68,11 @@ def _command(words: list[str]) -> None:
         pytest.main(["-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", *words[1:]])
     else:
         raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
+
+
+def _without_progress(told: str) -> str:
+    """What a command complains about; how far it is is no part of a document."""
+    return "".join(line for line in told.splitlines(keepends=True) if not line.endswith(" ...\n"))
 
 
 def apply_diff(path: Path, text: str) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import pytest
 
@@ -231,9 +233,11 @@ def test_ctrl_c_outside_a_run_is_told_and_ends_with_130(iapb, monkeypatch):
     assert status == 130 and err == "iapb: stopped; what was finished is kept.\n"
 
 
-def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(tmp_path):
+@pytest.mark.parametrize("of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"])
+def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, tmp_path):
     command = [sys.executable, "-m", "reports.cli", "live", "peg_corner", "--seconds", "600", "--out", str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    start = partial(signal.signal, signal.SIGINT, of_ctrl_c)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=start) as process:
         assert "Under way" in process.stdout.readline()
         time.sleep(1.0)
         process.terminate()

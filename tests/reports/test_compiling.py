@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 
+from iapb.compiled import Entry
 from iapb.scene_files import find_scene
 from iapb.simulation import Simulation, simulate
 from reports.compiling import BEGIN, compiling_told, tell_from_worker
@@ -51,14 +52,15 @@ def test_the_times_of_a_run_leave_out_compiling(monkeypatch):
     import iapb.recorder
     import iapb.simulation
 
-    clock, calls, steps = [0.0], [], iapb.simulation.compiled_steps
+    clock, calls = [0.0], []
 
-    def slow_at_first(*arguments):
-        clock[0] += 1000.0 if not calls else 1.0
-        calls.append(arguments[-1])
-        return steps(*arguments)
+    class SlowAtFirst(Entry):
+        def __call__(self, *arguments):
+            clock[0] += 1000.0 if not calls else 1.0
+            calls.append(arguments[-1])
+            return super().__call__(*arguments)
 
-    monkeypatch.setattr(iapb.simulation, "compiled_steps", slow_at_first)
+    monkeypatch.setattr(iapb.simulation, "Entry", SlowAtFirst)
     monkeypatch.setattr(iapb.recorder.time, "perf_counter", lambda: clock[0])
     run = simulate(find_scene("peg_corner"), steps=600)
     assert calls == [0, 512, 88] and run.chunk_seconds.tolist() == [1.0, 1.0]

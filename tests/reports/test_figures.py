@@ -144,6 +144,21 @@ def test_rounding_coordinates_leaves_the_numbers_on_the_axes_alone() -> None:
     assert not re.search(r'="[^"]*\d\.\d{3}', figure.panels[0].svg)
 
 
+def test_markers_of_one_style_say_it_once_and_every_one_of_another_keeps_its_own() -> None:
+    from matplotlib.figure import Figure as Drawing
+
+    from reports.figures.svg import to_svg
+
+    drawing = Drawing()
+    axes = drawing.subplots()
+    axes.scatter(range(20), range(20), color=["#112233"] * 10 + ["#445566"] * 10)
+    root = ElementTree.fromstring(to_svg(drawing, "key"))
+    markers = {colour: [use for group in root.iter() if colour in group.get("style", "") for use in
+                        group.iter("{http://www.w3.org/2000/svg}use")] for colour in ("#112233", "#445566")}
+    assert [len(found) for found in markers.values()] == [10, 10]
+    assert not any(use.get("style") for found in markers.values() for use in found)
+
+
 def test_a_map_counts_what_holds() -> None:
     figure = condition_map("m", "t", "c", ("x", [0, 1, 1]), ("y", [0, 0, 0]), [True, False, True])
     assert "2 of 3" in figure.panels[0].alt

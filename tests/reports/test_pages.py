@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,7 +18,7 @@ from reports.evidence.verdicts import verdicts as first_page
 from reports.figures.fig03_energy_loss import arm_energies
 from reports.figures.figure import Numbers
 from reports.pages.builder import OUTCOME_MARKS
-from reports.pages.formulas import prose
+from reports.pages.formulas import formula, prose
 from reports.pages.records import (
     LIMITED,
     OUTCOMES,
@@ -137,6 +138,16 @@ def test_what_was_not_computed_is_said() -> None:
 
 def test_a_page_repeats_byte_for_byte(full: Evidence) -> None:
     assert build_report(full) == build_report(full)
+
+
+def test_a_short_formula_has_the_signs_of_the_long_one() -> None:
+    from latex2mathml.converter import convert
+
+    latex = r"0 \le p < 1, \quad J^{\top} p \, = \, x \& y"
+    long, short = (ElementTree.fromstring(text.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
+                   for text in (convert(latex), str(formula(latex))))
+    assert [piece.strip() for piece in short.itertext()] == [piece.strip() for piece in long.itertext()]
+    assert len(str(formula(latex))) < 0.8 * len(convert(latex))
 
 
 def test_text_is_escaped_and_formulas_are_not(full: Evidence) -> None:
