@@ -49,10 +49,14 @@ class WholeLibrary(JITCodeLibrary):
         ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
-        """LLVM's whole pipeline; what came from other libraries becomes a part of this one that nobody else calls."""
+        """LLVM's whole pipeline; what came from other libraries becomes a part of this one that nobody else calls.
+
+        Private, not internal: the loader takes an internal function for that of the same name in another library, while
+        LLVM may have changed how it is called.
+        """
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = "internal"
+                function.linkage = "private"
         tuning = llvm.create_pipeline_tuning_options(speed_level=3)
         tuning.loop_vectorization, tuning.inlining_threshold = True, _INLINE_UP_TO
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)

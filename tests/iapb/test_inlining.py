@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from numba.core import config
@@ -68,6 +69,17 @@ def test_a_constant_argument_makes_no_version_of_its_own() -> None:
     _sum(np.ones(2))
     assert bitcode_versions(_entry) == 1
     assert bitcode_versions(_squared_if) == 1
+
+
+def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loader would take it for its own of that name, though LLVM may have changed how it is called."""
+    monkeypatch.setattr("iapb.inlining._INLINE_UP_TO", -10_000)
+    caller = compile_as_whole(_sum.py_func)
+    assert caller(np.array([1.0, 2.0])) == 4.0
+    (version,) = caller.overloads.values()
+    parts = [part for part in version.library._final_module.functions if not part.is_declaration]
+    kept = [part for part in parts if "_sum" not in part.name]
+    assert kept and all(part.linkage == llvm.Linkage.private for part in kept)
 
 
 def test_python_can_call_the_inner_kernel_too() -> None:

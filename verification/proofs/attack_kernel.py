@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from iapb.compiled import kernel
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 
 
@@ -14,7 +14,7 @@ def resolve_batch(mass_matrix, lower, columns, velocity, restitution, v_plus) ->
     _resolve(mass_matrix, lower, columns, velocity, restitution, make_impact_work(d, c), np.empty(d), v_plus)
 
 
-@numba.njit(cache=True, fastmath=False)
+@kernel
 def _resolve(mass_matrix, lower, columns, velocity, restitution, work, momentum, v_plus):  # type: ignore[no-untyped-def]
     d, c = columns.shape[1], columns.shape[2]
     for n in range(velocity.shape[0]):
