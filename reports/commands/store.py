@@ -49,7 +49,7 @@ def _check(where: Path, _: bool) -> None:
         states = check_store(where, lambda done, total: progress("files read whole", done, total))
     _tell(states)
     if any(state.state == DAMAGED for state in states):
-        print("Set the damaged files aside, to be computed again, with: iapb store repair")
+        print(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
         raise typer.Exit(1)
 
 

@@ -26,7 +26,7 @@ from reports.figures.style import (
 )
 from reports.figures.svg import to_svg
 
-KEY, TITLE = "scene-ledger", "Every scene at a glance"
+KEY, TITLE = "every-scene", "Every scene at a glance"
 CONTACTS, OVER_TIME = "scene-ledger/contact and time", "scene-ledger/books over time"
 CAPTION = (
     "A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by the "

@@ -166,7 +166,7 @@ class _Loop:
         """(n, k, 3) of the held body, of all bodies without a hand [m]."""
         system = self.simulation.system
         bodies = slice(None) if system.tool_tree < 0 else slice(system._held_body(), system._held_body() + 1)
-        return np.array([system.mechanism.placements(q)[1][bodies] for q in self.q])
+        return np.array([_points(system.mechanism, q, bodies) for q in self.q])
 
     def device_places(self) -> Floats:
         """(n, k, 3) of the device's bodies [m]; empty without a device."""
@@ -179,6 +179,20 @@ class _Loop:
         """(n,) [J]."""
         mechanism = self.simulation.system.mechanism
         return np.array([mechanism.kinetic_energy(q, v) for q, v in zip(self.q, self.v, strict=True)])
+
+
+def _points(mechanism: Any, q: Floats, bodies: slice) -> Floats:
+    """Four points of each body [m]: its centre of mass, and a radius of gyration from there along each of its axes.
+
+    The origin alone would not do: that of a hinged body lies in the hinge and never moves.
+    """
+    found = []
+    rotation, position = mechanism.placements(q)
+    for body, R, p in zip(mechanism.bodies[bodies], rotation[bodies], position[bodies], strict=True):
+        radius = float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass))) if body.mass > 0.0 else 0.0
+        center = p + R @ np.asarray(body.center_of_mass)
+        found += [center, *(center + radius * R.T)]
+    return np.array(found)
 
 
 def _values(scene: Scene, variant: Variant) -> dict[str, Any]:

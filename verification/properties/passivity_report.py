@@ -91,6 +91,10 @@ class PassivityReport:
             return ""
         return as_test(self.counterexample, self.counterexample_law, self.bounds, self.tested)
 
+    def __repr__(self) -> str:
+        """The same text: pytest shows the repr of what stands behind an `assert ..., report`."""
+        return str(self)
+
     def __str__(self) -> str:
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
         lines = [f"{self.resolver}: {word} on {self.impacts} impacts"]

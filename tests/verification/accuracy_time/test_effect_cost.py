@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -41,3 +43,16 @@ def test_words_carry_the_numbers() -> None:
     assert "+25 %" in cost and "2.00 µs" in cost
     assert "3 mm" in change and "device 1 mm" in change and "50 %" in change
     assert in_words(EffectMeasure("a", np.nan, np.nan, np.nan, np.nan, np.nan, "no run")) == ("", "no run")
+
+
+def test_a_hinged_rod_goes_elsewhere_though_its_hinge_stays(tmp_path: Path) -> None:
+    """Without gravity it hangs in the air; with it a point r away from the hinge falls by ½ α t² r at first."""
+    (tmp_path / "rod.yaml").write_text(
+        "{name: rod, title: A hinged rod, rate: 1000, duration: 0.1, gravity: [0, -9.81], bodies: [{name: rod, "
+        "joint: revolute, mass: 0.5, inertia: 1e-2, center_of_mass: [0.3, 0], "
+        "shapes: [{kind: circle, radius: 0.02}]}]}"
+    )
+    found = {one.effect: one for one in measure_effects(load_scene(tmp_path / "rod.yaml"), pairs=1)}
+    acceleration = 0.5 * 9.81 * 0.3 / (1e-2 + 0.5 * 0.3**2)
+    farthest = 0.3 + np.sqrt(1e-2 / 0.5)  # the point a radius of gyration beyond the centre of mass
+    assert found["gravity"].position == pytest.approx(0.5 * acceleration * 0.1**2 * farthest, rel=0.03)

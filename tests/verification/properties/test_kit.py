@@ -137,3 +137,9 @@ def test_a_partial_is_pasted_with_its_options() -> None:
 def test_the_same_seed_gives_the_same_report() -> None:
     first, second = (check_passivity(sound_resolver, impacts=40, seed=3) for _ in range(2))
     assert [v.worst for v in first.verdicts] == [v.worst for v in second.verdicts]
+
+
+def test_a_failed_assertion_shows_the_whole_report() -> None:
+    """What pytest prints for `assert report.passed, report` is the report's repr."""
+    report = check_passivity(lambda mass, jacobian, velocity, restitution: 2.0 * velocity, impacts=20)
+    assert repr(report) == str(report) and "counterexample to" in repr(report)
