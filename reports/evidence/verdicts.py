@@ -98,5 +98,7 @@ def _topics(evidence: Evidence) -> Iterator[Verdict]:
     for topic in evidence.topics:
         if topic.verdict:
             outcome = min((finding.outcome for finding in topic.findings), key=_WORST_FIRST.index)
+            if topic.failures and outcome == REPRODUCED:
+                outcome = NOT_COMPUTED  # what failed never counts as holding
             timed = any(finding.timed for finding in topic.findings)
             yield Verdict(topic.title, outcome, topic.verdict, topic.id, timed)

@@ -7,11 +7,12 @@ dollar signs. `outcome` is one of OUTCOMES.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from reports.figures.figure import Figure, Numbers
+from verification.finding import Failure
 from verification.proofs.statement import ProofRecord
 
 REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = (
@@ -138,6 +139,7 @@ class Topic:
     tables : by name; a figure asks for one as "<id>/<name>", and those that none asks for are printed
     verdict : the sentence of the first page, empty for none; its outcome is the worst of the findings
     failed : nothing was found, because computing it stopped
+    failures : the cases that raised; their rows are missing from the tables
     """
 
     id: str
@@ -147,6 +149,23 @@ class Topic:
     tables: Mapping[str, Numbers] = field(default_factory=dict)
     verdict: str = ""
     failed: bool = False
+    failures: tuple[Failure, ...] = ()
+
+
+def with_failures(topic: Topic, failures: Sequence[Failure]) -> Topic:
+    """Return the topic with the cases that failed: a finding, a table with the reasons, and a word in its verdict."""
+    if not failures:
+        return topic
+    count = len(failures)
+    said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
+    sentence = f"{said} in no other number: {', '.join(failure.case for failure in failures)}."
+    rows = tuple((failure.case, failure.error, failure.reason) for failure in failures)
+    return replace(
+        topic, findings=(*topic.findings, Finding(sentence, NOT_COMPUTED)),
+        tables={**topic.tables, "not computed": Numbers(("case", "error", "reason"), rows)},
+        verdict=f"{topic.verdict} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
+        failures=(*topic.failures, *failures),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
