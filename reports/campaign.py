@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.store_keys import canonical_json, code_version
-from reports.store_tables import Column, Table, read_table, write_table
+from reports.store.keys import canonical_json, code_version
+from reports.store.tables import Column, Table, read_table, write_table
 from reports.workers import worker_pool
 
 if TYPE_CHECKING:

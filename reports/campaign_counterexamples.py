@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from iapb.errors import IapbError, RunFileError
-from reports.store_keys import plain
-from reports.store_tables import Column, Table, read_table, write_table
+from reports.store.keys import plain
+from reports.store.tables import Column, Table, read_table, write_table
 
 if TYPE_CHECKING:
     from reports.campaign import CampaignRequest
@@ -80,9 +80,9 @@ def _write_fclib(path: Path, case: ImpactCase) -> None:
 
 def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
     """Judge a counterexample again: an impact by its resolver, a run as recorded and as it comes out now."""
+    from reports.store.io import opened
+    from reports.store.tables import TABLE_FORMAT
     from reports.store_impact import read_broken_impact
-    from reports.store_read import opened
-    from reports.store_tables import TABLE_FORMAT
 
     if not path.is_file():
         raise RunFileError(f"{path}: no such file")

@@ -12,7 +12,7 @@ from typing import Any
 from iapb.errors import ArgumentError, RunFileError
 from reports.figures.figure import Figure, Numbers
 from reports.pages.records import Evidence
-from reports.store_keys import plain
+from reports.store.keys import plain
 
 NUMBERS_NAME = "numbers.json"
 FORMAT, FORMAT_VERSION = "iapb numbers", 2

@@ -49,8 +49,8 @@ def repeat_run(path: Path | str) -> Repetition:
         Its law or coupling is not one of ours: it cannot be made again from the file alone.
     """
     from iapb.simulation import simulate
-    from reports.store_keys import content_hash
-    from reports.store_read import read_run
+    from reports.store.keys import content_hash
+    from reports.store.runs import read_run
 
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
@@ -105,7 +105,7 @@ def differences(stored: Run, again: Run) -> tuple[str, ...]:
     """Names of the results that are not the same bit for bit."""
     import numpy as np
 
-    from reports.store_layout import GROUPS, RESULT_GROUPS
+    from reports.store.schema import GROUPS, RESULT_GROUPS
 
     found = []
     for group in RESULT_GROUPS:

@@ -23,9 +23,8 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.run import ContactTable, ImpactTable, Run
-from reports.store_datasets import read_values, write_quantity, write_scale, write_text
-from reports.store_read import opened
-from reports.store_write import write_run
+from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
+from reports.store.runs import write_run
 
 if TYPE_CHECKING:
     from verification.properties.case import Floats, ImpactCase

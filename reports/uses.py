@@ -41,7 +41,7 @@ class UsedRun:
 
 def read_use(path: Path, name: str, command: str) -> UsedRun:
     """Return the run in a file, used by nobody yet."""
-    from reports.store_read import read_head
+    from reports.store.runs import read_head
 
     head = read_head(path)
     return UsedRun(name, path.name, str(head["run_key"]), str(head["content_hash"]),

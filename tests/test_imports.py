@@ -44,7 +44,7 @@ def test_importing_the_package_is_cheap() -> None:
 
 
 def test_the_store_waits_with_the_heavy_packages() -> None:
-    loaded = modules_after("import reports.store, reports.store_tables, reports.provenance")
+    loaded = modules_after("import reports.store, reports.provenance")
     assert not loaded & set(HEAVY)
 
 

@@ -15,8 +15,8 @@ def inspect(
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
     from reports.commands.inspect_impact import describe_impact
     from reports.commands.run import describe
+    from reports.store.runs import read_head, read_provenance, read_run
     from reports.store_impact import read_broken_impact
-    from reports.store_read import read_head, read_provenance, read_run
 
     run, head = read_run(file), read_head(file)
     broken = read_broken_impact(file)

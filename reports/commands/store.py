@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from reports.store_care import FileState
+    from reports.store.care import FileState
 
 
 class Action(StrEnum):
@@ -43,7 +43,7 @@ def store(
 
 def _check(where: Path, _: bool) -> None:
     from reports.commands.progress import stage_progress
-    from reports.store_care import DAMAGED, check_store
+    from reports.store.care import DAMAGED, check_store
 
     with stage_progress() as progress:
         states = check_store(where, lambda done, total: progress("files read whole", done, total))
@@ -55,7 +55,7 @@ def _check(where: Path, _: bool) -> None:
 
 def _repair(where: Path, _: bool) -> None:
     from reports.commands.progress import stage_progress
-    from reports.store_care import DAMAGED, repair_store
+    from reports.store.care import DAMAGED, repair_store
 
     with stage_progress() as progress:
         states = repair_store(where, lambda done, total: progress("files read whole", done, total))
@@ -67,7 +67,7 @@ def _repair(where: Path, _: bool) -> None:
 def _tell(states: Sequence[FileState]) -> None:
     from collections import Counter
 
-    from reports.store_care import WHOLE
+    from reports.store.care import WHOLE
 
     for state in states:
         if state.state != WHOLE:
@@ -78,7 +78,7 @@ def _tell(states: Sequence[FileState]) -> None:
 
 
 def _gc(where: Path, dry_run: bool) -> None:
-    from reports.store_care import collect_garbage, garbage
+    from reports.store.care import collect_garbage, garbage
 
     found = garbage(where)
     size = sum(state.size for state in found) / 1e6

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from reports.evidence.stage import Stage
 from reports.pages.records import StoredFile
-from reports.store_read import opened
+from reports.store.io import opened
 from reports.uses import UsedRun
 
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since

@@ -19,8 +19,8 @@ import numpy as np
 from iapb.scene_files import scene_folder
 from reports.evidence.tables import numbers_tables
 from reports.runner import Runner
-from reports.store_keys import canonical_json, code_version, plain
-from reports.store_tables import Column, Table, read_tables, write_tables
+from reports.store.keys import canonical_json, code_version, plain
+from reports.store.tables import Column, Table, read_tables, write_tables
 from reports.uses import UsedRun, add_use
 
 _RECORDS, _RUNS = "records", "runs used"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from reports.figures.figure import Numbers
-from reports.store_tables import Column, Table
+from reports.store.tables import Column, Table
 
 
 def numbers_tables(records: Any) -> tuple[Table, ...]:

@@ -10,10 +10,10 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from reports.faults.sample import inputs_of, numbered, open_store
-from reports.store_keys import content_hash
-from reports.store_layout import FORMAT_VERSION
-from reports.store_read import read_run
-from reports.store_seal import seal
+from reports.store.io import seal
+from reports.store.keys import content_hash
+from reports.store.runs import read_run
+from reports.store.schema import FORMAT_VERSION
 
 
 def damaged_byte(folder: Path, times: int) -> tuple[int, int, int, str]:

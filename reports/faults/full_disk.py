@@ -13,7 +13,7 @@ import numpy as np
 
 from iapb.errors import IapbError
 from reports.faults.sample import in_child, inputs_of, numbered, open_store, sample_run, whole
-from reports.store_care import DAMAGED, check_store
+from reports.store.care import DAMAGED, check_store
 
 
 def full_disk(folder: Path, times: int) -> tuple[int, int, int, str]:

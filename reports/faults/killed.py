@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from reports.faults.sample import in_child, inputs_of, numbered, open_store, sample_run, whole
-from reports.store_care import DAMAGED, check_store
+from reports.store.care import DAMAGED, check_store
 
 _FINISHED = "finished"
 _LONGEST = 0.25  # [s]: a dozen runs are stored in that time

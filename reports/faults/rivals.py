@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from reports.faults.sample import in_child, inputs_of, numbered, open_store, sample_run, whole
-from reports.store_care import WHOLE, check_store
+from reports.store.care import WHOLE, check_store
 
 _RUNS = 3  # per attempt
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from iapb.run import Run
 from reports.store import RunStore, read_run
-from reports.store_keys import content_hash
+from reports.store.keys import content_hash
 
 
 @cache

@@ -129,7 +129,7 @@ def _read_results(path: Path) -> None:
 
     from iapb.errors import RunFileError
     from reports.commands.inspect import inspect
-    from reports.store_tables import read_table
+    from reports.store.tables import read_table
 
     try:
         with contextlib.redirect_stdout(io.StringIO()):

@@ -66,7 +66,7 @@ def _write_global(path: Path, rng: Rng) -> None:
 def result_files() -> dict[str, bytes]:
     """A short run, and a table."""
     from reports.faults.sample import inputs_of, open_store, sample_run
-    from reports.store_tables import Column, Table, write_table
+    from reports.store.tables import Column, Table, write_table
 
     with tempfile.TemporaryDirectory() as folder:
         run = open_store(folder_path := Path(folder)).put(inputs_of(0), sample_run(), "sample")
@@ -82,7 +82,7 @@ def damaged_hdf5(sample: bytes, other: bytes, rng: Rng) -> bytes:
 
 def damaged_hdf5_sealed(sample: bytes, other: bytes, rng: Rng) -> bytes:
     """Damage to what the file says, under a seal that is right: somebody else's program wrote it."""
-    from reports.store_seal import seal
+    from reports.store.io import seal
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "sealed.h5"

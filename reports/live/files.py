@@ -9,9 +9,8 @@ import numpy as np
 
 from reports.live.deadline import Timetable
 from reports.live.loop import LiveRun
-from reports.store_read import read_run
-from reports.store_tables import Column, Table, read_tables, write_tables
-from reports.store_write import write_run
+from reports.store.runs import read_run, write_run
+from reports.store.tables import Column, Table, read_tables, write_tables
 
 _WRENCH = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
 _SUFFIX = "-timetable.h5"

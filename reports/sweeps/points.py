@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.store_keys import canonical_json
+from reports.store.keys import canonical_json
 from reports.sweeps.study import Study
 
 LAW = "law."  # paths below it are settings of the contact law

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from reports.store_files import remove_abandoned
-from reports.store_keys import code_version
-from reports.store_tables import Column, Table, write_table
+from reports.store.io import remove_abandoned
+from reports.store.keys import code_version
+from reports.store.tables import Column, Table, write_table
 from reports.sweeps.points import Point, points_of
 from reports.sweeps.schedule import Scheduler, here
 from reports.sweeps.study import Study

@@ -13,7 +13,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
-from reports.store_keys import code_version, content_hash, run_key
+from reports.store.keys import code_version, content_hash, run_key
 from reports.sweeps.points import Point
 
 DONE, FAILED = "done", "failed"
@@ -69,8 +69,7 @@ def _run(point: Point, folder: Path) -> tuple[Run, Path]:
     from iapb.simulation import simulate
     from reference.one_thread import one_thread
     from reference.worlds import find_world, require_complete
-    from reports.store_read import read_run
-    from reports.store_write import write_run
+    from reports.store.runs import read_run, write_run
 
     scene = _scene(point.scene).with_values(point.values)
     world = find_world(point.world, point.rendering)

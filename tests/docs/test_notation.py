@@ -8,7 +8,7 @@ import pytest
 from blocks import PACKAGES, ROOT
 
 from iapb import find_scene, simulate
-from reports.store_layout import GROUPS
+from reports.store.schema import GROUPS
 
 PAGE = (ROOT / "docs/notation.md").read_text(encoding="utf-8")
 QUANTITIES = [(group, quantity) for group, (quantities, _, _) in GROUPS.items() for quantity in quantities]

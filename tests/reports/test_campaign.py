@@ -16,7 +16,7 @@ from iapb.errors import RunFileError
 from reports.campaign import Campaign, CampaignRequest
 from reports.campaign_counterexamples import keep_counterexample, recheck
 from reports.cli import main
-from reports.store_tables import read_table
+from reports.store.tables import read_table
 from verification.properties.campaign import (
     IMPACTS,
     TRAJECTORIES,

@@ -244,7 +244,7 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
     (("sliding_box", "--world", "IAPB-friction"), "impulse-augmented penalty with impact friction", "impact_friction"),
 ])  # fmt: skip
 def test_extensions_of_the_law_run_by_name_and_say_so_in_the_file(arguments, law, effect, iapb, tmp_path):
-    from reports.store_read import read_run
+    from reports.store.runs import read_run
 
     status, out, _ = iapb("run", *arguments, "--out", tmp_path, "--set", "duration=0.02")
     assert status == 0 and f": {law}, coupling none." in out

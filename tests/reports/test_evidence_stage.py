@@ -17,7 +17,7 @@ from reports.evidence.stage import Stage, plain_records
 from reports.evidence.tables import numbers_table, numbers_tables
 from reports.figures.figure import Numbers
 from reports.runner import Runner
-from reports.store_tables import read_table
+from reports.store.tables import read_table
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: py
 
 def _readable(path: Path) -> bool:
     from iapb.errors import RunFileError
-    from reports.store_read import read_run
+    from reports.store.runs import read_run
 
     try:
         read_run(path)

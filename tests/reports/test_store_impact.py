@@ -16,8 +16,8 @@ from reports.campaign import Campaign, CampaignRequest
 from reports.campaign_counterexamples import keep_counterexample, recheck
 from reports.cli import main
 from reports.store import read_run
-from reports.store_care import PARTIAL, check_store
-from reports.store_datasets import new_file
+from reports.store.care import PARTIAL, check_store
+from reports.store.io import new_file
 from reports.store_impact import read_broken_impact
 from verification.properties.campaign import IMPACTS, UNEQUAL, Batch, Found, drawn
 from verification.properties.case import ImpactCase, LawResidual

@@ -8,7 +8,7 @@ import pytest
 from reports import cli
 from reports.live.files import read_live
 from reports.live.replay import replay
-from reports.store_keys import content_hash
+from reports.store.keys import content_hash
 
 
 @pytest.fixture

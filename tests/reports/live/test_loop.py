@@ -15,7 +15,7 @@ from reports.live.loop import Loop
 from reports.live.measure import rows_left_out, summary
 from reports.live.replay import replay
 from reports.live.setup import made_device
-from reports.store_keys import content_hash
+from reports.store.keys import content_hash
 
 PERIOD = 1e-3
 TICKS = 700  # more than one chunk of the record

@@ -15,7 +15,7 @@ from reports.live.loop import Loop
 from reports.live.replay import replay
 from reports.live.viewer import Viewer
 from reports.live.window import SILENCE_SECONDS, Window
-from reports.store_keys import content_hash
+from reports.store.keys import content_hash
 
 TICKS = 60
 

@@ -14,7 +14,7 @@ import pytest
 
 from iapb import find_scene
 from iapb.errors import ArgumentError, IapbError
-from reports.store_tables import read_table
+from reports.store.tables import read_table
 from reports.sweeps.points import Point
 from reports.sweeps.schedule import cluster, here, processes
 from reports.sweeps.study import Study, study_from_text

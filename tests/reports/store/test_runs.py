@@ -18,9 +18,9 @@ from iapb.errors import RunFileError
 from iapb.run import Run
 from reports.provenance import collect_provenance
 from reports.store import read_run, write_run
-from reports.store_keys import content_hash
-from reports.store_read import read_provenance
-from reports.store_seal import seal
+from reports.store.io import seal
+from reports.store.keys import content_hash
+from reports.store.runs import read_provenance
 
 MakeRun = Callable[..., Run]
 
@@ -204,5 +204,5 @@ def test_provenance_is_complete_and_names_no_machine(tmp_path: Path, make_run: M
     import platform
 
     text = " ".join(facts.values())
-    assert str(Path(__file__).parents[2]) not in text and str(Path.home()) not in text
+    assert str(Path(__file__).parents[3]) not in text and str(Path.home()) not in text
     assert platform.node() == "" or platform.node() not in text.split()

@@ -19,17 +19,17 @@ import numpy as np
 from iapb.errors import ArgumentError, RunFileError
 from iapb.names import one_of
 from reports.provenance import collect_provenance
-from reports.store_datasets import (
+from reports.store.io import (
     mark_plottable,
     new_file,
+    opened,
     read_values,
     write_quantity,
     write_scale,
     write_text,
 )
-from reports.store_keys import add_array
-from reports.store_layout import FORMAT_VERSION
-from reports.store_read import opened
+from reports.store.keys import add_array
+from reports.store.schema import FORMAT_VERSION
 
 TABLE_FORMAT = "iapb table"
 ROW = "row"

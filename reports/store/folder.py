@@ -13,24 +13,24 @@ fixed share of the time at most is the checkpoint's own business (see `Checkpoin
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store_files import remove_abandoned
-from reports.store_index import RunEntry, add_to_index, read_index
-from reports.store_keys import run_key
-from reports.store_read import read_head, read_run
-from reports.store_write import write_run
-
-__all__ = ["Checkpoint", "RunEntry", "RunStore", "read_run", "run_key", "write_run"]
+from reports.store.io import remove_abandoned, written_aside
+from reports.store.keys import run_key
+from reports.store.runs import read_head, read_run, write_run
 
 PARTIAL_SUFFIX = ".partial"
+INDEX_NAME = "index.jsonl"
 _KEY_DIGITS = 16  # 64 bits in the name: a chance hit among a million runs is below 1e-7; the file holds all 256
 # Between two checkpoints pass at least this long, and this many times what the last one took.
 _SHORTEST_PAUSE_SECONDS = 5.0
@@ -180,3 +180,64 @@ class RunStore:
 
 def _file_name(label: str) -> str:
     return re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run"
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """One line of the index."""
+
+    file: str  # name within the folder
+    title: str  # scene and world
+    run_key: str
+    content_hash: str
+    status: str
+
+
+def entry_of(path: Path) -> RunEntry:
+    """Return the entry of a run file, from its attributes."""
+    head = read_head(path)
+    return RunEntry(
+        path.name, str(head["title"]), str(head["run_key"]), str(head["content_hash"]), str(head["status"])
+    )
+
+
+def add_to_index(folder: Path, path: Path) -> None:
+    """Append the entry of a new file; one short write, so that several processes may do it at once."""
+    line = json.dumps(asdict(entry_of(path)), ensure_ascii=False) + "\n"
+    handle = os.open(folder / INDEX_NAME, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        os.write(handle, line.encode())
+    finally:
+        os.close(handle)
+
+
+def read_index(folder: Path) -> tuple[RunEntry, ...]:
+    """Return the entries of all run files in `folder`, by file name; the files decide, not the index."""
+    listed = _lines(folder / INDEX_NAME)
+    files = sorted(folder.glob("*.h5"))
+    entries = []
+    for path in files:
+        if path.name in listed:
+            entries.append(listed[path.name])
+        else:
+            with suppress(RunFileError):  # a table, or damaged: not a run
+                entries.append(entry_of(path))
+    if {entry.file for entry in entries} != set(listed):
+        _write_index(folder, entries)
+    return tuple(entries)
+
+
+def _lines(index: Path) -> dict[str, RunEntry]:
+    entries: dict[str, RunEntry] = {}
+    if index.is_file():
+        for line in index.read_text(encoding="utf-8").splitlines():
+            with suppress(ValueError, TypeError):  # a line cut off by a crash
+                entry = RunEntry(**json.loads(line))
+                entries[entry.file] = entry
+    return entries
+
+
+def _write_index(folder: Path, entries: list[RunEntry]) -> None:
+    text = "".join(json.dumps(asdict(entry), ensure_ascii=False) + "\n" for entry in entries)
+    with written_aside(folder / INDEX_NAME, replace=True) as aside:
+        aside.write_text(text, encoding="utf-8")

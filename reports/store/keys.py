@@ -14,7 +14,7 @@ import numpy as np
 
 from iapb.errors import ArgumentError
 from iapb.run import Run
-from reports.store_layout import GROUPS, RESULT_GROUPS
+from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # What can change a number in a run: the engine, the reference worlds, and the numeric packages under them.
 _SOURCES = ("iapb", "reference")
@@ -47,7 +47,7 @@ def code_version() -> str:
     a change of the report. Taken once per process, when first asked for.
     """
     digest = hashlib.sha256()
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     for package in _SOURCES:
         for path in sorted((root / package).rglob("*.py")):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")

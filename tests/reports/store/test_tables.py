@@ -10,8 +10,8 @@ import pytest
 import xarray
 
 from iapb.errors import ArgumentError, RunFileError
-from reports.store_seal import seal
-from reports.store_tables import Column, Table, read_table, read_tables, write_table, write_tables
+from reports.store.io import seal
+from reports.store.tables import Column, Table, read_table, read_tables, write_table, write_tables
 
 E = np.linspace(0, 1, 5)
 TABLE = Table(

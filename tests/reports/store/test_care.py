@@ -12,7 +12,7 @@ from reports.evidence.runs import shipped_scene
 from reports.resimulate import repeat_run
 from reports.runner import Runner
 from reports.store import write_run
-from reports.store_care import (
+from reports.store.care import (
     DAMAGED,
     DAMAGED_SUFFIX,
     FOREIGN,
@@ -25,7 +25,7 @@ from reports.store_care import (
     garbage,
     repair_store,
 )
-from reports.store_read import read_run
+from reports.store.runs import read_run
 
 SHORT = {"duration": 0.05}
 

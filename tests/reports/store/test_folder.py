@@ -16,8 +16,8 @@ import pytest
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store import Checkpoint, RunStore, read_run, run_key
-from reports.store_index import INDEX_NAME
-from reports.store_keys import content_hash
+from reports.store.folder import INDEX_NAME
+from reports.store.keys import content_hash
 
 MakeRun = Callable[..., Run]
 INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB", "settings": {"restitution": np.float64(0.0)}}
@@ -134,7 +134,7 @@ def test_a_killed_writer_leaves_its_last_checkpoint(tmp_path: Path, make_run: Ma
     runs = [make_run(steps=steps, seed=steps, complete=False) for steps in (50, 100, 150)]
     (tmp_path / "runs.pickle").write_bytes(pickle.dumps(runs))
     target = tmp_path / "run.h5.partial"
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     process = subprocess.Popen(
         [sys.executable, "-c", KILLED_WRITER, str(target), str(root), str(tmp_path / "runs.pickle")],
         stdout=subprocess.PIPE,

@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from iapb.errors import RunFileError
-from reports.store import PARTIAL_SUFFIX
-from reports.store_files import WRITING
-from reports.store_index import INDEX_NAME, read_index
-from reports.store_keys import run_key
-from reports.store_layout import FORMAT
-from reports.store_read import opened, read_head, read_run
+from reports.store.folder import INDEX_NAME, PARTIAL_SUFFIX, read_index
+from reports.store.io import WRITING, opened
+from reports.store.keys import run_key
+from reports.store.runs import read_head, read_run
+from reports.store.schema import FORMAT
 
 Progress = Callable[[int, int], None]
 
@@ -144,7 +143,7 @@ def _is_present_table(path: Path, version: str) -> bool:
     """Whether a stage of the present code has this file: its name ends with the stage's key."""
     import hashlib
 
-    from reports.store_keys import canonical_json
+    from reports.store.keys import canonical_json
 
     name, _, key = path.stem.rpartition("-")
     for depth in ("quick", "full"):

@@ -1,0 +1,265 @@
+"""Files of results: whole or not there, sealed by a checksum, HDF5 with units and dimension scales.
+
+A file is written aside, synced and renamed. Its seal is a checksum of the whole file, behind its end: HDF5's own
+checksums cover chunks of numbers and some metadata, and one wrong byte elsewhere can make the HDF5 library itself
+crash (seen: a double free, which ends the process). So a file is judged before the library sees it. HDF5 and
+everything built on it ignore what stands behind the end that the file states.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import RunFileError
+from reports.store.schema import FORMAT, FORMAT_VERSION
+
+WRITING = ".writing"  # ends the name of a file that is not yet whole
+# A write takes seconds; what is older than this was left by a writer that was killed.
+_ABANDONED_AFTER_SECONDS = 3600.0
+
+_MARK = b"\niapb sha256 "
+_LENGTH = len(_MARK) + 64 + 1  # the mark, 64 hexadecimal digits, a newline
+_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_BLOCK = 1 << 20
+# Chunks of about this size: small enough to look at a part, large enough to compress.
+_CHUNK_BYTES = 1 << 17
+_COMPRESSION_LEVEL = 4
+_MOST_PACKED = 1100  # times: deflate makes at most 1032 bytes of one
+_UNPACKED_SMALL = 1 << 20  # bytes that anything may state
+
+
+def sync(path: Path) -> None:
+    """Make sure that a file, or the entries of a folder, are on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
+    """Give a path to write to; afterwards move it to `target` in one step.
+
+    A crash at any moment leaves `target` as it was. With ``replace=False`` a target that exists by then
+    stays, and what was written aside is dropped: the first of two writers wins.
+    """
+    aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
+    try:
+        yield aside
+        sync(aside)
+        if replace:
+            os.replace(aside, target)
+        else:
+            _move_if_absent(aside, target)
+        sync(target.parent)
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def _move_if_absent(aside: Path, target: Path) -> None:
+    try:
+        os.link(aside, target)  # fails when the target exists, unlike a rename
+    except FileExistsError:
+        return
+    except OSError:  # a file system without hard links
+        if not target.exists():
+            os.rename(aside, target)
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove what killed writers left in `folder`; files of writers still at work are younger."""
+    for path in folder.glob(f".*{WRITING}"):
+        with suppress(FileNotFoundError):
+            if time.time() - path.stat().st_mtime > _ABANDONED_AFTER_SECONDS:
+                path.unlink()
+
+
+def seal(path: Path) -> None:
+    """Append the checksum of a file to it."""
+    mark = _MARK + _checksum(path, path.stat().st_size).encode() + b"\n"
+    with path.open("ab") as file:
+        file.write(mark)
+
+
+def check_seal(path: Path) -> None:
+    """Raise RunFileError unless `path` is an HDF5 file that is, to the byte, as it was sealed."""
+    with path.open("rb") as file:
+        if file.read(len(_HDF5_SIGNATURE)) != _HDF5_SIGNATURE:
+            raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
+    size = path.stat().st_size - _LENGTH
+    with path.open("rb") as file:
+        file.seek(max(size, 0))
+        mark = file.read()
+    if size < 0 or not mark.startswith(_MARK):
+        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or is not of iapb")
+    if mark != _MARK + _checksum(path, size).encode() + b"\n":
+        raise RunFileError(f"{path}: differs from its checksum, the file is damaged")
+
+
+def _checksum(path: Path, size: int) -> str:
+    """Return sha256 of the first `size` bytes."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while size > 0 and (block := file.read(min(_BLOCK, size))):
+            digest.update(block)
+            size -= len(block)
+    return digest.hexdigest()
+
+
+@contextmanager
+def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
+    """Give an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` in one step.
+
+    It is filled in memory, so that a disk that fails meets our write, not one somewhere inside the HDF5 library.
+
+    Raises
+    ------
+    RunFileError
+        If the disk or the folder does not take it; then nothing at `path` was changed.
+    """
+    import h5py
+
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with written_aside(path, replace=replace) as aside:
+            aside.write_bytes(image)
+            seal(aside)
+    except OSError as error:
+        why = error.strerror or error
+        raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
+
+
+@contextmanager
+def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
+    """Open a file of this project for reading; a format of None takes any.
+
+    Raises
+    ------
+    RunFileError
+        If the file is absent, is no HDF5 file, has another format, or fails in any way while it is read.
+    """
+    import h5py
+
+    path = Path(path)
+    if not path.is_file():
+        raise RunFileError(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
+    check_seal(path)
+    try:
+        with h5py.File(path, "r") as file:
+            if expected_format is not None:
+                _check_format(file, path, expected_format)
+            yield file
+    except RunFileError:
+        raise
+    except Exception as error:  # whole, but made by something else: can fail anywhere, with anything
+        raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
+
+
+def _check_format(file: Any, path: Path, expected: str) -> None:
+    found = file.attrs.get("format")
+    if found != expected:
+        raise RunFileError(f"{path}: format is {found!r}: expected {expected!r}")
+    version = int(file.attrs.get("format_version", 0))
+    if version > FORMAT_VERSION:
+        raise RunFileError(f"{path}: format version is {version}, of a later iapb: this one reads {FORMAT_VERSION}")
+    if version < FORMAT_VERSION:
+        raise RunFileError(f"{path}: format version is {version}, of an earlier iapb: this one reads {FORMAT_VERSION}; "
+                           "simulate the run again, it will be stored beside this file")
+
+
+def write_text(group: Any, name: str, text: str) -> None:
+    """Write one text of any length as a scalar UTF-8 dataset."""
+    import h5py
+
+    group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
+
+
+def write_values(group: Any, name: str, values: Any) -> Any:
+    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle, gzip and fletcher32."""
+    import h5py
+
+    array = np.asarray(values)
+    if array.dtype.kind in "UO" or (array.size == 0 and isinstance(values, tuple)):
+        texts = [str(value) for value in values]
+        return group.create_dataset(name, data=np.array(texts, object), dtype=h5py.string_dtype("utf-8"))
+    if array.dtype == np.bool_:
+        array = array.astype(np.uint8)  # netCDF has no truth values
+    return group.create_dataset(
+        name,
+        data=array,
+        chunks=_chunk_shape(array),
+        maxshape=(None,) * array.ndim if array.size == 0 else array.shape,
+        compression="gzip",
+        compression_opts=_COMPRESSION_LEVEL,
+        shuffle=True,
+        fletcher32=True,
+    )
+
+
+def _chunk_shape(array: np.ndarray) -> tuple[int, ...]:
+    width = max(int(np.prod(array.shape[1:])) * array.itemsize, 1)
+    rows = min(max(_CHUNK_BYTES // width, 1), max(array.shape[0], 1))
+    return (rows, *(max(length, 1) for length in array.shape[1:]))
+
+
+def write_scale(group: Any, dimension: str, values: Any, unit: str) -> None:
+    """Write the values along a dimension, and make them its scale."""
+    scale = write_values(group, dimension, values)
+    scale.attrs["units"] = unit
+    scale.make_scale(dimension)
+
+
+def write_quantity(
+    group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str
+) -> Any:
+    """Write one quantity; the scales of its dimensions must be in `group` already."""
+    dataset = write_values(group, name, values)
+    dataset.attrs["units"] = unit
+    dataset.attrs["long_name"] = meaning
+    for axis, dimension in enumerate(dimensions):
+        dataset.dims[axis].attach_scale(group[dimension])
+    return dataset
+
+
+def mark_plottable(group: Any, signal: str, axes: Sequence[str]) -> None:
+    """Make `group` an NXdata, so that a viewer knows what to draw; ``"."`` is an axis without values."""
+    import h5py
+
+    group.attrs["NX_class"] = "NXdata"
+    group.attrs["signal"] = signal
+    group.attrs.create("axes", list(axes), dtype=h5py.string_dtype("utf-8"))
+
+
+def read_values(group: Any, name: str, path: str) -> Any:
+    """Return a dataset of `group` as an array, or as a tuple of texts.
+
+    Raises
+    ------
+    RunFileError
+        If there is no such dataset, or it states more values than its bytes can hold.
+    """
+    import h5py
+
+    within = isinstance(group, h5py.Group)  # "in" would read a dataset through, however long it says it is
+    if not within or name not in group or not isinstance(group[name], h5py.Dataset):
+        raise RunFileError(f"{path}: {group.name}/{name} is missing")
+    dataset = group[name]
+    if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():
+        raise RunFileError(f"{path}: {group.name}/{name} states {dataset.size} values, more than its bytes can hold")
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        return dataset[()]
+    texts = dataset.asstr()[()]
+    return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
