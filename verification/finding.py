@@ -1,13 +1,160 @@
-"""What a study finds. A case that raises costs its own row: `attempt` records it as a Failure and the study goes on."""
+"""Finding: what a study found, the one record that every study returns and that reports store and print.
+
+A Finding answers a question by a sentence with its number, a verdict, the parts that were judged, and the tables
+behind them. A case that raises costs its own row: `attempt` records it as a Failure and the study goes on.
+Nothing here knows a page or a file.
+"""
 
 from __future__ import annotations
 
+import re
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
+Row = Mapping[str, Any]
+
+REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
+    "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
+)  # fmt: skip
+_WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
+HOLDS = "holds"  # heading of the outcomes, where a table is printed
+WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
+FAILED_CASES = "not computed"  # name of the table of cases that failed
+_UNIT = re.compile(r"^(?P<key>.*\S)\s*\[(?P<unit>[^\[\]]+)\]$")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity of every row.
+
+    key : by which code finds it; heading : in words, by default the key; unit : empty where there is none
+    condition : chosen, not measured; part : rows with the same value are judged apart
+    timed : a measured time, or made from some: it need not repeat
+    """
+
+    key: str
+    unit: str = ""
+    heading: str = ""
+    condition: bool = False
+    part: bool = False
+    timed: bool = False
+
+    @property
+    def title(self) -> str:
+        """Heading with its unit."""
+        words = self.heading or self.key
+        return f"{words} [{self.unit}]" if self.unit else words
+
+
+def columns(*titles: str, timed: Iterable[str] = ()) -> tuple[Column, ...]:
+    """Return columns from titles such as "step [ms]": the unit in brackets, the rest is heading and key.
+
+    `timed` names some of the keys.
+    """
+    found = (_UNIT.match(title) for title in titles)
+    pairs = [(m["key"], m["unit"]) if m else (title, "") for m, title in zip(found, titles, strict=True)]
+    measured = set(timed)
+    if unknown := measured - {key for key, _ in pairs}:
+        raise ValueError(f"timed columns {sorted(unknown)}: expected some of {[key for key, _ in pairs]}")
+    return tuple(Column(key, unit, timed=key in measured) for key, unit in pairs)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of numbers, texts or None ("does not apply"), with what each column is.
+
+    holds : per row, whether what is claimed held; None where the row cannot tell; empty where nothing is judged
+    digits : significant digits in print; note : printed below
+    timed_rows : which rows there are depends on measured times
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Any, ...], ...] = ()
+    holds: tuple[bool | None, ...] = ()
+    digits: int = 4
+    note: str = ""
+    timed_rows: bool = False
+
+    def column(self, key: str) -> list[Any]:
+        """Return the values of one column."""
+        index = self.keys.index(key)
+        return [row[index] for row in self.rows]
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows as dictionaries by key."""
+        return [dict(zip(self.keys, row, strict=True)) for row in self.rows]
+
+    def where(self, **values: Any) -> Table:
+        """Return the rows in which the named columns have these values."""
+        return self._only([all(row[key] == value for key, value in values.items()) for row in self.records()])
+
+    def that(self, outcome: bool | None) -> Table:
+        """Return the rows with this outcome."""
+        return self._only([held is outcome for held in self.holds])
+
+    def select(self, keys: Sequence[str]) -> Table:
+        """Return the table with these columns, in this order."""
+        at = [self.keys.index(key) for key in keys]
+        kept = tuple(tuple(row[k] for k in at) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
+
+    def without(self, *keys: str) -> Table:
+        """Return the table without these columns."""
+        return self.select([key for key in self.keys if key not in keys])
+
+    @property
+    def keys(self) -> list[str]:
+        """Key of each column."""
+        return [column.key for column in self.columns]
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Headings in print, the outcomes' last."""
+        return (*(column.title for column in self.columns), *([HOLDS] if self.holds else ()))
+
+    @property
+    def cells(self) -> tuple[tuple[Any, ...], ...]:
+        """Rows in print: each with its outcome in words, where there are outcomes."""
+        if not self.holds:
+            return self.rows
+        return tuple((*row, WORDS[held]) for row, held in zip(self.rows, self.holds, strict=True))
+
+    @property
+    def timed(self) -> tuple[str, ...]:
+        """Titles of what need not repeat; an outcome rests on all that is measured."""
+        found = tuple(column.title for column in self.columns if column.timed)
+        return (*found, HOLDS) if found and self.holds else found
+
+    def _only(self, kept: Sequence[bool]) -> Table:
+        rows = tuple(row for row, keep in zip(self.rows, kept, strict=True) if keep)
+        return replace(self, rows=rows, holds=tuple(h for h, keep in zip(self.holds, kept, strict=False) if keep))
+
+
+def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) -> Table:
+    """Return a table of these columns from dictionaries; what a dictionary lacks is None."""
+    rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
+    return Table(tuple(columns), rows, **options)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the answer that is judged by itself.
+
+    name : where the parts of one question are told apart; sentence : what was found, with its number
+    held, decided : trials in which it held, of those that could tell; fails : the conditions of those that fail
+    timed : measured times are in it
+    """
+
+    sentence: str
+    verdict: str
+    name: str = ""
+    held: int = 0
+    decided: int = 0
+    fails: str = ""
+    timed: bool = False
 
 
 @dataclass(frozen=True)
@@ -23,6 +170,64 @@ class Failure:
     error: str
     reason: str
     traceback: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a study found.
+
+    key : of the question, such as "C07" or "mechanics"; title : its heading
+    question : what is asked, and how; answer : what was found, in one sentence with its number
+    verdict : one of VERDICTS; parts : what it was made from
+    tables : by name; a figure asks for one as "<key>/<name>"
+    details : what else a reader needs, by label (place, tolerance, source, law ...)
+    axes : keys of the columns over which the outcome is best drawn: across, up, and what splits the maps
+    failures : the cases that raised; their rows are missing from the tables
+    timed : the verdict or the answer rests on measured times
+    """
+
+    key: str
+    title: str
+    question: str
+    answer: str
+    verdict: str
+    parts: tuple[Part, ...] = ()
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    details: Mapping[str, str] = field(default_factory=dict)
+    axes: tuple[str, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    timed: bool = False
+
+    @property
+    def computed(self) -> bool:
+        """Whether anything was found."""
+        return self.verdict != NOT_COMPUTED
+
+
+def worst(verdicts: Iterable[str]) -> str:
+    """Return the worst of some verdicts; NOT_COMPUTED for none."""
+    return min(verdicts, key=_WORST_FIRST.index, default=NOT_COMPUTED)
+
+
+def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
+    """Return the verdict of a finding: that of its worst part. What failed never counts as holding."""
+    found = worst(part.verdict for part in parts)
+    return NOT_COMPUTED if failures and found == REPRODUCED else found
+
+
+def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
+    """Return the finding with cases that failed: a part, a table of reasons, and a word in its answer."""
+    if not failures:
+        return finding
+    every, count = (*finding.failures, *failures), len(failures)
+    said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
+    part = Part(f"{said} in no other number: {', '.join(failure.case for failure in failures)}.", NOT_COMPUTED)
+    table = Table(columns("case", "error", "reason"), tuple((one.case, one.error, one.reason) for one in every))
+    return replace(
+        finding, parts=(*finding.parts, part), tables={**finding.tables, FAILED_CASES: table}, failures=every,
+        answer=f"{finding.answer} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
+        verdict=NOT_COMPUTED if finding.verdict == REPRODUCED else finding.verdict,
+    )  # fmt: skip
 
 
 def failure_of(case: str, error: Exception) -> Failure:

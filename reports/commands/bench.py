@@ -24,8 +24,8 @@ def bench(
     from reports.commands.progress import stage_progress
     from reports.evidence import accuracy
     from reports.evidence.haptic_rate import topic_of
-    from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED
     from verification.accuracy_time.study import haptic_study
+    from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 
     with stage_progress() as progress:
         topic = topic_of(haptic_study("full" if full else "quick", progress))

@@ -41,19 +41,12 @@ def as_record(result: Any) -> Claim:
     headline, table = "", result.table
     if result.decided:
         headline = f"holds in {result.held} of {result.decided} trials"
-    columns = tuple(column.heading for column in table.columns) + (("holds",) if table.holds else ())
-    timed = tuple(column.heading for column in table.columns if column.timed)
-    if timed and table.holds:
-        timed += ("holds",)
-    words = {True: "yes", False: "no", None: "cannot tell"}
-    rows = tuple(
-        (*row, words[held]) for row, held in zip(table.rows, table.holds, strict=True)
-    ) if table.holds else table.rows  # fmt: skip
     return Claim(
         id=result.id, statement=result.statement, place=result.place, outcome=result.verdict,
         headline=f"{result.finding} ({headline})" if headline else result.finding, quantity=result.quantity,
         conditions=result.conditions, tolerance=result.tolerance, fails=result.fails,
-        numbers=Numbers(columns, rows, timed=timed, timed_rows=bool(timed)), figure=_map(result),
+        numbers=Numbers(table.titles, table.cells, timed=table.timed, timed_rows=bool(table.timed)),
+        figure=_map(result),
     )  # fmt: skip
 
 
@@ -61,7 +54,7 @@ def _map(result: Any) -> Figure | None:
     """Where the claim holds, over its two telling conditions; none where it holds everywhere."""
     if result.map_axes is None or result.verdict == "reproduced" or not result.table.rows:
         return None
-    units = {column.name: column.heading for column in result.table.columns}
+    units = {column.key: column.title for column in result.table.columns}
     x, y = result.map_axes
     panels = _panel_names(result, units) if result.map_panels else None
     return condition_map(

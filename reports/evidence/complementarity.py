@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reports.evidence import complementarity_tables as tables
-from reports.pages.records import OUTCOMES, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import VERDICTS
 
 if TYPE_CHECKING:
     from verification.comparison.study import ComparisonStudy
@@ -60,6 +61,6 @@ def verdict(study: ComparisonStudy, findings: tuple[Finding, ...]) -> str:
     cases = sum(cell.cases for cell in cells)
     agree = sum(cell.agree * cell.cases for cell in cells) / cases
     against = sum(cell.contradictions for cell in cells)
-    held = sum(finding.outcome == OUTCOMES[0] for finding in findings)
+    held = sum(finding.outcome == VERDICTS[0] for finding in findings)
     return (f"IAPB moves as the Newton LCP in {agree:.0%} of {cases} impacts, and exactly where some p >= 0 gives its "
             f"motion ({against} exceptions); {held} of {len(findings)} findings hold without limits.")

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from reports.figures.figure import Numbers
-from reports.pages.records import LIMITED, NOT_TESTABLE, REPRODUCED, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED
 
 if TYPE_CHECKING:
     from verification.engines import EngineRecord

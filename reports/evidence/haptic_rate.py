@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from reports.evidence import haptic_rate_tables as tables
-from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 
 LEAD = (
     "A haptic loop has a millisecond. How much of it a step needs is measured here beside MuJoCo, Pinocchio, the "

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from reports.evidence.mechanics_tables import AGAINST_PINOCCHIO
-from reports.pages.records import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
+from reports.pages.records import Finding
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED
 from verification.mechanics.record import Finding as Study
 from verification.studies.false_collisions import EDGE_JUMP, FalseCollisions
 from verification.studies.linked_impacts import (

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.figure import Numbers
+from verification.finding import WORDS
 from verification.mechanics.record import Finding as Study
 from verification.studies.false_collisions import FalseCollisions
 from verification.studies.linked_impacts import LinkedOutcome
 from verification.studies.many_bodies import StepCost
 
-WORDS = {True: "yes", False: "no", None: "cannot tell"}
 # Studies that compare with Pinocchio, and what their rows are called together.
 AGAINST_PINOCCHIO = {
     "random trees": "random trees", "joint kinds": "joint kinds", "scenes": "scenes", "URDF texts": "URDF texts",
@@ -23,12 +23,8 @@ _KINEMATICS = ("placement", "frame_jacobian", "point_jacobian")
 
 def study_table(study: Study, leave_out: Sequence[str] = ()) -> Numbers:
     """Return the trials of a study with their outcomes."""
-    names = [column.name for column in study.table.columns]
-    kept = [k for k, name in enumerate(names) if name not in leave_out]
-    headings = tuple(study.table.columns[k].heading for k in kept)
-    rows = tuple((*(row[k] for k in kept), WORDS[held])
-                 for row, held in zip(study.table.rows, study.table.holds, strict=True))  # fmt: skip
-    return Numbers((*headings, "holds"), rows, note=f"{study.statement} Tolerance: {study.tolerance}.")
+    table = study.table.without(*leave_out)
+    return Numbers(table.titles, table.cells, note=f"{study.statement} Tolerance: {study.tolerance}.")
 
 
 def pinocchio_table(studies: Mapping[str, Study]) -> Numbers:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.evidence.scenes_tables import YARDSTICK, pace_of
-from reports.pages.records import LIMITED, REFUTED, REPRODUCED, Finding
+from reports.pages.records import Finding
+from verification.finding import LIMITED, REFUTED, REPRODUCED
 
 if TYPE_CHECKING:
     from iapb.run import Run

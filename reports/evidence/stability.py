@@ -10,8 +10,9 @@ import numpy as np
 
 from reports.evidence.runs import shipped_scene
 from reports.figures.figure import Numbers
-from reports.pages.records import LIMITED, REFUTED, REPRODUCED, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import LIMITED, REFUTED, REPRODUCED
 
 LEAD = (
     "A wall in a sampled loop can feed the hand. A mass of 2 kg is pushed against walls of every stiffness and "

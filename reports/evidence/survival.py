@@ -9,8 +9,9 @@ from typing import Any
 
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures.figure import Numbers
-from reports.pages.records import REFUTED, REPRODUCED, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import REFUTED, REPRODUCED
 
 LEAD = (
     "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "

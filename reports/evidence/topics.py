@@ -7,8 +7,9 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from reports.pages.records import NOT_COMPUTED, Finding, Topic
+from reports.pages.records import Finding, Topic
 from reports.runner import Runner
+from verification.finding import NOT_COMPUTED
 
 # id of the topic -> module of reports.evidence
 TOPICS: dict[str, str] = {

@@ -5,16 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from reports.pages.records import (
-    LIMITED,
-    NOT_COMPUTED,
-    NOT_TESTABLE,
-    OUTCOMES,
-    REFUTED,
-    REPRODUCED,
-    Evidence,
-    Verdict,
-)
+from reports.pages.records import Evidence, Verdict
+from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, VERDICTS
 
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 
@@ -31,7 +23,7 @@ def _claims(evidence: Evidence) -> Iterator[Verdict]:
     if not evidence.claims:
         return
     count = Counter(claim.outcome for claim in evidence.claims)
-    words = ", ".join(f"{count[outcome]} {outcome}" for outcome in OUTCOMES if count[outcome])
+    words = ", ".join(f"{count[outcome]} {outcome}" for outcome in VERDICTS if count[outcome])
     refuted = [claim.id for claim in evidence.claims if claim.outcome == REFUTED]
     outcome = REPRODUCED if set(count) == {REPRODUCED} else LIMITED
     tail = f" Refuted: {', '.join(refuted)}." if refuted else ""

@@ -14,18 +14,19 @@ from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
 from reports.pages.legend import swatch
-from reports.pages.records import OUTCOMES, REFUTED, Claim, Evidence, Topic, Verdict
+from reports.pages.records import Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
 from reports.pages.verdicts import verdicts
+from verification.finding import REFUTED, VERDICTS
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
 # The mark that goes with each outcome: shape as well as colour.
-OUTCOME_MARKS = dict(zip(OUTCOMES, ("✓", "≈", "✕", "○", "…"), strict=True))
-OUTCOME_CLASSES = dict(zip(OUTCOMES, ("good", "limited", "bad", "open", "absent"), strict=True))
+OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "≈", "✕", "○", "…"), strict=True))
+OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "limited", "bad", "open", "absent"), strict=True))
 # The same outcomes in the words of a check that is not a claim of the paper.
-FINDINGS = dict(zip(OUTCOMES, ("holds", "holds within limits", "fails", "cannot tell", "not computed"), strict=True))
+FINDINGS = dict(zip(VERDICTS, ("holds", "holds within limits", "fails", "cannot tell", "not computed"), strict=True))
 
 
 def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
@@ -53,7 +54,7 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
 
 def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
     """Return how many records have each outcome, those that occur only."""
-    counts = {outcome: sum(record.outcome == outcome for record in claims) for outcome in OUTCOMES}
+    counts = {outcome: sum(record.outcome == outcome for record in claims) for outcome in VERDICTS}
     return {outcome: count for outcome, count in counts.items() if count}
 
 

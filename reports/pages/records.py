@@ -2,7 +2,7 @@
 as "not computed in this run", never as a number.
 
 Whoever computes something turns it into one of these; the pages know nothing else. Formulas are LaTeX without
-dollar signs. `outcome` is one of OUTCOMES.
+dollar signs. `outcome` is one of VERDICTS.
 """
 
 from __future__ import annotations
@@ -12,13 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from reports.figures.figure import Figure, Numbers
-from verification.finding import Failure
+from verification.finding import NOT_COMPUTED, Failure
 from verification.proofs.statement import ProofRecord
-
-REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = (
-    "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
-)
-OUTCOMES = (REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from reports.pages.records import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, Claim, Verdict
+from reports.pages.records import Claim, Verdict
+from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 SUBJECTS = (
     ("Energy", ("C01", "C02", "C04", "C08")),

@@ -15,7 +15,6 @@ from reports.evidence import complementarity, complementarity_tables
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, Numbers, draw
 from reports.figures.style import VARIABLES
-from reports.pages.records import OUTCOMES
 from reports.runner import Runner
 from verification.comparison.agreement import compare_cases
 from verification.comparison.agreement_map import agreement_map, two_contact_map
@@ -26,6 +25,7 @@ from verification.comparison.problem_study import study_read
 from verification.comparison.step_cost import LEMKE_KERNEL, CostRow, impact_cost
 from verification.comparison.study import OWN, ComparisonStudy
 from verification.comparison.world_cost import WAYS, StepCostRow
+from verification.finding import VERDICTS
 
 NAN = float("nan")
 
@@ -100,5 +100,5 @@ def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypat
     monkeypatch.setattr("verification.comparison.study.compare", lambda *arguments, **options: study)
     monkeypatch.setattr(complementarity_tables, "worlds", lambda runner: Numbers(("world",), ()))
     topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
-    assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(OUTCOMES)
+    assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(VERDICTS)
     assert topic.verdict and "profile" in topic.tables and str(Path.home()) not in repr(topic)

@@ -21,9 +21,10 @@ from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers
-from reports.pages.records import REPRODUCED, Claim, Evidence
+from reports.pages.records import Claim, Evidence
 from reports.report import build_report, write_report
 from reports.runner import Runner
+from verification.finding import REPRODUCED
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
 FIGURE = Figure("figA", "", "A", "See.", (PANEL,), Numbers(("x",), ((0.1,),)))

@@ -8,8 +8,9 @@ import pytest
 
 from reports.evidence import gather
 from reports.evidence.verdicts import verdicts
-from reports.pages.records import NOT_COMPUTED, Evidence, Finding, Topic
+from reports.pages.records import Evidence, Finding, Topic
 from reports.runner import Runner
+from verification.finding import NOT_COMPUTED
 
 COMPUTED = Topic("engines", "Other engines", "", (Finding("all well", "reproduced"),), verdict="all well")
 

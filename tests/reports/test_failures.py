@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from reports.evidence.verdicts import verdicts
-from reports.pages.records import NOT_COMPUTED, REPRODUCED, Evidence, Finding, Topic, with_failures
-from verification.finding import Failure, attempt
+from reports.pages.records import Evidence, Finding, Topic, with_failures
+from verification.finding import NOT_COMPUTED, REPRODUCED, Failure, attempt
 
 TOPIC = Topic("engines", "Other engines", "", (Finding("all well", REPRODUCED),), verdict="All well.")
 

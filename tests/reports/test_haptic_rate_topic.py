@@ -11,7 +11,7 @@ import pytest
 from reports.evidence.effects import summary
 from reports.evidence.haptic_rate import topic_of
 from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
-from reports.pages.records import LIMITED, NOT_COMPUTED, REPRODUCED, SceneEffect
+from reports.pages.records import SceneEffect
 from verification.accuracy_time.against_mujoco import StepRace
 from verification.accuracy_time.anytime import BudgetRow
 from verification.accuracy_time.haptic_rate import FACTORED, PRINTED, RateTrial
@@ -22,6 +22,7 @@ from verification.accuracy_time.step_profile import PartTime
 from verification.accuracy_time.study import HapticStudy
 from verification.accuracy_time.trajectories import TrajectoryRun
 from verification.comparison.step_cost import IAPB, KERNEL, CostRow
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 from verification.mechanics.robot_timing import MANY, ONE
 from verification.studies.many_bodies import StepCost
 

@@ -18,8 +18,7 @@ from reports.evidence.mechanics_tables import (
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
 from reports.figures.linked_impacts import BERNOULLI, CRADLE, outcomes
-from reports.pages.records import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED
-from verification.claims.table import Table
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Table
 from verification.mechanics import robots
 from verification.mechanics.coordinate_invariance import coordinate_invariance
 from verification.mechanics.own_robots import compare_kinds

@@ -6,20 +6,10 @@ import pytest
 
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
 from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
-from reports.pages.records import (
-    LIMITED,
-    REFUTED,
-    REPRODUCED,
-    Claim,
-    Evidence,
-    Finding,
-    HardCase,
-    StoredFile,
-    Topic,
-    Verdict,
-)
+from reports.pages.records import Claim, Evidence, Finding, HardCase, StoredFile, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import failures, verdicts
+from verification.finding import LIMITED, REFUTED, REPRODUCED
 
 RUNS = tuple(
     StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))

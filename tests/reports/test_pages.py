@@ -20,10 +20,6 @@ from reports.figures.figure import Numbers
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
 from reports.pages.records import (
-    LIMITED,
-    OUTCOMES,
-    REFUTED,
-    REPRODUCED,
     Claim,
     CrossCheck,
     Evidence,
@@ -38,6 +34,7 @@ from reports.pages.records import (
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
+from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -157,8 +154,8 @@ def test_text_is_escaped_and_formulas_are_not(full: Evidence) -> None:
 
 
 def test_outcomes_are_told_by_a_mark_as_well_as_by_colour() -> None:
-    assert set(OUTCOME_MARKS) == set(OUTCOMES)
-    assert len(set(OUTCOME_MARKS.values())) == len(OUTCOMES)
+    assert set(OUTCOME_MARKS) == set(VERDICTS)
+    assert len(set(OUTCOME_MARKS.values())) == len(VERDICTS)
 
 
 def test_each_outcome_is_counted(full: Evidence) -> None:

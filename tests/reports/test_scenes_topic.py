@@ -18,7 +18,8 @@ from reports.evidence import scenes
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes_ledger, scenes_space
 from reports.figures.spatial import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
-from reports.pages.records import LIMITED, REFUTED, REPRODUCED, Topic
+from reports.pages.records import Topic
+from verification.finding import LIMITED, REFUTED, REPRODUCED
 from verification.studies.open_books import OpenBooks
 from verification.studies.scene_measures import SceneMeasure, measure
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from reports.evidence.stability import _coordinated, _coupled, _ports
-from reports.pages.records import LIMITED, REFUTED
+from verification.finding import LIMITED, REFUTED
 from verification.stability.device_loop import DeviceLoop
 from verification.stability.device_port import CROSSES, PRESSES, PortLeak
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from verification.claims.claim import VERDICTS, Claim, ClaimResult
+from verification.claims.claim import Claim, ClaimResult
 from verification.claims.study import Study, check_claims, conditions
-from verification.claims.table import Column, Table
+from verification.finding import VERDICTS, Column, Table
 
 _FILES = (
     "c01_one_collision",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verification.claims.instances import Instance
-from verification.claims.table import Column, Row, Table
+from verification.finding import Column, Row, Table
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from verification.claims.algebraic import COLUMNS, kinetic_energy, solve_bound, 
 from verification.claims.claim import Claim
 from verification.claims.exact_pseudo_inverse import pseudo_inverse_velocity
 from verification.claims.instances import Family, Instance, draw, whole_numbers
-from verification.claims.table import Table, table_of
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -11,7 +11,7 @@ from iapb import resolve_impact
 from verification.claims.algebraic import COLUMNS, energy_gains, solve_bound, summary, within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.instances import Family, draw, whole_numbers
-from verification.claims.table import Table, table_of
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -11,7 +11,7 @@ from iapb import resolve_impact
 from verification.claims.algebraic import COLUMNS, solve_bound, summary, within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.instances import Family, Instance, approaching, draw
-from verification.claims.table import Table, table_of
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -19,7 +19,7 @@ from verification.claims.algebraic import (
 )
 from verification.claims.claim import Claim
 from verification.claims.instances import Family, Instance, draw, whole_numbers
-from verification.claims.table import Table, table_of
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

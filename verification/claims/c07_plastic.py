@@ -9,7 +9,7 @@ import numpy as np
 
 from iapb import resolve_impact
 from verification.claims.claim import Claim
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from iapb.mechanics.mechanism import Mechanism

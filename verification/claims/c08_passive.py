@@ -17,8 +17,8 @@ from verification.claims.algebraic import (
 )
 from verification.claims.claim import Claim
 from verification.claims.instances import Family, draw
-from verification.claims.table import Table, table_of
 from verification.claims.trace import Trace
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

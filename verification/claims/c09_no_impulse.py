@@ -12,7 +12,7 @@ from verification.claims.algebraic import within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.conditions import columns
 from verification.claims.instances import Family, draw
-from verification.claims.table import Column, Table, table_of
+from verification.finding import Column, Table, table_of
 
 if TYPE_CHECKING:
     from iapb.run import Run

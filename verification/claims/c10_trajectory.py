@@ -13,7 +13,7 @@ from verification.claims.closeness import (
     distances,
     median_ratio,
 )
-from verification.claims.table import Table, table_of
+from verification.finding import Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

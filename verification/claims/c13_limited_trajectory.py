@@ -12,7 +12,7 @@ from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
 from verification.claims.closeness import by_coordinate, closest, count, distances
 from verification.claims.conditions import Condition, columns
 from verification.claims.measures import deepest_penetration
-from verification.claims.table import Row, Table, table_of
+from verification.finding import Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

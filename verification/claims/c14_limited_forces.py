@@ -11,8 +11,8 @@ from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
 from verification.claims.measures import peak_force
-from verification.claims.table import Column, Row, Table, table_of
 from verification.claims.trace import COORDINATES
+from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -11,7 +11,7 @@ from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
 from verification.claims.measures import bounces, settling_time
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -9,7 +9,7 @@ import numpy as np
 
 from verification.claims.claim import Claim
 from verification.claims.conditions import Condition, columns, wall_conditions
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

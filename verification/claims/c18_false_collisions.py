@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 from verification.studies.false_collisions import EDGE_JUMP, FalseCollisions, count_false, socket
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from verification.claims.claim import Claim
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -10,16 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.table import Row, Table
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Row, Table
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
-
-REPRODUCED = "reproduced"
-LIMITED = "reproduced within stated limits"
-REFUTED = "refuted"
-NOT_TESTABLE = "not testable here"
-VERDICTS = (REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE)
 
 # A claim that fails in more trials than it holds in is not "true with exceptions".
 LEAST_SHARE = 0.5
@@ -129,7 +123,7 @@ def parts_of(table: Table) -> tuple[Part, ...]:
 
 
 def _by_part(table: Table) -> dict[str, Table]:
-    names = [column.name for column in table.columns if column.part]
+    names = [column.key for column in table.columns if column.part]
     if not names:
         return {"": table}
     return {part: table.where(**{names[0]: part}) for part in dict.fromkeys(table.column(names[0]))}
@@ -155,7 +149,7 @@ def ranges(table: Table) -> str:
     parts = []
     for column in table.columns:
         if column.condition and table.rows:
-            parts.append(f"{column.name} {_span(table.column(column.name))} {column.unit}".rstrip())
+            parts.append(f"{column.key} {_span(table.column(column.key))} {column.unit}".rstrip())
     return "; ".join(parts)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from iapb.scene import Scene
-from verification.claims.table import Column
+from verification.finding import Column
 
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
@@ -120,4 +120,4 @@ def columns(*names: str) -> tuple[Column, ...]:
 
 def describe(condition: Condition) -> dict[str, Any]:
     """The condition with units, for a report."""
-    return {column.heading: condition.record()[column.name] for column in columns(*UNITS)}
+    return {column.title: condition.record()[column.key] for column in columns(*UNITS)}

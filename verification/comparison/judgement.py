@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verification.claims.claim import LIMITED, REFUTED, REPRODUCED, verdict_of
+from verification.claims.claim import verdict_of
 from verification.comparison import sentences
 from verification.comparison.agreement import REPRODUCED as CONE_TOLERANCE
 from verification.comparison.agreement import SAME
@@ -16,6 +16,7 @@ from verification.comparison.problem_study import ProblemStudy
 from verification.comparison.step_cost import rivals
 from verification.comparison.study import ComparisonStudy
 from verification.comparison.world_cost import costs_more, step_rivals
+from verification.finding import LIMITED, REFUTED, REPRODUCED
 
 # Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9

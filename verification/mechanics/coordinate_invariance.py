@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iapb import resolve_impact
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 from verification.mechanics.planar_arm import Contact, PlanarArm
 from verification.mechanics.record import Finding, check_depth
 

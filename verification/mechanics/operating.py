@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from iapb.errors import IapbError
 from iapb.scene import Scene
 from iapb.simulation import Simulation
-from verification.claims.table import Column, Table, table_of
+from verification.finding import Column, Table, table_of
 from verification.mechanics.hand_paths import PATHS, Path
 from verification.mechanics.record import Finding, check_depth
 

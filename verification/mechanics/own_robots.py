@@ -16,7 +16,7 @@ from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
-from verification.claims.table import table_of
+from verification.finding import table_of
 from verification.mechanics.random_urdf import random_urdf
 from verification.mechanics.record import Finding, check_depth
 from verification.mechanics.robots import (

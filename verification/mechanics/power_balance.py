@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
-from verification.claims.table import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table, table_of
 from verification.mechanics.record import Finding, check_depth
 
 Floats = NDArray[np.float64]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from verification.claims.table import Table
+from verification.finding import Table
 
 DEPTHS = ("quick", "full")
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_state
 from reference.rigid_body import model_from_urdf
-from verification.claims.table import Column, Table, table_of
+from verification.finding import Column, Table, table_of
 from verification.mechanics.record import Finding, check_depth
 from verification.mechanics.robots import SEED, robot_files
 

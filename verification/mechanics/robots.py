@@ -16,7 +16,7 @@ from iapb.mechanics.mechanism import Mechanism
 from reference.mechanism_comparison import compare
 from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
-from verification.claims.table import Column, Table, table_of
+from verification.finding import Column, Table, table_of
 from verification.mechanics.record import Finding, check_depth
 
 # Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.

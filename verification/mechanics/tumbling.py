@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from verification.claims.table import Column, Table, table_of
+from verification.finding import Column, Table, table_of
 from verification.mechanics.record import Finding, check_depth
 from verification.mechanics.torque_free import TorqueFreeBody
 

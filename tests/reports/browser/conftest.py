@@ -20,8 +20,9 @@ from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.fig03_energy_loss import arm_energies
 from reports.figures.figure import Numbers
-from reports.pages.records import LIMITED, REPRODUCED, Claim, CrossCheck, Evidence, Finding, Topic, Verdict
+from reports.pages.records import Claim, CrossCheck, Evidence, Finding, Topic, Verdict
 from reports.report import build_report
+from verification.finding import LIMITED, REPRODUCED
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (

@@ -5,10 +5,10 @@ import pytest
 
 from iapb.contact.impact import resolve_impact
 from verification.claims import c03_rows_removed, c04_elastic, c05_complementarity, check_claims, losses
-from verification.claims.claim import LIMITED, REPRODUCED
 from verification.claims.exact_pseudo_inverse import pseudo_inverse
 from verification.claims.instances import Family, draw
 from verification.claims.study import Study
+from verification.finding import LIMITED, REPRODUCED
 
 
 class Faulty:

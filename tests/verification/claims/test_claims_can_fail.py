@@ -10,8 +10,7 @@ from verification.claims import (
     c13_limited_trajectory,
     c18_false_collisions,
 )
-from verification.claims.claim import REFUTED, REPRODUCED
-from verification.claims.table import Column, table_of
+from verification.finding import REFUTED, REPRODUCED, Column, table_of
 
 RENDERED = {"saturate": 3e-3, "scale": 2e-3, "spread": 1e-3}
 NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]

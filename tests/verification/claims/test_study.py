@@ -5,9 +5,9 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
 from verification.claims import Study, check_claims, study
-from verification.claims.claim import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.claims.conditions import Condition
 from verification.claims.study import run_directly
+from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 
 FEW = (Condition(0.0), Condition(0.1, friction=0.1))
 SWAPPED = {"IAPB": "PB", "PB": "IAPB"}

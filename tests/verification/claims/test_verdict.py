@@ -2,17 +2,8 @@
 
 import pytest
 
-from verification.claims.claim import (
-    LIMITED,
-    NOT_TESTABLE,
-    REFUTED,
-    REPRODUCED,
-    Claim,
-    Part,
-    overall,
-    verdict_of,
-)
-from verification.claims.table import Column, table_of
+from verification.claims.claim import Claim, Part, overall, verdict_of
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Column, table_of
 
 
 @pytest.mark.parametrize(

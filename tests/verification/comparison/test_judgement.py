@@ -11,7 +11,6 @@ import pytest
 
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
-from verification.claims.claim import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.comparison.agreement import compare_cases
 from verification.comparison.agreement_map import agreement_map, two_contact_map
 from verification.comparison.cases import random_cases
@@ -19,6 +18,7 @@ from verification.comparison.judgement import VERDICTS, judge_problems
 from verification.comparison.own_problems import own_problems
 from verification.comparison.problem_study import study_read
 from verification.comparison.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 FOUND = compare_cases(random_cases(3, seed=12))
 CELLS = agreement_map(FOUND)

@@ -51,7 +51,7 @@ def test_a_hand_that_pushes_with_the_motion_is_seen(scene, monkeypatch):
 
 
 def test_a_fault_or_a_number_that_is_not_finite_fails():
-    whole = {column.name: 0.0 for column in study.COLUMNS} | {"fault": "", "tolerance": 1.0}
+    whole = {column.key: 0.0 for column in study.COLUMNS} | {"fault": "", "tolerance": 1.0}
     assert outcome(whole)
     assert not outcome(whole | {"largest joint speed": np.inf})
     assert not outcome(whole | {"fault": "the motion left the range of numbers"})
