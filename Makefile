@@ -28,7 +28,7 @@ $(LOCK_STAMP):
 	@test -n "$(PYTHON)" || { echo "make: no python >= 3.11 with venv was found; set PYTHON=..." >&2; exit 1; }
 	@echo "Making $(VENV) from requirements.lock with $$($(PYTHON) --version); this takes a minute or two ..."
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(PIP) install --no-deps --require-hashes -r requirements.lock
+	@$(PIP) install --no-deps --require-hashes -r requirements.lock && echo "Installing took $$SECONDS s."
 	@touch $@
 
 $(PROJECT_STAMP): $(LOCK_STAMP)
@@ -46,6 +46,11 @@ reproduce: setup ## regenerate every figure, table and claim into out/report.htm
 .PHONY: verify
 verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; three quarters of an hour of a core, can be stopped and gone on with
 	@$(BIN)/iapb verify --full --workers $(PYTEST_WORKERS)
+
+.PHONY: portable
+portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm and threads; SETTINGS="Haswell Zen" selects
+	@$(BIN)/python -m tools.portable $(if $(PORTABLE_ARGS),$(PORTABLE_ARGS),--reproduce) --workers $(PYTEST_WORKERS) \
+		$(if $(SETTINGS),--settings $(SETTINGS))
 
 .PHONY: fuzz
 fuzz: setup ## 100,000 wrong inputs: each must be read or refused by name; what breaks something is kept in out/fuzz

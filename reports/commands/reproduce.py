@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,8 +41,9 @@ def make_report(out: Path, depth: str) -> None:
     from reports.report import build_report, write_report
 
     started = time.perf_counter()
+    took: dict[str, float] = {}
     with stage_progress() as progress:
-        evidence = gather(out, depth, progress)
+        evidence = gather(out, depth, _timed(progress, took))
     recipes, figures = remembering(RECIPES)
     path = write_report(out / REPORT_NAME, build_report(evidence, recipes))
     beside = write_companions(out, evidence, figures, depth)
@@ -51,8 +52,25 @@ def make_report(out: Path, depth: str) -> None:
     size, files = path.stat().st_size / 1e6, len(evidence.manifest)
     print(f"\n{path} ({size:.1f} MB, from {files} run and table files) in {time.perf_counter() - started:.0f} s.")
     print(f"Beside it: {', '.join(file.name for file in beside)}.")
+    took["figures and page"] = time.perf_counter() - started - sum(took.values())
+    print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
     if any(topic.failed for topic in evidence.topics):
         raise typer.Exit(1)
+
+
+def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) -> Callable[[str, int, int], None]:
+    """Progress that adds up in `took` how long each stage is at work: stages come one after the other."""
+    import time
+
+    last = time.perf_counter()
+
+    def timed(stage: str, done: int, total: int) -> None:
+        nonlocal last
+        progress(stage, done, total)
+        now = time.perf_counter()
+        took[stage], last = took.get(stage, 0.0) + now - last, now
+
+    return timed
 
 
 def _write_figure(key: str, out: Path, depth: str) -> None:

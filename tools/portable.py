@@ -1,0 +1,365 @@
+"""`make portable`: the same verdicts on every processor, tried by running everything under other settings of this one.
+
+A setting chooses other machine code for BLAS (OPENBLAS_CORETYPE), numpy (NPY_DISABLE_CPU_FEATURES), compiled kernels
+(NUMBA_CPU_NAME), the C library's sin and exp (GLIBC_TUNABLES) or the number of threads. Every setting is compared
+with `default`, the settings that the machine picks by itself:
+
+- runs of engine worlds, and impacts: equal bit for bit, for the kernels call no BLAS
+- runs of the other worlds (they solve by LAPACK): q within Q_TOLERANCE
+- numerical tests (TESTS): none fails
+- `iapb reproduce`: ends with 0, and every outcome that rests on no measured time is the same
+
+A part that is done for this state of the sources is kept in out/portable and not repeated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+ROOT = Path.cwd()
+# The tests whose outcome rests on numbers: all but those of the documents, the browser, the live view and the tools.
+TESTS = ("tests/iapb", "tests/reference", "tests/verification", "tests/reports",
+         "--ignore=tests/reports/browser", "--ignore=tests/reports/live")  # fmt: skip
+# A rigid world solves a problem by LAPACK in each step. Its rounding (1e-16 of a position) grows over some 2,000 steps
+# by contacts that part: 1.5e-10 m was seen. A nanometre is a millionth of the filter distances, so no verdict sees it.
+Q_TOLERANCE = 1e-9
+IMPACTS = 200
+BLAS = {name: {"OPENBLAS_CORETYPE": name} for name in ("Haswell", "SkylakeX", "Sandybridge", "Zen", "Prescott")}
+SETTINGS: dict[str, dict[str, str]] = {
+    "default": {},
+    **BLAS,
+    "numpy-baseline": {"NPY_DISABLE_CPU_FEATURES": "?"},  # the names are asked of numpy: it ignores wrong ones silently
+    "numba-generic": {"NUMBA_CPU_NAME": "generic"},
+    "libm-baseline": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"},
+    "one-thread": {"OPENBLAS_NUM_THREADS": "1"},
+    "two-threads": {"OPENBLAS_NUM_THREADS": "2"},
+}
+# What OpenBLAS calls the kernels that it takes for a name, where that is not the name itself.
+BLAS_NAMES = {"Zen": {"Zen", "Haswell"}, "Prescott": {"Prescott", "Katmai"}}
+
+
+def main() -> int:
+    """Try the settings, print and write the table; 1 where one of them does not give the same."""
+    parser = argparse.ArgumentParser(prog="python -m tools.portable", description=__doc__.splitlines()[0])
+    parser.add_argument("--settings", nargs="+", choices=SETTINGS, default=list(SETTINGS), metavar="NAME",
+                        help=f"default: all of {', '.join(SETTINGS)}")  # fmt: skip
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument("--tests-only", action="store_true", help="only the numerical tests")
+    only.add_argument("--runs-only", action="store_true", help="only the runs and impacts: a minute a setting")
+    parser.add_argument("--reproduce", action="store_true", help="also a quick `iapb reproduce`: ten minutes a setting")
+    parser.add_argument("--out", type=Path, default=Path("out/portable"))
+    parser.add_argument("--workers", default="2", help="processes of pytest")
+    parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.child:
+        CHILDREN[given.child[0]](Path(given.child[1]))
+        return 0
+    parts = [name for name, wanted in (("tests", not given.runs_only), ("runs", not given.tests_only),
+                                       ("report", given.reproduce)) if wanted]  # fmt: skip
+    names = given.settings if parts == ["tests"] else list(dict.fromkeys(["default", *given.settings]))
+    folder = given.out.resolve() / state_of_sources()
+    rows = [row for name in names if (row := try_setting(name, folder, parts, given.workers))]
+    text = table(rows)
+    print(text)
+    (given.out / "portable.txt").write_text(text + "\n", encoding="utf-8")
+    (given.out / "portable.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    return int(any(row["wrong"] for row in rows))
+
+
+def state_of_sources() -> str:
+    """The commit, and a hash of what differs from it."""
+    commit = _git("rev-parse", "--short=12", "HEAD")
+    changed = _git("diff", "HEAD") + _git("ls-files", "--others", "--exclude-standard")
+    return commit + (f"-{hashlib.sha256(changed.encode()).hexdigest()[:8]}" if changed else "")
+
+
+def _git(*arguments: str) -> str:
+    return subprocess.run(["git", *arguments], capture_output=True, text=True, check=True, cwd=ROOT).stdout.strip()
+
+
+def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict[str, Any]:
+    """One row of the table: what the setting gave, and what of it is wrong."""
+    here = folder / name
+    here.mkdir(parents=True, exist_ok=True)
+    machine = _facts({}, here / "machine.json")
+    setting, reason = environment(name, machine, here)
+    row: dict[str, Any] = {"setting": name, "environment": setting, "wrong": []}
+    if reason:
+        return row | {"not tried": reason}
+    row["facts"] = facts = _facts(setting, here / "facts.json")
+    if without := not_in_force(name, facts, machine):
+        row["wrong"].append(f"not in force: {without}")
+        return row
+    _say(f"{name}: {' '.join(f'{key}={value}' for key, value in setting.items()) or 'nothing set'}; "
+         f"BLAS {'/'.join(facts['blas'])}, {facts['threads']} threads, kernels for {facts['numba']}")  # fmt: skip
+    for part in parts:
+        started = time.perf_counter()
+        row[part], kept = PARTS[part](name, setting, folder, workers)
+        row["wrong"] += row[part].pop("wrong")
+        if not kept:
+            _say(f"  {part} took {time.perf_counter() - started:.0f} s")
+    return row
+
+
+def environment(name: str, machine: dict[str, Any], here: Path) -> tuple[dict[str, str], str]:
+    """The variables of a setting on this machine, or why it cannot be tried."""
+    setting = dict(SETTINGS[name])
+    lacking = {"SkylakeX": "AVX512_SKX", "Haswell": "AVX2", "Zen": "AVX2", "Sandybridge": "AVX",
+               "libm-baseline": "FMA3"}.get(name)  # fmt: skip
+    if lacking and lacking not in machine["features"]:
+        return setting, f"the processor lacks {lacking}"
+    if name == "numpy-baseline":
+        if not machine["optional"]:
+            return setting, "the processor has none of the features that numpy has code for"
+        setting["NPY_DISABLE_CPU_FEATURES"] = " ".join(machine["optional"])
+    if name == "numba-generic":  # a cache of its own: nothing compiled for this processor is taken for generic
+        setting["NUMBA_CACHE_DIR"] = str(here / "numba")
+    return setting, ""
+
+
+def not_in_force(name: str, facts: dict[str, Any], machine: dict[str, Any]) -> str:
+    """What a setting should have changed in the process and did not; empty where it did."""
+    if name in BLAS and not set(facts["blas"]) <= BLAS_NAMES.get(name, {name}):
+        return f"OpenBLAS took {facts['blas']}"
+    if name == "numpy-baseline" and facts["optional"]:
+        return f"numpy still uses {facts['optional']}"
+    if name == "numba-generic" and facts["numba"] != "generic":
+        return f"numba compiles for {facts['numba']}"
+    if name == "libm-baseline" and facts["libm"] == machine["libm"]:
+        return "the C library gives the same sines"
+    if name.endswith("-thread") and facts["threads"] != 1:
+        return f"OpenBLAS has {facts['threads']} threads"
+    return ""
+
+
+def _facts(setting: dict[str, str], path: Path) -> dict[str, Any]:
+    _run([sys.executable, __file__, "--child", "facts", str(path)], setting, path.with_suffix(".log"))
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _run(command: list[str], setting: dict[str, str], log: Path) -> int:
+    """Run a command under a setting and nothing else of the kind; its output goes to a file."""
+    clean = {key: value for key, value in os.environ.items() if all(key not in one for one in SETTINGS.values())}
+    with log.open("w", encoding="utf-8") as file:
+        return subprocess.run(command, cwd=ROOT, stdout=file, stderr=subprocess.STDOUT,
+                              env=clean | {"PYTHONPATH": str(ROOT)} | setting).returncode  # fmt: skip
+
+
+def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+    """The numerical tests: how many passed, and which did not."""
+    here, path = folder / name, folder / name / "tests.xml"
+    kept = path.is_file()
+    if not kept:
+        command = [sys.executable, "-m", "pytest", "-q", "-n", workers, f"--junitxml={path}.partial", *TESTS]
+        _run(command, setting, here / "tests.log")
+        if not Path(f"{path}.partial").is_file():
+            return {"passed": 0, "failed": 0, "wrong": [f"no test ran: see {here / 'tests.log'}"]}, kept
+        Path(f"{path}.partial").replace(path)
+    cases = list(ElementTree.parse(path).iter("testcase"))
+    bad = [f"{case.get('classname')}::{case.get('name')}" for case in cases
+           if case.find("failure") is not None or case.find("error") is not None]  # fmt: skip
+    skipped = sum(case.find("skipped") is not None for case in cases)
+    wrong = [f"test: {case}" for case in bad]
+    return {"passed": len(cases) - len(bad) - skipped, "skipped": skipped, "failed": len(bad), "wrong": wrong}, kept
+
+
+def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+    """Every shipped scene in every world, and impacts: which are equal to the default's."""
+    path = folder / name / "runs.json"
+    kept = path.is_file()
+    if not kept and _run([sys.executable, __file__, "--child", "runs", str(path)], setting, path.with_suffix(".log")):
+        return {"wrong": [f"runs were not computed: see {path.with_suffix('.log')}"]}, False
+    theirs, ours = (json.loads((folder / one / "runs.json").read_text(encoding="utf-8")) for one in ("default", name))
+    found: dict[str, Any] = {"engine": 0, "engine equal": 0, "other": 0, "other equal": 0, "largest": 0.0,
+                             "largest q": 0.0, "wrong": []}  # fmt: skip
+    for label in theirs:
+        kind, equal = theirs[label]["kind"], theirs[label]["hashes"] == ours[label]["hashes"]
+        found[kind] += 1
+        found[f"{kind} equal"] += equal
+        if equal:
+            continue
+        differ = [key for key, value in theirs[label]["hashes"].items() if ours[label]["hashes"].get(key) != value]
+        q, largest = _differences(folder / "default" / f"{label}.npz", folder / name / f"{label}.npz")
+        found["largest"], found["largest q"] = max(found["largest"], largest), max(found["largest q"], q)
+        if kind == "engine" or not q <= Q_TOLERANCE:
+            found["wrong"].append(f"{label}: {', '.join(differ[:4])} differ; q by {q:.1e}")
+    return found, kept
+
+
+def _differences(first: Path, second: Path) -> tuple[float, float]:
+    """Largest difference of q, and of any array; infinite where one has other entries than the other."""
+    if not (first.is_file() and second.is_file()):
+        return np.inf, np.inf  # one of them was not computed
+    q, largest = 0.0, 0.0
+    with np.load(first) as old, np.load(second) as new:
+        texts = [key for key in old.files if old[key].dtype.kind == "U"]
+        if set(old.files) != set(new.files) or any(old[key] != new[key] for key in texts):
+            return np.inf, np.inf  # one of them was refused, or says something else
+        for key in (key for key in old.files if old[key].dtype.kind in "fiu"):
+            gap = np.inf
+            if old[key].shape == new[key].shape:
+                other = ~((old[key] == new[key]) | (np.isnan(old[key]) & np.isnan(new[key])))
+                gap = np.max(np.abs(old[key][other].astype(float) - new[key][other]), initial=0.0)
+                gap = np.inf if np.isnan(gap) else gap
+            largest, q = max(largest, gap), (max(q, gap) if key == "q" else q)
+    return float(q), float(largest)
+
+
+def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+    """`iapb reproduce`: its exit status, and its outcomes beside those of the default."""
+    from iapb import IapbError
+    from reports.difference import CLOSE, DIFFERS, EXACT, TIMING, compare_reports
+    from reports.numbers_file import read_numbers
+
+    here = folder / name / "report"
+    kept = (here / "status").is_file()
+    if not kept:
+        command = [sys.executable, "-c", "from reports.cli import main; main()", "reproduce", "--out", str(here)]
+        status = _run(command, setting, folder / name / "report.log")
+        for part in ("runs", "tables"):  # half a gigabyte each time
+            shutil.rmtree(here / part, ignore_errors=True)
+        (here / "status").write_text(str(status), encoding="utf-8")
+    wrong = [] if (here / "status").read_text() == "0" else [f"iapb reproduce failed: {folder / name / 'report.log'}"]
+    try:
+        found = compare_reports(read_numbers(folder / "default" / "report"), read_numbers(here))
+    except IapbError as missing:
+        return {"outcomes": 0, "outcomes equal": 0, "wrong": [*wrong, str(missing)]}, kept
+    told = [cell for cell in found.cells if cell.state != TIMING]
+    outcomes = [cell for cell in told if cell.column == "outcome" or isinstance(cell.old, bool)]
+    other = [f"{cell.table}, {cell.row}: {cell.old} became {cell.new}" for cell in outcomes if cell.state != EXACT]
+    gaps = [cell.gap for cell in told if cell.state in (CLOSE, DIFFERS)]
+    wrong += other + [f"table in one report only: {one}" for one in found.tables_old + found.tables_new]
+    return {"outcomes": len(outcomes), "outcomes equal": len(outcomes) - len(other), "numbers": len(told),
+            "numbers that differ": sum(cell.state == DIFFERS for cell in told), "largest": max(gaps, default=0.0),
+            "wrong": wrong}, kept  # fmt: skip
+
+
+PARTS = {"tests": run_tests, "runs": run_runs, "report": run_report}
+
+
+def child_facts(path: Path) -> None:
+    """What this process really uses."""
+    import math
+
+    import scipy.linalg  # noqa: F401 - loads its own BLAS
+    from numba.core.registry import cpu_target
+    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+    from threadpoolctl import threadpool_info
+
+    blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
+    sines = np.array([math.sin(k / 997.0) for k in range(20_000)])
+    facts = {
+        "blas": sorted({str(one.get("architecture")) for one in blas}),
+        "threads": max(one["num_threads"] for one in blas),
+        "features": [key for key, there in __cpu_features__.items() if there],
+        "optional": [key for key in __cpu_dispatch__ if __cpu_features__[key]],
+        "numba": cpu_target.target_context.codegen().magic_tuple()[1],
+        "libm": hashlib.sha256(sines.tobytes()).hexdigest(),
+    }  # fmt: skip
+    path.write_text(json.dumps(facts), encoding="utf-8")
+
+
+def child_runs(path: Path) -> None:
+    """Compute every run and the impacts; hashes go to `path`, arrays beside it."""
+    found = {}
+    for label, kind, arrays in [*_runs(), *_impacts()]:
+        hashes = {key: hashlib.sha256(f"{x.dtype}{x.shape}".encode() + x.tobytes()).hexdigest() for key, x in arrays}
+        found[label] = {"kind": kind, "hashes": hashes}
+        np.savez(path.with_name(f"{label}.npz"), **dict(arrays))
+    path.write_text(json.dumps(found), encoding="utf-8")
+
+
+def _runs() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
+    """Label, kind of world and arrays of each run; of a world that refuses a scene, its words."""
+    from iapb import IapbError, find_scene, load_scene
+    from iapb.scene_files import scene_names
+    from reference.worlds import WORLDS, find_world, run_world
+
+    renderings = [("IAPB", rendering) for rendering in ("saturate", "scale", "spread")]
+    for name in scene_names():
+        scene = load_scene(find_scene(name))
+        for world, rendering in [*((world, "full") for world in WORLDS), *renderings]:
+            kind = "engine" if type(find_world(world).law).__module__.startswith("iapb.") else "other"
+            try:
+                arrays = list(_arrays("", run_world(scene, world, rendering, partial=True)))
+            except IapbError as refused:
+                arrays = [("refused", np.array(str(refused)))]
+            yield f"{name}-{world}-{rendering}", kind, arrays
+
+
+def _arrays(place: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Every array of a record by its place in it; measured times are left out."""
+    if is_dataclass(value):
+        for field in fields(value):
+            if not field.name.startswith("chunk_"):
+                yield from _arrays(f"{place}.{field.name}".strip("."), getattr(value, field.name))
+    elif isinstance(value, dict):
+        for key in value:
+            yield from _arrays(f"{place}.{key}", value[key])
+    elif isinstance(value, np.ndarray | float | int | str):
+        yield place, np.asarray(value)
+
+
+def _impacts() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
+    """Impacts whose input is made of whole numbers, so that it is the same everywhere."""
+    from iapb import resolve_impact
+
+    rng = np.random.default_rng(0)
+    for number in range(IMPACTS):
+        d, c = int(rng.integers(1, 31)), int(rng.integers(1, 61))
+        factor = rng.integers(-3, 4, size=(d, d))
+        mass = np.ldexp((factor @ factor.T + np.eye(d, dtype=int)).astype(float), int(rng.integers(-9, 10)))
+        rank = int(rng.integers(1, min(c, d) + 1))
+        rows = (rng.integers(-3, 4, size=(c, rank)) @ rng.integers(-9, 10, size=(rank, d))).astype(float)
+        e = rng.integers(0, 9) / 8.0 if number % 4 else rng.integers(0, 9, size=c) / 8.0
+        impact = resolve_impact(mass, rows, rng.integers(-99, 100, size=d) / 64.0, e)
+        yield f"impact-{number}", "engine", list(_arrays("", impact))
+
+
+CHILDREN = {"facts": child_facts, "runs": child_runs}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """The settings as lines of text, and beneath them what is wrong."""
+    heads = ("setting", "BLAS", "tests passed/failed", "outcomes equal", "engine runs equal", "other runs equal",
+             "largest difference", "of q", "result")  # fmt: skip
+    lines = [heads, *(_line(row) for row in rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
+    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    wrong = [f"{row['setting']}: {one}" for row in rows for one in row["wrong"][:20]]
+    return "\n".join([*text, "", *wrong])
+
+
+def _line(row: dict[str, Any]) -> tuple[str, ...]:
+    if "not tried" in row:
+        return (row["setting"], "-", *("-",) * 6, f"not tried: {row['not tried']}")
+    tests, runs, report = (row.get(part, {}) for part in PARTS)
+    return (
+        row["setting"], "/".join(row["facts"]["blas"]), f"{tests['passed']}/{tests['failed']}" if tests else "-",
+        f"{report['outcomes equal']}/{report['outcomes']}" if report else "-",
+        *(f"{runs[f'{kind} equal']}/{runs[kind]}" if kind in runs else "-" for kind in ("engine", "other")),
+        *(f"{runs[key]:.1e}" if key in runs else "-" for key in ("largest", "largest q")),
+        "WRONG" if row["wrong"] else "the same",
+    )  # fmt: skip
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
