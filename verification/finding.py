@@ -236,13 +236,17 @@ def failure_of(case: str, error: Exception) -> Failure:
     return Failure(case, type(error).__name__, reason, "".join(traceback.format_exception(error)))
 
 
-def attempt(case: str, compute: Callable[[], Result], failures: list[Failure]) -> Result | None:
+def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | None) -> Result | None:
     """Return compute(), or append a Failure and return None where it raises an Exception.
+
+    Without a list of failures the exception passes through.
 
     An interrupt (KeyboardInterrupt, SystemExit) is no failure of the case and passes through.
     """
     try:
         return compute()
     except Exception as error:
+        if failures is None:
+            raise
         failures.append(failure_of(case, error))
         return None

@@ -48,18 +48,20 @@ def run_solvers(
     tolerance: float = SOLVED_TOLERANCE,
     repeats: int = 1,
     longest: float = np.inf,
+    slow: dict[str, float] | None = None,
     progress: Callable[[str, str], None] | None = None,
 ) -> list[SolverRow]:
     """Solve every problem by every solver that takes its kind (or by `solvers`); the least time of `repeats`.
 
     A solver that needs more than `longest` [s] for one problem is not asked again: give the smallest problems first.
+    `slow` holds such solvers and their times from one call to the next.
     """
     rows: list[SolverRow] = []
-    slow: dict[str, float] = {}
+    slow = {} if slow is None else slow
     for problem in problems:
         names = solvers or solver_names(problem)
         found = _rows(problem, [name for name in names if name not in slow], tolerance, repeats, progress)
-        slow |= {row.solver: row.seconds for row in found if row.seconds > longest}
+        slow.update({row.solver: row.seconds for row in found if row.seconds > longest})
         rows += found + [_unasked(problem, name, slow[name]) for name in names if name in slow
                          and name not in {row.solver for row in found}]  # fmt: skip
     return rows

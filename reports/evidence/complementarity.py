@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reports.evidence import complementarity_tables as tables
-from reports.pages.records import Finding, Topic
+from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
 from verification.finding import VERDICTS
 
@@ -40,10 +40,11 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         progress(len(stages) - 1, STAGES)
 
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
-    findings = tuple(Finding(judged.sentence, judged.verdict, judged.timed) for judged in judge(study))
+    failures = list(study.failures)
+    findings = tuple(Finding(judged.sentence, judged.verdict, judged.timed) for judged in judge(study, failures))
+    made = tables.all_tables(study, failures) | {"worlds": tables.worlds(runner, failures=failures)}
     progress(STAGES, STAGES)
-    return Topic(ID, TITLE, LEAD, findings, tables.all_tables(study) | {"worlds": tables.worlds(runner)},
-                 verdict(study, findings))  # fmt: skip
+    return with_failures(Topic(ID, TITLE, LEAD, findings, made, verdict(study, findings)), failures)
 
 
 STAGES = 9  # of `compare`, with a folder of problems
@@ -58,7 +59,7 @@ def _renamed(study: ComparisonStudy) -> ComparisonStudy:
 def verdict(study: ComparisonStudy, findings: tuple[Finding, ...]) -> str:
     """The sentence of the first page."""
     cells = study.cells + study.scenes
-    cases = sum(cell.cases for cell in cells)
+    cases = sum(cell.cases for cell in cells) or 1
     agree = sum(cell.agree * cell.cases for cell in cells) / cases
     against = sum(cell.contradictions for cell in cells)
     held = sum(finding.outcome == VERDICTS[0] for finding in findings)

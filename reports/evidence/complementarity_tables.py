@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from reports.evidence.runs import shipped_scene
 from reports.figures.figure import Numbers
 from reports.runner import Runner
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from verification.comparison.problem_study import ProblemStudy
@@ -19,15 +21,18 @@ WORLD_SCENE = "peg_corner"
 SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
 
 
-def all_tables(study: ComparisonStudy) -> dict[str, Numbers]:
-    """Every table of the topic but the worlds, by name."""
-    made = {
-        "map": agreement(study), "two contacts": two_contacts(study), "time per impact": impact_costs(study),
-        "time per step": step_costs(study), "profile": profile(study.problems), "convergence": convergence(study),
-        "friction": friction(study), "unequal restitution": unequal(study), "struck bar": bar(study), "laws": laws(),
-        "solvers": solvers(),
+def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) -> dict[str, Numbers]:
+    """Every table of the topic but the worlds, by name; `failures` receives those that cannot be made."""
+    makers: dict[str, Callable[[], Numbers]] = {
+        "map": partial(agreement, study), "two contacts": partial(two_contacts, study),
+        "time per impact": partial(impact_costs, study), "time per step": partial(step_costs, study),
+        "profile": partial(profile, study.problems), "convergence": partial(convergence, study),
+        "friction": partial(friction, study), "unequal restitution": partial(unequal, study),
+        "struck bar": partial(bar, study), "laws": laws, "solvers": solvers,
     }  # fmt: skip
-    return made | {each.folder: problems(each) for each in study.problems}
+    makers |= {each.folder: partial(problems, each) for each in study.problems}
+    made = {name: attempt(f"table {name}", make, failures) for name, make in makers.items()}
+    return {name: table for name, table in made.items() if table is not None}
 
 
 def agreement(study: ComparisonStudy) -> Numbers:
@@ -164,14 +169,18 @@ def solvers() -> Numbers:
     return Numbers(("solver", "method", "package", "takes"), rows, note=note)
 
 
-def worlds(runner: Runner, values: dict[str, Any] | None = None) -> Numbers:
+def worlds(
+    runner: Runner, values: dict[str, Any] | None = None, failures: list[Failure] | None = None
+) -> Numbers:
     """A run of every world, as its own file states its contact law and coupling; `values` change the scene."""
     from reference.worlds import WORLDS
 
     rows = []
     for world in WORLDS:
-        run = runner(shipped_scene(WORLD_SCENE, values), world, keep=False)
-        rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
+        run = attempt(f"world {world}", lambda world=world: runner(  # type: ignore[misc]
+            shipped_scene(WORLD_SCENE, values), world, keep=False), failures)
+        if run is not None:
+            rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
     return Numbers(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
                    f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip
 

@@ -98,7 +98,7 @@ def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
 def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypatch: pytest.MonkeyPatch,
                                                tmp_path: Path) -> None:  # fmt: skip
     monkeypatch.setattr("verification.comparison.study.compare", lambda *arguments, **options: study)
-    monkeypatch.setattr(complementarity_tables, "worlds", lambda runner: Numbers(("world",), ()))
+    monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: Numbers(("world",), ()))
     topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
     assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(VERDICTS)
     assert topic.verdict and "profile" in topic.tables and str(Path.home()) not in repr(topic)

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from verification.comparison.cases import ImpactCase
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from reference.complementarity.laws import Outcome
@@ -154,7 +156,11 @@ def _outside(rows: np.ndarray, change: np.ndarray) -> float:
 
 
 def compare_cases(
-    cases: Iterable[ImpactCase], law: str = "newton_lcp", resolver: Resolver = iapb
+    cases: Iterable[ImpactCase], law: str = "newton_lcp", resolver: Resolver = iapb,
+    failures: list[Failure] | None = None,
 ) -> tuple[Comparison, ...]:
-    """Compare on every case."""
-    return tuple(compare_case(case, law, resolver) for case in cases)
+    """Compare on every case; `failures` receives those that raise."""
+    found = (attempt(f"{case.family}, e = {case.restitution:g}, impact {number}",
+                     partial(compare_case, case, law, resolver), failures)
+             for number, case in enumerate(cases, 1))  # fmt: skip
+    return tuple(comparison for comparison in found if comparison is not None)

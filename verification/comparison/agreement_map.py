@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from verification.comparison.agreement import REPRODUCED, SAME, Comparison, compare_case
 from verification.comparison.cases import two_contacts
+from verification.finding import Failure, attempt
 
 COSINES = (-0.9, -0.6, -0.3, 0.0, 0.15, 0.35, 0.55, 0.75, 0.9)
 SPEED_RATIOS = (0.05, 0.25, 0.45, 0.65, 0.85, 1.0)
@@ -107,7 +109,8 @@ def _share(outcomes: Iterable[bool]) -> float:
 
 
 def two_contact_map(
-    cosines: Sequence[float] = COSINES, speed_ratios: Sequence[float] = SPEED_RATIOS, seed: int = 2
+    cosines: Sequence[float] = COSINES, speed_ratios: Sequence[float] = SPEED_RATIOS, seed: int = 2,
+    failures: list[Failure] | None = None,
 ) -> tuple[TwoContactCell, ...]:
     """Try the border r = c on a grid of two-contact impacts; grid points on the border itself are left out."""
     rng = np.random.default_rng(seed)
@@ -116,6 +119,9 @@ def two_contact_map(
         for ratio in speed_ratios:
             if cosine == ratio:
                 continue
-            found = compare_case(two_contacts(cosine, ratio, rng))
-            cells.append(TwoContactCell(cosine, ratio, ratio >= cosine, found.agrees, found.distance))
+            case = two_contacts(cosine, ratio, rng)
+            name = f"two contacts, cosine {cosine:g}, speed ratio {ratio:g}"
+            found = attempt(name, partial(compare_case, case), failures)
+            if found is not None:
+                cells.append(TwoContactCell(cosine, ratio, ratio >= cosine, found.agrees, found.distance))
     return tuple(cells)

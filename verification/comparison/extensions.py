@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verification.comparison.cases import random_mass_matrix
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from iapb.contact.impact_laws import FrictionalImpact
@@ -101,16 +103,17 @@ def _draw(rng: np.random.Generator, approaching: bool) -> _Impact:
 def compare_friction(
     count: int = 60, restitutions: tuple[float, ...] = RESTITUTIONS, frictions: tuple[float, ...] = FRICTIONS,
     seed: int = 44, progress: Callable[[str, int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[FrictionCell, ...]:
     """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts."""
     rng = np.random.default_rng(seed)
     impacts, cells = [_draw(rng, approaching=True) for _ in range(count)], []
     pairs = [(e, mu) for e in restitutions for mu in frictions]
     for done, (e, mu) in enumerate(pairs):
-        cells.append(_friction_cell(impacts, e, mu))
+        cells.append(attempt(f"friction, e = {e:g}, μ = {mu:g}", partial(_friction_cell, impacts, e, mu), failures))
         if progress is not None:
             progress("friction", done + 1, len(pairs))
-    return tuple(cells)
+    return tuple(cell for cell in cells if cell is not None)
 
 
 def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
@@ -169,9 +172,13 @@ def _counterparts(impact: _Impact, e: float, mu: float) -> tuple[Floats | None, 
     return found[0], found[1]
 
 
-def compare_unequal(count: int = 200, seed: int = 45) -> tuple[UnequalCell, ...]:
+def compare_unequal(
+    count: int = 200, seed: int = 45, failures: list[Failure] | None = None
+) -> tuple[UnequalCell, ...]:
     """Compare the engine's law for unequal restitution with Poisson, the Newton LCP and plain equalities."""
-    return tuple(_unequal_cell(signs, count, seed) for signs in ("all approach", "mixed signs"))
+    cells = (attempt(f"unequal restitution, {signs}", partial(_unequal_cell, signs, count, seed), failures)
+             for signs in ("all approach", "mixed signs"))  # fmt: skip
+    return tuple(cell for cell in cells if cell is not None)
 
 
 def _unequal_cell(signs: str, count: int, seed: int) -> UnequalCell:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from verification.comparison.problem_study import ProblemStudy
 from verification.comparison.step_cost import rivals
 from verification.comparison.study import ComparisonStudy
 from verification.comparison.world_cost import costs_more, step_rivals
-from verification.finding import LIMITED, REFUTED, REPRODUCED
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, attempt
 
 # Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9
@@ -37,16 +38,21 @@ class Judged:
     timed: bool = False
 
 
-def judge(study: ComparisonStudy) -> tuple[Judged, ...]:
-    """Every sentence of a study with its verdict; those about nothing are left out."""
-    found = []
-    for name, verdict in VERDICTS.items():
-        sentence = getattr(sentences, name)(study)
-        if sentence:
-            found.append(Judged(name, sentence, verdict(study), name in FROM_TIMES))
+def judge(study: ComparisonStudy, failures: list[Failure] | None = None) -> tuple[Judged, ...]:
+    """Every sentence of a study with its verdict; those about nothing are left out.
+
+    failures : receives the sentences that cannot be made, as where every case that they are about failed
+    """
+    found = [attempt(f"sentence on {name.replace('_', ' ')}", partial(_judged, study, name), failures)
+             for name in VERDICTS]  # fmt: skip
     for folder in study.problems:
-        found += judge_problems(folder)
-    return tuple(found)
+        found += attempt(f"sentences on {folder.folder}", partial(judge_problems, folder), failures) or []
+    return tuple(judged for judged in found if judged is not None)
+
+
+def _judged(study: ComparisonStudy, name: str) -> Judged | None:
+    sentence = str(getattr(sentences, name)(study))
+    return Judged(name, sentence, VERDICTS[name](study), name in FROM_TIMES) if sentence else None
 
 
 def judge_problems(study: ProblemStudy) -> list[Judged]:
@@ -117,7 +123,8 @@ def _steps(study: ComparisonStudy) -> str:
 
 def _all(outcomes: Iterable[bool]) -> str:
     """A statement that claims to be exact has no exceptions."""
-    return REPRODUCED if all(outcomes) else REFUTED
+    found = list(outcomes)
+    return NOT_TESTABLE if not found else REPRODUCED if all(found) else REFUTED
 
 
 def _by_share(share: float) -> str:

@@ -4,7 +4,8 @@ project's scenes, hyperstatic families, and patches with friction. The same ones
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +15,14 @@ from iapb.errors import ArgumentError
 from verification.comparison.cases import ImpactCase, random_cases
 from verification.comparison.scene_cases import scene_impacts
 from verification.comparison.step_cost import patch, pile
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from reference.complementarity.problem import ImpactProblem
     from reference.datasets import StoredProblem
 
 Floats = NDArray[np.float64]
+Maker = Callable[[str], "ImpactProblem"]  # from its name
 
 # Of the catalogue, those with few contacts; a thousand copies of one row take the slowest solvers minutes.
 HARD = ("nearly_parallel_normals", "printed_formula_gains", "hilbert_rows", "kahan_rows", "mass_ratio",
@@ -33,41 +36,42 @@ FRICTIONAL_CONTACTS = (1, 4, 12)
 _SEED = 9
 
 
-def own_problems() -> tuple[StoredProblem, ...]:
-    """All of them, frictionless ones first."""
+def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
+    """All of them, frictionless ones first; `failures` receives those that cannot be made."""
     from reference.datasets import StoredProblem
 
-    problems = (*_hard_cases(), *_scene_impacts(), *_hyperstatic(), *_with_friction())
-    return tuple(StoredProblem(problem, format="built here") for problem in problems)
+    makers: dict[str, Maker] = {f"hard case {name}": partial(_hard_case, name) for name in HARD}
+    makers |= {f"impact of {name}": partial(_scene_impact, name) for name in SCENES}
+    makers |= dict(_hyperstatic()) | dict(_with_friction())
+    made = (attempt(name, partial(make, name), failures) for name, make in makers.items())
+    return tuple(StoredProblem(problem, format="built here") for problem in made if problem is not None)
 
 
-def _hard_cases() -> Iterator[ImpactProblem]:
+def _hard_case(hard: str, name: str) -> ImpactProblem:
     from reference.complementarity.problem import ImpactProblem
     from verification.hard_cases import HARD_CASES, HardCase
 
-    for name in HARD:
-        case = HARD_CASES[name]()
-        if not isinstance(case, HardCase):
-            raise ArgumentError("HARD", name, "the name of a hard impact")
-        yield ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution,
-                                        name=f"hard case {name}")  # fmt: skip
+    case = HARD_CASES[hard]()
+    if not isinstance(case, HardCase):
+        raise ArgumentError("HARD", hard, "the name of a hard impact")
+    return ImpactProblem.from_impact(
+        case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, name=name
+    )
 
 
-def _scene_impacts() -> Iterator[ImpactProblem]:
-    """Of each scene the impact with the most contacts."""
-    for name in SCENES:
-        cases = scene_impacts(name).cases
-        if cases:
-            yield _posed(max(cases, key=lambda case: case.contacts), f"impact of {name}")
+def _scene_impact(scene: str, name: str) -> ImpactProblem:
+    """The impact with the most contacts."""
+    return _posed(max(scene_impacts(scene).cases, key=lambda case: case.contacts), name)
 
 
-def _hyperstatic() -> Iterator[ImpactProblem]:
+def _hyperstatic() -> Iterator[tuple[str, Maker]]:
     for case in random_cases(1, restitutions=(0.5,), families=FAMILIES, seed=_SEED):
         if case.redundancy:
-            yield _posed(case, f"{case.family}, {case.redundancy} redundant of {case.contacts}")
+            yield f"{case.family}, {case.redundancy} redundant of {case.contacts}", partial(_posed, case)
     for contacts in HYPERSTATIC_CONTACTS:
         for make in (patch, pile):
-            yield _posed(make(contacts, np.random.default_rng([_SEED, contacts])), f"{make.__name__} of {contacts}")
+            case = make(contacts, np.random.default_rng([_SEED, contacts]))
+            yield f"{make.__name__} of {contacts}", partial(_posed, case)
 
 
 def _posed(case: ImpactCase, name: str) -> ImpactProblem:
@@ -78,17 +82,21 @@ def _posed(case: ImpactCase, name: str) -> ImpactProblem:
     )
 
 
-def _with_friction() -> Iterator[ImpactProblem]:
+def _with_friction() -> Iterator[tuple[str, Maker]]:
     """The box that lands on a patch, sliding, with dry friction; and a rod wedged between two walls."""
+    for contacts in FRICTIONAL_CONTACTS:
+        for mu in FRICTIONS:
+            yield f"patch of {contacts}, μ = {mu:g}", partial(_rough_patch, contacts, mu)
+    for mu in FRICTIONS:
+        yield f"rod between walls, μ = {mu:g}", partial(_wedged_rod, mu)
+
+
+def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
     from reference.complementarity.problem import ImpactProblem
 
-    for contacts in FRICTIONAL_CONTACTS:
-        case = patch(contacts, np.random.default_rng([_SEED, contacts, 3]))
-        for mu in FRICTIONS:
-            yield ImpactProblem.from_impact(case.mass_matrix, _with_tangents(case.contact_jacobian), case.velocity, 0.0,
-                                            mu, name=f"patch of {contacts}, μ = {mu:g}")  # fmt: skip
-    for mu in FRICTIONS:
-        yield _wedged_rod(mu)
+    case = patch(contacts, np.random.default_rng([_SEED, contacts, 3]))
+    rows = _with_tangents(case.contact_jacobian)
+    return ImpactProblem.from_impact(case.mass_matrix, rows, case.velocity, 0.0, mu, name=name)
 
 
 def _with_tangents(normals: Floats) -> Floats:
@@ -100,7 +108,7 @@ def _with_tangents(normals: Floats) -> Floats:
     return np.array(rows)
 
 
-def _wedged_rod(mu: float) -> ImpactProblem:
+def _wedged_rod(mu: float, name: str) -> ImpactProblem:
     """A rod whose ends press on two facing walls as it turns: normals opposed, friction may hold it by itself."""
     from reference.complementarity.problem import ImpactProblem
 
@@ -109,7 +117,7 @@ def _wedged_rod(mu: float) -> ImpactProblem:
             for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip
     velocity = np.array([0.0, -0.4, 0.1, 0.0, 0.0, 0.7])
     mass = np.diag([1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0])
-    return ImpactProblem.from_impact(mass, np.array(rows), -velocity, 0.0, mu, name=f"rod between walls, μ = {mu:g}")
+    return ImpactProblem.from_impact(mass, np.array(rows), -velocity, 0.0, mu, name=name)
 
 
 def _row(point: Floats, direction: Floats) -> Floats:

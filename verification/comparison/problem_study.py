@@ -9,11 +9,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from reference.complementarity.benchmark import SolverRow
@@ -80,7 +83,8 @@ Progress = Callable[[str, int, int], None]
 
 
 def study_problems(
-    folder: Path | str, repeats: int = 1, longest: float = np.inf, progress: Progress | None = None
+    folder: Path | str, repeats: int = 1, longest: float = np.inf, progress: Progress | None = None,
+    failures: list[Failure] | None = None,
 ) -> ProblemStudy:
     """Read every problem file below `folder` and solve it by every solver that takes its kind.
 
@@ -88,6 +92,7 @@ def study_problems(
     ----------
     repeats : solves of each pair, of which the fastest counts
     longest : a solver that needs more seconds than this for a problem is not asked for one with more unknowns
+    failures : receives the problems that raise; without it the exception passes through
 
     Raises
     ------
@@ -105,12 +110,12 @@ def study_problems(
             read.append(read_problem(path))
         except DatasetError as error:
             unread.append(UnreadFile(path.name, str(error)))
-    return study_read(str(folder), read, unread, repeats, longest, progress)
+    return study_read(str(folder), read, unread, repeats, longest, progress, failures)
 
 
 def study_read(
     name: str, problems: Sequence[StoredProblem], unread: Sequence[UnreadFile] = (), repeats: int = 1,
-    longest: float = np.inf, progress: Progress | None = None,
+    longest: float = np.inf, progress: Progress | None = None, failures: list[Failure] | None = None,
 ) -> ProblemStudy:
     """Solve every problem of a collection called `name` by every solver that takes its kind."""
     from reference.complementarity.benchmark import run_solvers
@@ -123,14 +128,20 @@ def study_read(
     with one_thread():
         _warm(problems)
         small_first = sorted((stored.problem for stored in problems), key=lambda problem: problem.size)
-        rows = run_solvers(small_first, repeats=repeats, longest=longest,
-                           progress=lambda *_: say(stage, next(begun), pairs))
+        rows: list[SolverRow] = []
+        slow: dict[str, float] = {}
+        for problem in small_first:
+            rows += attempt(problem.name, partial(
+                run_solvers, [problem], repeats=repeats, longest=longest, slow=slow,
+                progress=lambda *_: say(stage, next(begun), pairs)), failures) or []
     say(stage, pairs, pairs)
     kinds: dict[str, list[SolverRow]] = {}
     for stored in problems:
         kind = "frictionless" if stored.problem.friction is None else "friction"
         kinds.setdefault(kind, []).extend(_of(stored, rows))
-    lines = tuple(_line(stored, _of(stored, rows)) for stored in problems)
+    tried = [attempt(stored.problem.name, partial(_line, stored, found), failures)
+             for stored in problems if (found := _of(stored, rows))]  # fmt: skip
+    lines = tuple(line for line in tried if line is not None)
     return ProblemStudy(name, lines, tuple(rows), tuple(unread), _profiles(kinds))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from verification.comparison.cases import ImpactCase
 from verification.comparison.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
+from verification.finding import Failure, attempt, failure_of
 
 Floats = NDArray[np.float64]
 
@@ -110,6 +112,7 @@ def impact_cost(
     seed: int = 22,
     longest: float = LONGEST,
     progress: Callable[[str, int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[CostRow, ...]:
     """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
     from reference.one_thread import one_thread
@@ -120,16 +123,18 @@ def impact_cost(
         for make in (patch, pile):
             case = make(count, np.random.default_rng([seed, count]))
             with one_thread():
-                rows += _time_case(case, solvers, max(3, repeats), longest, too_slow)
+                timing = partial(_time_case, case, solvers, max(3, repeats), longest, too_slow, failures)
+                rows += attempt(f"{case.family} of {count} contacts", timing, failures) or []
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))
     return tuple(rows)
 
 
 def _time_case(
-    case: ImpactCase, solvers: Sequence[str], repeats: int, longest: float, too_slow: dict[tuple[str, str], float]
+    case: ImpactCase, solvers: Sequence[str], repeats: int, longest: float, too_slow: dict[tuple[str, str], float],
+    failures: list[Failure] | None,
 ) -> list[CostRow]:
-    calls, answers, notes = _warm(case, solvers, too_slow)
+    calls, answers, notes = _warm(case, solvers, too_slow, failures)
     samples: dict[str, list[float]] = {name: [] for name in calls}
     inner = {name: _repetitions(call) for name, call in calls.items()}
     names = list(calls)
@@ -143,7 +148,7 @@ def _time_case(
 
 
 def _warm(
-    case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float]
+    case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float], failures: list[Failure] | None
 ) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
     """The calls that work, their v⁺, and for the others why not."""
     from iapb.errors import MissingDependencyError
@@ -160,8 +165,13 @@ def _warm(
             answers[name] = call()
         except MissingDependencyError as error:
             notes[name] = f"missing: {error}"
-            continue
-        calls[name] = call
+        except Exception as error:
+            if failures is None:
+                raise
+            failures.append(failure_of(f"{name} on a {case.family} of {case.contacts} contacts", error))
+            notes[name] = f"failed: {error}"
+        else:
+            calls[name] = call
     return calls, answers, notes
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.comparison.agreement import Comparison, compare_case, compare_cases
+from verification.comparison.agreement import Comparison, compare_cases
 from verification.comparison.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
 from verification.comparison.cases import random_cases
-from verification.comparison.convergence import CASES, ConvergenceRow, TruthCase, convergence
+from verification.comparison.convergence import CASES, ConvergenceRow, converge
 from verification.comparison.extensions import (
     FrictionCell,
     UnequalCell,
@@ -26,6 +27,7 @@ from verification.comparison.problem_study import ProblemStudy, study_problems, 
 from verification.comparison.scene_cases import impacts_of_run, scene_impacts
 from verification.comparison.step_cost import CONTACTS, CostRow, impact_cost
 from verification.comparison.world_cost import StepCostRow, world_cost
+from verification.finding import Failure, attempt
 
 Progress = Callable[[str, int, int], None]
 
@@ -69,6 +71,7 @@ class ComparisonStudy:
     friction, unequal, bar : the engine's extensions beside their complementarity counterparts
     convergence : of the rigid world to event-driven truth, scene by scene
     impact_costs, step_costs : C22; problems : our own collection, and folders of problem files
+    failures : the cases that raised, which are in nothing else
     """
 
     depth: str
@@ -84,6 +87,7 @@ class ComparisonStudy:
     impact_costs: tuple[CostRow, ...]
     step_costs: tuple[StepCostRow, ...]
     problems: tuple[ProblemStudy, ...] = ()
+    failures: tuple[Failure, ...] = ()
 
 
 def compare(
@@ -101,6 +105,8 @@ def compare(
     scenes : names of the project's scenes; default all
     progress : called as progress(stage, done, total)
 
+    A case that raises is among the failures of what is returned.
+
     Raises
     ------
     ArgumentError
@@ -109,38 +115,47 @@ def compare(
     if depth not in DEPTHS:
         raise ArgumentError("depth", depth, one_of(depth, DEPTHS))
     size, say = DEPTHS[depth], progress or (lambda stage, done, total: None)
-    comparisons = _random_comparisons(size.cases, say)
-    scene_cells, left_out = compare_scenes(scenes, say)
-    return ComparisonStudy(
+    failures: list[Failure] = []
+    comparisons = _random_comparisons(size.cases, say, failures)
+    scene_cells, left_out = compare_scenes(scenes, say, failures)
+    found = ComparisonStudy(
         depth,
         single=tuple(c for c in comparisons if c.family == "one contact" and not c.redundancy),
-        cells=agreement_map(comparisons), two_contacts=two_contact_map(), scenes=scene_cells, left_out=left_out,
-        friction=compare_friction(size.frictional, progress=say), unequal=compare_unequal(size.unequal),
-        bar=struck_bar(), convergence=convergence(_truths(size), progress=say),
-        impact_costs=impact_cost(size.contacts, repeats=size.repeats, longest=size.longest, progress=say),
-        step_costs=world_cost(repeats=size.repeats, progress=say),
-        problems=(study_read(OWN, own_problems(), longest=size.longest, progress=say),
-                  *(study_problems(folder, longest=size.longest, progress=say) for folder in folders)),
+        cells=agreement_map(comparisons), two_contacts=two_contact_map(failures=failures),
+        scenes=scene_cells, left_out=left_out,
+        friction=compare_friction(size.frictional, progress=say, failures=failures),
+        unequal=compare_unequal(size.unequal, failures=failures),
+        bar=attempt("struck bar", struck_bar, failures) or {}, convergence=_convergence(size, say, failures),
+        impact_costs=impact_cost(size.contacts, repeats=size.repeats, longest=size.longest, progress=say,
+                                 failures=failures),
+        step_costs=world_cost(repeats=size.repeats, progress=say, failures=failures),
+        problems=(study_read(OWN, own_problems(failures), longest=size.longest, progress=say, failures=failures),
+                  *(study_problems(folder, longest=size.longest, progress=say, failures=failures)
+                    for folder in folders)),
     )  # fmt: skip
+    return replace(found, failures=tuple(failures))
 
 
-def _truths(size: Depth) -> list[TruthCase]:
-    return [case for case in CASES if size.truths is None or case.scene in size.truths]
+def _convergence(size: Depth, say: Progress, failures: list[Failure]) -> tuple[ConvergenceRow, ...]:
+    cases = [case for case in CASES if size.truths is None or case.scene in size.truths]
+    rows = []
+    for done, case in enumerate(cases, 1):
+        rows.append(attempt(f"convergence on {case.scene}", partial(converge, case), failures))
+        say("convergence to event-driven truth", done, len(cases))
+    return tuple(row for row in rows if row is not None)
 
 
-def _random_comparisons(count: int, say: Progress) -> tuple[Comparison, ...]:
-    cases = list(random_cases(count))
-    found = []
-    for done, case in enumerate(cases):
-        found.append(compare_case(case))
-        if done % 50 == 0:
-            say("random impacts", done, len(cases))
+def _random_comparisons(count: int, say: Progress, failures: list[Failure]) -> tuple[Comparison, ...]:
+    cases, found, piece = list(random_cases(count)), list[Comparison](), 50
+    for done in range(0, len(cases), piece):
+        say("random impacts", done, len(cases))
+        found += compare_cases(cases[done : done + piece], failures=failures)
     say("random impacts", len(cases), len(cases))
     return tuple(found)
 
 
 def compare_scenes(
-    scenes: Iterable[str] | None = None, progress: Progress | None = None
+    scenes: Iterable[str] | None = None, progress: Progress | None = None, failures: list[Failure] | None = None
 ) -> tuple[tuple[MapCell, ...], int]:
     """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
     from iapb.scene_files import scene_names
@@ -149,9 +164,11 @@ def compare_scenes(
     found: list[Comparison] = []
     for done, name in enumerate(names):
         for restitution in SCENE_RESTITUTIONS:
-            impacts = scene_impacts(name, restitution=restitution)
-            found += compare_cases(impacts.cases)
-            left_out += impacts.left_out
+            told = name if restitution is None else f"{name}, e = {restitution:g}"
+            impacts = attempt(f"impacts of {told}", partial(scene_impacts, name, restitution=restitution), failures)
+            if impacts is not None:
+                found += compare_cases(impacts.cases, failures=failures)
+                left_out += impacts.left_out
         if progress is not None:
             progress("impacts of scenes", done + 1, len(names))
     return agreement_map(found), left_out

@@ -9,8 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+
+from verification.finding import Failure, attempt
 
 SCENES = ("peg_corner", "peg_hole")
 STEPPED, IDEAL = "IAPB, step by step", "ideal (QP per step)"
@@ -34,7 +37,9 @@ class StepCostRow:
 def step_rivals(rows: Sequence[StepCostRow]) -> tuple[tuple[StepCostRow, StepCostRow], ...]:
     """(the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
     by = {(row.scene, row.way): row for row in rows}
-    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in dict.fromkeys(row.scene for row in rows))
+    scenes = dict.fromkeys(row.scene for row in rows)
+    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in scenes
+                 if (scene, IDEAL) in by and (scene, STEPPED) in by)  # fmt: skip
 
 
 def costs_more(theirs: StepCostRow, ours: StepCostRow) -> bool | None:
@@ -46,7 +51,7 @@ def costs_more(theirs: StepCostRow, ours: StepCostRow) -> bool | None:
 
 def world_cost(
     scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS, ways: Sequence[str] = WAYS,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Callable[[str, int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> tuple[StepCostRow, ...]:
     """Time every world on every scene; the first run of each, which compiles, is not counted."""
     from reference.one_thread import one_thread
@@ -56,9 +61,11 @@ def world_cost(
         samples: dict[str, list[float]] = {way: [] for way in ways}
         with one_thread():
             for turn in range(max(3, repeats) + 1):
-                for way in ways:
-                    seconds = _seconds_per_step(name, way, steps)
-                    if turn > 0:
+                for way in tuple(samples):
+                    seconds = attempt(f"{name}, {way}", partial(_seconds_per_step, name, way, steps), failures)
+                    if seconds is None:
+                        del samples[way]
+                    elif turn > 0:
                         samples[way].append(seconds)
         rows += [
             StepCostRow(name, way, float(np.median(s)), min(s), max(s), len(s), steps) for way, s in samples.items()
