@@ -7,11 +7,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
+from iapb.simulation import simulate
+from reports.store.keys import canonical_json, content_hash, result_head, results_of
+from reports.store.runs import read_run
 
 # name of a law -> (module, class); any other law is made again where a world has it
 LAWS = {
@@ -24,13 +29,28 @@ COUPLINGS: dict[str, Any] = {kind.name: kind for kind in (NoCoupling, FourChanne
 
 
 @dataclass(frozen=True)
+class Difference:
+    """One result that did not come out the same, and how.
+
+    largest : absolute difference of the numbers; infinite where there is none (another shape, a NaN on one side).
+    """
+
+    name: str
+    how: str
+    largest: float = np.inf
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.how})"
+
+
+@dataclass(frozen=True)
 class Repetition:
     """A run simulated again: the two content hashes, and what differs where they do."""
 
     file: str
     stored: str
     again: str
-    differs: tuple[str, ...]
+    differs: tuple[Difference, ...]
 
     @property
     def same(self) -> bool:
@@ -48,10 +68,6 @@ def repeat_run(path: Path | str) -> Repetition:
     ArgumentError
         Its law or coupling is not one of ours: it cannot be made again from the file alone.
     """
-    from iapb.simulation import simulate
-    from reports.store.keys import content_hash
-    from reports.store.runs import read_run
-
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
     return Repetition(str(path), content_hash(stored), content_hash(again), differences(stored, again))
@@ -101,17 +117,32 @@ def _known(kind: Any, settings: Any) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name in names}
 
 
-def differences(stored: Run, again: Run) -> tuple[str, ...]:
-    """Names of the results that are not the same bit for bit."""
-    import numpy as np
+def differences(stored: Run, again: Run) -> tuple[Difference, ...]:
+    """Return every result that is not the same bit for bit; none where the content hashes are equal."""
+    heads, arrays = (result_head(stored), result_head(again)), (dict(results_of(stored)), dict(results_of(again)))
+    found = [_difference(name, *(head[name] for head in heads)) for name in heads[0]]
+    for name in dict.fromkeys([*arrays[0], *arrays[1]]):
+        if any(name not in side for side in arrays):
+            found.append(Difference(name, "only stored" if name in arrays[0] else "only simulated again"))
+        else:
+            found.append(_array_difference(name, *(np.asarray(side[name]) for side in arrays)))
+    return tuple(one for one in found if one is not None)
 
-    from reports.store.schema import GROUPS, RESULT_GROUPS
 
-    found = []
-    for group in RESULT_GROUPS:
-        quantities, record_of, _ = GROUPS[group]
-        for quantity in quantities:
-            a, b = (np.asarray(getattr(record_of(run), quantity.name)) for run in (stored, again))
-            if a.shape != b.shape or a.tobytes() != b.tobytes():
-                found.append(f"{group}/{quantity.name}")
-    return tuple(found)
+def _difference(name: str, stored: Any, again: Any) -> Difference | None:
+    same = canonical_json(stored) == canonical_json(again)
+    return None if same else Difference(name, f"is {again}, was {stored}")
+
+
+def _array_difference(name: str, stored: np.ndarray, again: np.ndarray) -> Difference | None:
+    if (stored.shape, stored.dtype) != (again.shape, again.dtype):
+        return Difference(name, f"is {again.dtype} {again.shape}, was {stored.dtype} {stored.shape}")
+    if stored.tobytes() == again.tobytes():
+        return None
+    other = stored != again  # true for NaN on both sides
+    a, b = stored[other].astype(float), again[other].astype(float)
+    bits = np.isnan(a) & np.isnan(b)
+    if np.all(bits):
+        return Difference(name, "in bits that no comparison of numbers shows (the sign of a zero, a NaN)", 0.0)
+    largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
+    return Difference(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)

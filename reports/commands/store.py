@@ -92,17 +92,35 @@ def _gc(where: Path, dry_run: bool) -> None:
 
 def _again(where: Path, _: bool) -> None:
     from reports.commands.progress import stage_progress
-    from reports.resimulate import repeat_run
+    from reports.store.care import is_run
 
-    files = sorted(where.rglob("*.h5")) if where.is_dir() else [where]
-    other = 0
+    files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
+    same = 0
     with stage_progress() as progress:
         for done, path in enumerate(files):
             progress("runs simulated again", done, len(files))
-            found = repeat_run(path)
-            other += not found.same
-            words = "the same to the last bit" if found.same else f"differs in {', '.join(found.differs)}"
-            print(f"{path}: {words}")
-    print(f"{len(files) - other} of {len(files)} runs came out the same.")
-    if other:
+            same += _tell_again(path)
+    print(f"{same} of {len(files)} runs came out the same.")
+    if same < len(files):
         raise typer.Exit(1)
+
+
+def _tell_again(path: Path) -> bool:
+    """Simulate one run again, and say what differs and by how much; whether nothing does."""
+    from iapb.errors import IapbError
+    from reports.provenance import linear_algebra
+    from reports.resimulate import repeat_run
+    from reports.store.runs import read_provenance
+
+    try:
+        found = repeat_run(path)
+    except IapbError as error:
+        print(f"{path}: not simulated again: {str(error).removeprefix(f'{path}: ')}")
+        return False
+    print(f"{path}: " + ("the same to the last bit" if found.same else "differs in"))
+    for one in found.differs:
+        print(f"  {one.name}: {one.how}")
+    made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
+    if not found.same and made != here:
+        print(f"  it was stored under {made}; this is {here}")
+    return found.same

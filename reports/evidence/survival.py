@@ -89,5 +89,6 @@ def _fault_table(faults: Any) -> Numbers:
 
 
 def _repeated_table(repeated: Any) -> Numbers:
-    rows = tuple((name, one.stored[:16], one.again[:16], ", ".join(one.differs) or "nothing") for name, one in repeated)
+    rows = tuple((name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
+                 for name, one in repeated)  # fmt: skip
     return Numbers(("run", "content hash stored", "simulated again", "differs in"), rows)

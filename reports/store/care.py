@@ -82,6 +82,15 @@ def _state(path: Path) -> FileState:
         return FileState(path, DAMAGED, str(error).removeprefix(f"{path}: "))
 
 
+def is_run(path: Path) -> bool:
+    """Whether a file is a run or damaged; a table or somebody else's file is not."""
+    try:
+        with opened(path, expected_format=None) as file:
+            return file.attrs.get("format") == FORMAT
+    except RunFileError:
+        return True
+
+
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
     """Set damaged files aside and write the index anew; return the state of every file before that.
 

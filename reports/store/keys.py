@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -81,13 +81,24 @@ def add_array(digest: Any, name: str, array: Any) -> None:
 def content_hash(run: Run) -> str:
     """Return sha256 of the results alone: no timings, no provenance; equal bit for bit on a repeat."""
     digest = hashlib.sha256()
-    head = [run.dt, run.complete, run.tool_dofs, run.coordinate_names, run.velocity_names, run.body_names]
-    digest.update(canonical_json(head).encode())
-    add_array(digest, "time", run.time)
+    digest.update(canonical_json(list(result_head(run).values())).encode())
+    for name, values in results_of(run):
+        add_array(digest, name, values)
+    return digest.hexdigest()
+
+
+def result_head(run: Run) -> dict[str, Any]:
+    """Return what the content hash covers besides arrays, by name."""
+    names = ("dt", "complete", "tool_dofs", "coordinate_names", "velocity_names", "body_names")
+    return {name: getattr(run, name) for name in names}
+
+
+def results_of(run: Run) -> Iterator[tuple[str, Any]]:
+    """Yield name and array of every result that the content hash covers."""
+    yield "time", run.time
     for group in RESULT_GROUPS:
         quantities, record_of, _ = GROUPS[group]
         for quantity in quantities:
-            add_array(digest, f"{group}/{quantity.name}", getattr(record_of(run), quantity.name))
+            yield f"{group}/{quantity.name}", getattr(record_of(run), quantity.name)
     for name in sorted(run.energy):
-        add_array(digest, f"energy/{name}", run.energy[name])
-    return digest.hexdigest()
+        yield f"energy/{name}", run.energy[name]

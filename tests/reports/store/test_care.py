@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, RunFileError
+from iapb.run import Run
 from reports.evidence.runs import shipped_scene
-from reports.resimulate import repeat_run
+from reports.resimulate import differences, repeat_run
 from reports.runner import Runner
-from reports.store import write_run
+from reports.store import Column, Table, content_hash, read_run, write_run, write_table
 from reports.store.care import (
     DAMAGED,
     DAMAGED_SUFFIX,
@@ -25,7 +30,7 @@ from reports.store.care import (
     garbage,
     repair_store,
 )
-from reports.store.runs import read_run
+from reports.store.schema import GROUPS, RESULT_GROUPS
 
 SHORT = {"duration": 0.05}
 
@@ -115,20 +120,89 @@ def test_a_run_comes_out_the_same_from_its_own_file(tmp_path: Path, world: str) 
     assert repetition.same and repetition.differs == ()
 
 
-def test_a_run_that_does_not_come_out_the_same_is_told_with_what_differs(tmp_path: Path) -> None:
-    from dataclasses import replace
+def test_a_run_that_does_not_come_out_the_same_is_told_with_what_differs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from reports.cli import main
 
     run = Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "IAPB")
-    forged = replace(run, q=run.q + 1e-15)
-    write_run(tmp_path / "forged.h5", forged)
-    repetition = repeat_run(tmp_path / "forged.h5")
+    energy = {**run.energy, "impact_loss": run.energy["impact_loss"] + 6e-17}
+    other = {"blas": "OpenBLAS of another processor"}
+    path = write_run(tmp_path / "forged.h5", replace(run, q=run.q + 1e-15, energy=energy), provenance=other)
+    repetition = repeat_run(path)
     assert not repetition.same
-    assert repetition.differs == ("trajectory/q",)
+    assert [one.name for one in repetition.differs] == ["trajectory/q", "energy/impact_loss"]
+    assert [0.0 < one.largest < 2e-15 for one in repetition.differs] == [True, True]
+    assert main(["store", "again", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert "forged.h5: differs in\n" in said and "energy/impact_loss: by at most 6e-17 in " in said
+    assert "stored under OpenBLAS of another processor; this is " in said
+
+
+def _changed(values: np.ndarray) -> np.ndarray:
+    return ~values if values.dtype == np.bool_ else values + values.dtype.type(1)
+
+
+ARRAYS = [f"{group}/{quantity.name}" for group in RESULT_GROUPS for quantity in GROUPS[group][0]]
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_every_array_of_the_content_hash_is_compared(name: str, make_run: Callable[..., Run]) -> None:
+    run, (group, field) = make_run(), name.split("/")
+    record: Any = getattr(run, group) if group in ("contacts", "impacts") else run
+    changed: Any = replace(record, **{field: _changed(getattr(record, field))})
+    other = changed if record is run else replace(run, **{group: changed})
+    assert content_hash(other) != content_hash(run)
+    assert [one.name for one in differences(run, other)] == [name]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "how"),
+    [
+        ("complete", False, "is False, was True"),
+        ("dt", 0.25, "is 0.25, was 0.001953125"),
+        ("time", np.zeros(21), "by at most 0.039 in 20 of 21 values"),
+        ("body_names", ("ball",), "is ('ball',), was ('peg',)"),
+    ],
+)
+def test_so_is_what_stands_beside_the_arrays(field: str, value: object, how: str, make_run: Callable[..., Run]) -> None:
+    run = make_run()
+    other = replace(run, **{field: value})  # type: ignore[arg-type]
+    assert content_hash(other) != content_hash(run)
+    assert [(one.name, one.how) for one in differences(run, other)] == [(field, how)]
+
+
+@pytest.mark.parametrize(
+    ("stored", "again", "how"),
+    [
+        ([0.0, 1.0], [-0.0, 1.0], "in bits that no comparison of numbers shows (the sign of a zero, a NaN)"),
+        ([np.nan, 1.0], [np.nan, 1.5], "by at most 0.5 in 1 of 2 values"),
+        ([np.nan, 1.0], [2.0, 1.0], "by at most inf in 1 of 2 values"),
+        ([1.0], [1.0, 1.0], "is float64 (2,), was float64 (1,)"),
+    ],
+)
+def test_a_difference_says_how_large_it_is(
+    stored: list[float], again: list[float], how: str, make_run: Callable[..., Run]
+) -> None:
+    runs = [make_run(energy={"kinetic": np.array(values)}) for values in (stored, again)]
+    assert [(one.name, one.how) for one in differences(*runs)] == [("energy/kinetic", how)]
+    assert differences(make_run(energy={}), make_run())[0].how == "only simulated again"
+
+
+def test_a_run_that_cannot_be_made_again_costs_its_own_line(
+    filled: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from reports.cli import main
+
+    write_run(filled / "mine.h5", replace(read_run(runs(filled)[0]), law="mine"))
+    write_table(filled / "table.h5", Table("t", (Column("x", np.arange(3.0), "1", "x"),)))
+    assert main(["store", "again", str(filled)]) == 1
+    said = capsys.readouterr().out
+    assert "mine.h5: not simulated again: law = 'mine'" in said and "table.h5" not in said
+    assert f"{len(runs(filled))} of {len(runs(filled)) + 1} runs came out the same." in said
 
 
 def test_a_run_of_an_unknown_law_cannot_be_made_again(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     run = Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "IAPB")
     write_run(tmp_path / "mine.h5", replace(run, law="mine"))
     with pytest.raises(ArgumentError, match="mine"):
