@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from iapb.mechanics.mechanism import Mechanism as Mechanism
     from iapb.run import Run as Run
     from iapb.scene import Scene as Scene
+    from iapb.scene import find_scene as find_scene
     from iapb.scene import load_scene as load_scene
-    from iapb.scene_files import find_scene as find_scene
-    from iapb.scene_files import scene_folder as scene_folder
+    from iapb.scene import scene_folder as scene_folder
     from iapb.simulation import Simulation as Simulation
     from iapb.simulation import simulate as simulate
 
@@ -50,8 +50,7 @@ _HOME = {
     ),
     "iapb.mechanics.mechanism": ("Body", "Joint", "Mechanism"),
     "iapb.run": ("Run",),
-    "iapb.scene": ("Scene", "load_scene"),
-    "iapb.scene_files": ("find_scene", "scene_folder"),
+    "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

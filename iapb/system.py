@@ -22,9 +22,8 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralC
 from iapb.haptics.kernels import Port
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Mechanism
-from iapb.restitution import restitution_by_pair, restitution_by_shape
 from iapb.scene import Scene, SpatialScene
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, restitution_by_shape, shapes_of
 from iapb.system_port import force_limit, make_port
 
 Floats = NDArray[np.float64]

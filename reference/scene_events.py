@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
-from iapb.restitution import one_restitution
 from iapb.scene import Scene
+from iapb.scene.mechanism import one_restitution
 from iapb.system import System
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem

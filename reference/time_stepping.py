@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from iapb.contact.laws import StepResult
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from iapb.restitution import restitution_by_pair
 from iapb.run import COLLIDING, FREE, RESTING
+from iapb.scene.mechanism import restitution_by_pair
 from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
 from reference.one_thread import one_thread
 from reference.rigid_friction import FRICTION_LAWS, friction_step

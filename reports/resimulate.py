@@ -75,7 +75,7 @@ def repeat_run(path: Path | str) -> Repetition:
 
 def scene_of(run: Run) -> Scene:
     """The scene of a run, from its resolved values."""
-    from iapb.scene.space import scene_kind
+    from iapb.scene.model import scene_kind
 
     scene: Scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
     scene._source_text = run.scene_source

@@ -59,7 +59,7 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
 
     Its values are tried before it is returned: as the command reads them, they must give the scene to the last bit.
     """
-    from iapb.scene.changing import set_value
+    from iapb.scene.model import set_value
     from reports.commands.run import parsed
 
     shipped = _shipped(scene.name)
@@ -80,8 +80,7 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
 
 @cache
 def _shipped(name: str) -> Scene | None:
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene, scene_names
+    from iapb.scene import find_scene, load_scene, scene_names
 
     return load_scene(find_scene(name)) if name in scene_names() else None
 

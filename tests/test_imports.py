@@ -49,8 +49,7 @@ def test_the_store_waits_with_the_heavy_packages() -> None:
 
 
 def test_the_scenes_are_found() -> None:
-    scene_files = import_module("iapb.scene_files")
-    for name in scene_files.scene_names():
+    for name in import_module("iapb.scene").scene_names():
         assert iapb.find_scene(name).is_file() and iapb.find_scene(f"{name}.yaml") == iapb.find_scene(name)
     with pytest.raises(iapb.ArgumentError, match="one of"):
         iapb.find_scene("no such scene")

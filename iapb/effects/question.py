@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from iapb.mechanics.mechanism import Mechanism
-from iapb.restitution import restitution_by_pair
 from iapb.scene import Scene
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
 
 # What each law makes of a scene's contact section; a law that is not listed is taken to use all of it.
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"

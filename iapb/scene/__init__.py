@@ -1,8 +1,16 @@
 """Scenes: what a scene file may say, read and checked."""
 
-from iapb.scene.model import Scene
-from iapb.scene.reading import load_scene, scene_from_text
+from iapb.scene.model import Scene, SpatialScene
+from iapb.scene.reading import find_scene, load_scene, scene_folder, scene_from_text, scene_names
 from iapb.scene.schema import scene_schema
-from iapb.scene.space import SpatialScene
 
-__all__ = ["Scene", "SpatialScene", "load_scene", "scene_from_text", "scene_schema"]
+__all__ = [
+    "Scene",
+    "SpatialScene",
+    "find_scene",
+    "load_scene",
+    "scene_folder",
+    "scene_from_text",
+    "scene_names",
+    "scene_schema",
+]

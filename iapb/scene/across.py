@@ -10,11 +10,9 @@ from typing import Any
 
 from pydantic_core import InitErrorDetails
 
-from iapb.scene.bodies import JOINT_COORDINATES, WORLD
+from iapb.scene.bodies import JOINTS, WORLD
 from iapb.scene.parts import located
 
-# velocities of each joint, in the plane and in space
-VELOCITIES = JOINT_COORDINATES | {"continuous": 1, "spherical": 3, "free_flyer": 6}
 MAX_SHAPES = 4000  # bodies and walls together: candidate pairs grow with its square
 
 
@@ -141,8 +139,6 @@ def _tree_coordinates(bodies: list[dict[str, Any]], held: str) -> int | None:
     roots = _roots(bodies)
     held_root = roots[[_name(body) for body in bodies].index(held)]
     joints = [_name(body, "joint") for body in bodies]
-    if held_root is None or None in roots or any(joint not in VELOCITIES for joint in joints):
+    if held_root is None or None in roots or any(joint not in JOINTS for joint in joints):
         return None
-    return sum(
-        VELOCITIES[joint or ""] for joint, root in zip(joints, roots, strict=True) if root == held_root
-    )
+    return sum(JOINTS[joint or ""].velocities for joint, root in zip(joints, roots, strict=True) if root == held_root)

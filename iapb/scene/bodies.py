@@ -1,8 +1,14 @@
-"""A moving body: its joint, its inertia, its shapes, and how it starts."""
+"""What a scene holds in the plane and in space: shapes, walls and moving bodies. Lengths in metres, angles in radians.
+
+In space the angles of placements are roll, pitch and yaw about the fixed x, y and z axes, in this order, as in URDF.
+Quaternions are x, y, z, w.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from fractions import Fraction as Exact
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -13,23 +19,226 @@ from iapb.scene.parts import (
     Number,
     OwnRestitution,
     Part,
+    Positive,
     Vector2,
+    Vector3,
     expectation,
 )
-from iapb.scene.shapes import Shape, checked_direction
 
-JOINT_COORDINATES = {"fixed": 0, "revolute": 1, "prismatic": 1, "planar": 3}
 WORLD = "world"  # the parent of a body that hangs on nothing
+ORIGIN = (0.0, 0.0, 0.0)
 MAX_SHAPES_OF_BODY = 64
+MAX_VERTICES = 256  # a polygon with more is a circle
+UNIT_TOLERANCE = 1e-6  # length of a quaternion as written: six digits are enough
+_STRAIGHT = 1e-9  # sine of the smallest turn that counts as a corner: below it, rounding decides convexity
 
 
-class Body(Part):
+class JointSize(NamedTuple):
+    """Entries of position and velocity of a joint, and its position at rest."""
+
+    coordinates: int
+    velocities: int
+    rest: tuple[float, ...]
+
+
+JOINTS = {
+    "fixed": JointSize(0, 0, ()),
+    "revolute": JointSize(1, 1, (0.0,)),
+    "continuous": JointSize(2, 1, (1.0, 0.0)),
+    "prismatic": JointSize(1, 1, (0.0,)),
+    "planar": JointSize(3, 3, ORIGIN),
+    "spherical": JointSize(4, 3, (*ORIGIN, 1.0)),
+    "free_flyer": JointSize(7, 6, (*ORIGIN, *ORIGIN, 1.0)),
+}
+
+
+def with_direction(vector: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the vector if it has a direction; its length is left as written."""
+    if math.hypot(*vector) < 1e-9:  # shorter, its direction would be decided by rounding of its parts
+        raise expectation("a vector with a direction (length at least 1e-9)")
+    return vector
+
+
+# Shapes in the plane
+
+
+class Box(Part):
+    """A rectangle."""
+
+    kind: Literal["box"] = Field(description="a rectangle")
+    size: tuple[Positive, Positive] = Field(description="full width and height [m], along its own axes")
+    center: Vector2 = Field((0.0, 0.0), description="its centre [m], in body axes (walls: world axes)")
+    angle: Number = Field(0.0, description="its rotation about the centre [rad], counter-clockwise")
+
+
+class Circle(Part):
+    """A disc."""
+
+    kind: Literal["circle"] = Field(description="a disc")
+    radius: Positive = Field(description="radius [m]")
+    center: Vector2 = Field((0.0, 0.0), description="its centre [m], in body axes (walls: world axes)")
+
+
+class Polygon(Part):
+    """A convex polygon; its vertices are stored counter-clockwise."""
+
+    kind: Literal["polygon"] = Field(description="a convex polygon")
+    vertices: Annotated[tuple[Vector2, ...], Field(min_length=3, max_length=MAX_VERTICES)] = Field(
+        description="corners in order [m], around the shape in either direction, relative to center"
+    )
+    center: Vector2 = Field((0.0, 0.0), description="where its origin lies [m], in body axes (walls: world axes)")
+    angle: Number = Field(0.0, description="its rotation about its origin [rad], counter-clockwise")
+
+    @field_validator("vertices")
+    @classmethod
+    def _convex(cls, vertices: tuple[Vector2, ...]) -> tuple[Vector2, ...]:
+        corners = zip((*vertices[-1:], *vertices), vertices, (*vertices[1:], *vertices[:1]), strict=False)
+        turns = [_turn(before, at, after) for before, at, after in corners]
+        if sum(turns) < 0.0:
+            vertices, turns = vertices[::-1], [-turn for turn in turns]
+        once_around = abs(sum(turns) - 2.0 * math.pi) < 1.0  # the sum is a multiple of 2 pi
+        if not once_around or any(math.sin(turn) <= _STRAIGHT for turn in turns):
+            raise expectation("the corners of a convex polygon in order, none twice, no three on one line")
+        return vertices
+
+
+def _turn(before: Vector2, at: Vector2, after: Vector2) -> float:
+    """Return the angle by which the outline turns at a corner [rad]; 0 where two corners coincide."""
+    ux, uy = at[0] - before[0], at[1] - before[1]
+    vx, vy = after[0] - at[0], after[1] - at[1]
+    return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+
+
+# Shapes in space
+
+
+class Cuboid(Part):
+    """A box."""
+
+    kind: Literal["box"] = Field(description="a cuboid")
+    size: tuple[Positive, Positive, Positive] = Field(description="full side lengths [m], along its own axes")
+    center: Vector3 = Field(ORIGIN, description="its centre [m], in body axes (walls: world axes)")
+    rpy: Vector3 = Field(ORIGIN, description="its rotation about the centre: roll, pitch, yaw [rad]")
+
+
+class Ball(Part):
+    """A sphere."""
+
+    kind: Literal["sphere"] = Field(description="a ball")
+    radius: Positive = Field(description="radius [m]")
+    center: Vector3 = Field(ORIGIN, description="its centre [m], in body axes (walls: world axes)")
+
+
+# Walls: shapes of the static world, and half of it
+
+
+class _OfWall(Part):
+    name: Name = Field(description="the wall's name")
+    restitution: OwnRestitution = None
+
+
+class HalfPlaneWall(_OfWall):
+    """A straight wall without end; solid on the side that the normal points away from."""
+
+    kind: Literal["half_plane"] = Field(description="everything behind a straight line")
+    point: Vector2 = Field(description="a point of the surface [m], world axes")
+    normal: Vector2 = Field(description="direction out of the wall, any length but zero, world axes")
+
+    _direction = field_validator("normal")(with_direction)
+
+
+class HalfSpaceWall(_OfWall):
+    """A flat wall without end; solid on the side that the normal points away from."""
+
+    kind: Literal["half_space"] = Field(description="everything behind a plane")
+    point: Vector3 = Field(description="a point of the surface [m], world axes")
+    normal: Vector3 = Field(description="direction out of the wall, any length but zero, world axes")
+
+    _direction = field_validator("normal")(with_direction)
+
+
+class BoxWall(_OfWall, Box):
+    """A static rectangle."""
+
+
+class CircleWall(_OfWall, Circle):
+    """A static disc."""
+
+
+class PolygonWall(_OfWall, Polygon):
+    """A static convex polygon."""
+
+
+class CuboidWall(_OfWall, Cuboid):
+    """A static box."""
+
+
+class BallWall(_OfWall, Ball):
+    """A static sphere."""
+
+
+Shape = Annotated[Box | Circle | Polygon, Field(discriminator="kind")]
+Wall = Annotated[HalfPlaneWall | BoxWall | CircleWall | PolygonWall, Field(discriminator="kind")]
+SpatialShape = Annotated[Cuboid | Ball, Field(discriminator="kind")]
+SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminator="kind")]
+
+
+# Moving bodies
+
+
+class _AnyBody(Part):
+    """What a joint asks of its body's numbers, in the plane and in space."""
+
+    with_axis: ClassVar[tuple[str, ...]]  # the joints that have an axis
+    an_axis: ClassVar[str]  # what one looks like
+
+    @field_validator("axis", check_fields=False)
+    @classmethod
+    def _axis_where_needed(cls, axis: Any, info: ValidationInfo) -> Any:
+        joint = info.data.get("joint")
+        if joint in cls.with_axis and axis is None:
+            raise expectation(f"the direction of the {joint} joint, such as {cls.an_axis}")
+        if joint is not None and joint not in cls.with_axis and axis is not None:
+            raise expectation(f"no axis: only a {' or '.join(cls.with_axis)} joint has one, this joint is {joint}")
+        return None if axis is None else with_direction(axis)
+
+    @field_validator("mass", check_fields=False)
+    @classmethod
+    def _mass_that_joint_moves(cls, mass: float, info: ValidationInfo) -> float:
+        joint = info.data.get("joint")
+        if joint in ("prismatic", "planar", "free_flyer") and mass < SMALLEST_POSITIVE:
+            raise expectation(f"a mass >= {SMALLEST_POSITIVE} kg: the {joint} joint moves it")
+        return mass
+
+    @field_validator("position", "velocity", check_fields=False)
+    @classmethod
+    def _one_number_per_coordinate(cls, given: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        joint = info.data.get("joint")
+        if joint is None:
+            return given
+        moving = info.field_name == "velocity"
+        count = JOINTS[joint].velocities if moving else JOINTS[joint].coordinates
+        if given and len(given) != count:
+            noun = "velocity" if moving else "coordinate"
+            raise expectation(f"{count} number{'' if count == 1 else 's'}, one per {noun} of a {joint} joint")
+        if moving:
+            return given or (0.0,) * count
+        turn = {"continuous": given, "spherical": given, "free_flyer": given[3:]}.get(joint)
+        if turn and abs(math.hypot(*turn) - 1.0) > UNIT_TOLERANCE:
+            raise expectation("a rotation of length one: cos, sin or quaternion x, y, z, w")
+        return given or JOINTS[joint].rest
+
+
+class Body(_AnyBody):
     """A rigid body of a tree.
 
     The joint frame lies at `origin`, turned by `angle`, in the parent body's frame; the joint moves the body
     frame away from it. Every moving body carries what its own joint accelerates, so that the mass matrix is
     positive definite in every configuration.
     """
+
+    with_axis = ("prismatic",)
+    an_axis = "[1, 0]"
 
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
@@ -45,31 +254,11 @@ class Body(Part):
     shapes: Annotated[tuple[Shape, ...], Field(max_length=MAX_SHAPES_OF_BODY)] = Field(
         (), description="what can touch; none: the body passes through everything"
     )
-    position: tuple[Number, ...] = Field(
-        (), description="joint coordinates at the start [m, rad]; default: zeros"
-    )
+    position: tuple[Number, ...] = Field((), description="joint coordinates at the start [m, rad]; default: zeros")
     velocity: tuple[Number, ...] = Field(
         (), description="joint velocities at the start [m/s, rad/s]; default: zeros"
     )
-
     restitution: OwnRestitution = None
-
-    @field_validator("axis")
-    @classmethod
-    def _axis_of_prismatic(cls, axis: Vector2 | None, info: ValidationInfo) -> Vector2 | None:
-        joint = info.data.get("joint")
-        if joint == "prismatic" and axis is None:
-            raise expectation("the direction of the prismatic joint, such as [1, 0]")
-        if joint in ("fixed", "revolute", "planar") and axis is not None:
-            raise expectation(f"no axis: only a prismatic joint has one, this joint is {joint}")
-        return None if axis is None else checked_direction(axis)
-
-    @field_validator("mass")
-    @classmethod
-    def _mass_that_joint_moves(cls, mass: float, info: ValidationInfo) -> float:
-        if info.data.get("joint") in ("prismatic", "planar") and mass < SMALLEST_POSITIVE:
-            raise expectation(f"a mass >= {SMALLEST_POSITIVE} kg: the {info.data['joint']} joint moves it")
-        return mass
 
     @field_validator("inertia")
     @classmethod
@@ -80,20 +269,70 @@ class Body(Part):
         if known.get("joint") == "revolute" and "mass" in known and "center_of_mass" in known:
             about_axis = inertia + known["mass"] * sum(c * c for c in known["center_of_mass"])
             if about_axis < SMALLEST_POSITIVE:
-                raise expectation(
-                    "a moment of inertia > 0, or a mass whose centre is off the revolute joint's axis"
-                )
+                raise expectation("a moment of inertia > 0, or a mass whose centre is off the revolute joint's axis")
         return inertia
 
-    @field_validator("position", "velocity")
+
+Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3]
+
+
+class SpatialBody(_AnyBody):
+    """A rigid body of a tree in space."""
+
+    with_axis = ("revolute", "continuous", "prismatic")
+    an_axis = "[0, 0, 1]"
+
+    name: Name = Field(description="the body's name")
+    parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
+    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = Field(
+        description="how it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical "
+        "quaternion x, y, z, w, free_flyer x, y, z [m] and quaternion"
+    )
+    axis: Vector3 | None = Field(None, description="direction of a revolute, continuous or prismatic joint")
+    origin: Vector3 = Field(ORIGIN, description="where the joint lies [m], parent's axes")
+    rpy: Vector3 = Field(ORIGIN, description="rotation of the joint frame in the parent: roll, pitch, yaw [rad]")
+    center_of_mass: Vector3 = Field(ORIGIN, description="centre of mass [m], body axes")
+    mass: NonNegative = Field(0.0, description="mass [kg]")
+    inertia: Inertia = Field(
+        ORIGIN,
+        description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, zz, xy, xz, yz; or a matrix",
+    )
+    shapes: Annotated[tuple[SpatialShape, ...], Field(max_length=MAX_SHAPES_OF_BODY)] = Field(
+        (), description="what can touch; none: the body passes through everything"
+    )
+    position: tuple[Number, ...] = Field((), description="joint coordinates at the start; default: at rest")
+    velocity: tuple[Number, ...] = Field(
+        (), description="joint velocities [m/s, rad/s]; free_flyer: linear, angular, body axes; default: zeros"
+    )
+    restitution: OwnRestitution = None
+
+    @field_validator("inertia")
     @classmethod
-    def _one_number_per_coordinate(cls, given: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        joint: Any = info.data.get("joint")
-        if joint is None:
-            return given
-        count = JOINT_COORDINATES[joint]
-        if given and len(given) != count:
-            raise expectation(
-                f"{count} number{'' if count == 1 else 's'}, one per coordinate of a {joint} joint"
-            )
-        return given or (0.0,) * count
+    def _inertia_of_a_body(cls, inertia: Any, info: ValidationInfo) -> Any:
+        matrix = inertia_matrix(inertia)
+        if any(matrix[i][j] != matrix[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
+            raise expectation("a symmetric matrix")
+        turned = info.data.get("joint") in ("spherical", "free_flyer")
+        if turned and not _least_eigenvalue_reaches(matrix, SMALLEST_POSITIVE):
+            raise expectation(f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes")
+        return inertia
+
+
+def inertia_matrix(inertia: Any) -> list[list[float]]:
+    """Return the (3, 3) matrix that three, six or nine numbers stand for."""
+    if isinstance(inertia[0], (tuple, list)):
+        return [list(row) for row in inertia]
+    xx, yy, zz, xy, xz, yz = inertia if len(inertia) == 6 else (*inertia, 0.0, 0.0, 0.0)
+    return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+
+
+def _least_eigenvalue_reaches(matrix: list[list[float]], least: float) -> bool:
+    """Return whether all eigenvalues of a symmetric (3, 3) matrix are at least `least`; decided exactly.
+
+    So they are where no principal minor of the matrix less `least` on its diagonal is negative.
+    """
+    (a, b, c), (_, d, e), (_, _, f) = [[Exact(x) for x in row] for row in matrix]
+    a, d, f = (x - Exact(least) for x in (a, d, f))
+    minors = (a, d, f, a * d - b * b, a * f - c * c, d * f - e * e,
+              a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))  # fmt: skip
+    return min(minors) >= 0

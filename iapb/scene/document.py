@@ -18,18 +18,11 @@ MAX_REPEATED = 100  # repeated fields: more is not a slip, and no list to read
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
 _WORDS: dict[str, Any] = {
-    "": None,
-    "~": None,
-    "null": None,
-    "Null": None,
-    "NULL": None,
-    "true": True,
-    "True": True,
-    "TRUE": True,
-    "false": False,
-    "False": False,
-    "FALSE": False,
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
 }
+Place = tuple[int, int]  # line and column, from 1
 
 
 @dataclass
@@ -37,18 +30,28 @@ class Node:
     """A value of the document and where it stands (line and column count from 1)."""
 
     value: Any
-    line: int
-    column: int
+    place: Place
     size: int = 1  # values and field names in it, aliases expanded
     children: dict[str | int, Node] = field(default_factory=dict)
-    keys: dict[str, tuple[int, int]] = field(default_factory=dict)  # where each key of a mapping stands
+    keys: dict[str, Place] = field(default_factory=dict)  # where each key of a mapping stands
+
+    def stands_at(self, path: tuple[str | int, ...], key: bool = False) -> Place:
+        """Return the place of a value below (or of its key); of the nearest part around it where it is absent."""
+        node = self
+        for step in path:
+            if key and step == path[-1] and step in node.keys:
+                return node.keys[str(step)]
+            if step not in node.children:
+                break
+            node = node.children[step]
+        return node.place
 
 
 class DocumentError(Exception):
     """The text is no document that a scene can be read from; one mistake with its place."""
 
-    def __init__(self, line: int, column: int, value: str, expected: str) -> None:
-        self.line, self.column, self.value, self.expected = line, column, value, expected
+    def __init__(self, place: Place, value: str, expected: str) -> None:
+        self.place, self.value, self.expected = place, value, expected
         super().__init__(expected)
 
 
@@ -56,8 +59,7 @@ class DocumentError(Exception):
 class Repeated:
     """A key that a mapping has twice."""
 
-    line: int
-    column: int
+    place: Place
     path: tuple[str | int, ...]
 
 
@@ -70,7 +72,7 @@ def read_document(text: str) -> tuple[Node, list[Repeated]]:
         where the text is not YAML, or leaves the bounds above.
     """
     if len(text) > MAX_CHARACTERS:
-        raise DocumentError(1, 1, f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
+        raise DocumentError((1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
     builder = _Builder(_events(text))
     return builder.document(), builder.repeated
 
@@ -83,14 +85,10 @@ def _events(text: str) -> Iterator[Any]:
         yield from YAML(typ="safe", pure=True).parse(text)
     except MarkedYAMLError as failure:
         mark = failure.problem_mark or failure.context_mark
-        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        raise DocumentError(
-            line, column, "(not YAML)", f"valid YAML: {failure.problem or failure}"
-        ) from failure
-    except YAMLError as failure:  # characters that YAML does not allow: no mark, only text
-        raise DocumentError(1, 1, "(not YAML)", f"valid YAML: {' '.join(str(failure).split())}") from failure
-    except (ValueError, OverflowError) as failure:  # an escape such as \UFFFFFFFF names no character
-        raise DocumentError(1, 1, "(not YAML)", f"valid YAML: {failure}") from failure
+        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        raise DocumentError(place, "(not YAML)", f"valid YAML: {failure.problem or failure}") from failure
+    except (YAMLError, ValueError, OverflowError) as failure:  # a character that YAML has not: no mark, only text
+        raise DocumentError((1, 1), "(not YAML)", f"valid YAML: {' '.join(str(failure).split())}") from failure
 
 
 class _Builder:
@@ -106,35 +104,31 @@ class _Builder:
         """Return the root of the only document of the stream."""
         root: Node | None = None
         for event in self.events:
-            kind = type(event).__name__
-            if kind in ("StreamStartEvent", "StreamEndEvent", "DocumentStartEvent", "DocumentEndEvent"):
+            if _kind(event) in ("StreamStart", "StreamEnd", "DocumentStart", "DocumentEnd"):
                 continue
             if root is not None:
-                raise DocumentError(*_place(event), "(second document)", "one document in the file")
+                raise DocumentError(_place(event), "(second document)", "one document in the file")
             root = self.node(event, ())
-        return root if root is not None else Node(None, 1, 1)
+        return root if root is not None else Node(None, (1, 1))
 
     def node(self, event: Any, path: tuple[str | int, ...]) -> Node:
         """Return the node that starts with this event."""
-        line, column = _place(event)
-        kind = type(event).__name__
-        if kind == "AliasEvent":
-            node = self.alias(event)
-            self.count_in(node.size, line, column)
+        kind, place = _kind(event), _place(event)
+        node = self.alias(event) if kind == "Alias" else Node(None, place)
+        self.count += node.size
+        if self.count > MAX_NODES:
+            raise DocumentError(place, f"more than {MAX_NODES} values", "a smaller scene")
+        if kind == "Alias":
             return node
-        if event.tag is not None and not (kind == "ScalarEvent" and event.tag == "!"):
-            raise DocumentError(
-                line, column, str(event.tag), "no tags: a scene is plain numbers, texts and lists"
-            )
+        if event.tag is not None and not (kind == "Scalar" and event.tag == "!"):
+            raise DocumentError(place, str(event.tag), "no tags: a scene is plain numbers, texts and lists")
         if len(path) > MAX_DEPTH:
-            raise DocumentError(line, column, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
-        node = Node(None, line, column)
-        self.count_in(1, line, column)
+            raise DocumentError(place, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
         if event.anchor is not None:
             self.anchors[event.anchor] = None
-        if kind == "ScalarEvent":
+        if kind == "Scalar":
             node.value = scalar(event.value) if event.style is None and event.tag is None else event.value
-        elif kind == "SequenceStartEvent":
+        elif kind == "SequenceStart":
             self.sequence(node, path)
         else:
             self.mapping(node, path)
@@ -143,53 +137,47 @@ class _Builder:
             self.anchors[event.anchor] = node
         return node
 
-    def count_in(self, size: int, line: int, column: int) -> None:
-        """Count a value into the bound on the whole document."""
-        self.count += size
-        if self.count > MAX_NODES:
-            raise DocumentError(line, column, f"more than {MAX_NODES} values", "a smaller scene")
-
     def alias(self, event: Any) -> Node:
         """Return the node that an alias stands for."""
         node = self.anchors.get(event.anchor)
         if node is None:
             known = event.anchor in self.anchors
-            raise DocumentError(
-                *_place(event),
-                f"*{event.anchor}",
-                "an alias to a finished value" if known else "an alias whose anchor exists",
-            )
+            expected = "an alias to a finished value" if known else "an alias whose anchor exists"
+            raise DocumentError(_place(event), f"*{event.anchor}", expected)
         return node
 
     def sequence(self, node: Node, path: tuple[str | int, ...]) -> None:
         """Read the items of a list up to its end."""
-        for event in self.events:
-            if type(event).__name__ == "SequenceEndEvent":
+        for index, event in enumerate(self.events):
+            if _kind(event) == "SequenceEnd":
                 break
-            index = len(node.children)
             node.children[index] = self.node(event, (*path, index))
         node.value = [child.value for child in node.children.values()]
 
     def mapping(self, node: Node, path: tuple[str | int, ...]) -> None:
         """Read the fields of a mapping up to its end."""
         for event in self.events:
-            if type(event).__name__ == "MappingEndEvent":
+            if _kind(event) == "MappingEnd":
                 break
-            if type(event).__name__ != "ScalarEvent":
-                raise DocumentError(*_place(event), "(not a name)", "the name of a field")
+            if _kind(event) != "Scalar":
+                raise DocumentError(_place(event), "(not a name)", "the name of a field")
             key, place = event.value, _place(event)
             self.count += 1
             child = self.node(next(self.events), (*path, key))
             if len(self.repeated) == MAX_REPEATED:
-                raise DocumentError(*place, f"more than {MAX_REPEATED} repeated fields", "each field once")
+                raise DocumentError(place, f"more than {MAX_REPEATED} repeated fields", "each field once")
             if key in node.children:
-                self.repeated.append(Repeated(*place, (*path, key)))
+                self.repeated.append(Repeated(place, (*path, key)))
             else:
                 node.children[key], node.keys[key] = child, place
         node.value = {key: child.value for key, child in node.children.items()}
 
 
-def _place(event: Any) -> tuple[int, int]:
+def _kind(event: Any) -> str:
+    return type(event).__name__.removesuffix("Event")
+
+
+def _place(event: Any) -> Place:
     return event.start_mark.line + 1, event.start_mark.column + 1
 
 

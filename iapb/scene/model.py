@@ -1,21 +1,134 @@
-"""Scene: everything a scene file may say. A scene never names a contact law."""
+"""Scene: everything a scene file may say, in the plane and in space. A scene never names a contact law.
+
+A file with ``dimensions: 3`` is a scene in space: its vectors have three numbers, everything else is as in the plane.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import copy
+import io
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 from pydantic_core import InitErrorDetails
 
-from iapb.scene.bodies import Body
-from iapb.scene.parts import Name, Part, Positive, Text, Vector2, expectation
-from iapb.scene.sections import Contact, Couplings, Device, Hand
-from iapb.scene.shapes import Wall
+from iapb.errors import ArgumentError, SceneError
+from iapb.names import one_of
+from iapb.scene.across import across_parts
+from iapb.scene.bodies import ORIGIN, Body, SpatialBody, SpatialWall, Wall
+from iapb.scene.parts import (
+    Fraction,
+    Name,
+    NonNegative,
+    Number,
+    Part,
+    Positive,
+    Text,
+    Vector2,
+    Vector3,
+    expectation,
+    mistakes_of,
+)
 
 MAX_BODIES = 2000
 MAX_WALLS = 2000
 MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
 MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a slip of the pen, and would not end
+MAX_DELAY = 1000  # steps; a longer delay is a broken line
+PerCoordinate = tuple[NonNegative, ...]
+
+
+class Contact(Part):
+    """How contacts behave. The defaults are the paper's where it gives a number, ours where it does not."""
+
+    stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default 1000, the paper's walls")
+    damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default 50, the paper's walls")
+    penalty: Literal["clamped", "printed"] = Field(
+        "clamped", description="clamped (default): never pulls; printed: (5) to the letter, may pull"
+    )
+    friction: NonNegative = Field(0.0, description="coefficient mu of (6) [1]; default 0 = no friction")
+    friction_velocity: Positive = Field(
+        1e-3, description="v_threshold of (6) [m/s]: below it friction grows linearly; default 1e-3, ours"
+    )
+    restitution: Fraction = Field(
+        0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0"
+    )
+    approach_velocity: NonNegative = Field(
+        1e-6, description="v_approach [m/s]: contacts that approach faster collide; default 1e-6, ours"
+    )
+    cluster_distance: NonNegative = Field(
+        0.0, description="contacts closer than this [m] become one; default 0 = no clustering"
+    )
+    coherence_distance: NonNegative = Field(
+        0.0,
+        description="a contact this close [m] to one of the step before is not new; must exceed the largest "
+        "speed times the step; default 0 = no such filter",
+    )
+    self_collision_rows: Literal["relative", "per_body"] = Field(
+        "relative",
+        description="rows of a collision of two moving bodies: relative (12), default; per_body (13)-(14)",
+    )
+    self_collisions: Annotated[bool, Field(strict=True)] = Field(
+        False, description="whether bodies of one tree, not neighbours in it, can touch; default false"
+    )
+
+
+class Hand(Part):
+    """The hand: a constant force on one body, the worst case for stability (paper, section VI)."""
+
+    body: Name = Field(description="the body that the hand holds")
+    point: Vector2 = Field(
+        (0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin"
+    )
+    force: tuple[Number, Number, Number] = Field(
+        (0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], world axes; default: none"
+    )
+
+
+class SpatialHand(Hand):
+    """The hand in space."""
+
+    point: Vector3 = Field(ORIGIN, description="where it holds the body [m], body axes")  # type: ignore[assignment]
+    force: tuple[Number, Number, Number, Number, Number, Number] = Field(  # type: ignore[assignment]
+        (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none"
+    )
+
+
+Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"]
+
+
+class Device(Part):
+    """The haptic device: kinematically the tool's equal, so its lists have one number per tool coordinate."""
+
+    force_limit: tuple[Positive, ...] | None = Field(
+        None, description="largest force per coordinate [N, N m]; default: no limit"
+    )
+    delay: Annotated[int, Field(strict=True, ge=0, le=MAX_DELAY)] = Field(
+        0, description="steps between the device and the world, each way; default 0"
+    )
+    position_resolution: PerCoordinate | None = Field(
+        None, description="smallest step that its sensors see, per coordinate [m, rad]; default: exact"
+    )
+    damping: PerCoordinate | None = Field(
+        None, description="physical damping per coordinate [N s/m, N m s/rad]; default: none"
+    )
+    waveform: Waveform = Field(
+        "step", description="how an impulse reaches the hand: in one step, as a brake, or ringing; default step"
+    )
+
+
+class Gains(Part):
+    """A spring and damper per coordinate of the tool (Table I)."""
+
+    stiffness: PerCoordinate = Field(description="one per tool coordinate [N/m, N m/rad]")
+    damping: PerCoordinate = Field(description="one per tool coordinate [N s/m, N m s/rad]")
+
+
+class Couplings(Part):
+    """Gains of the couplings that the scene can be held with; which one is used, the caller says."""
+
+    four_channel: Gains | None = Field(None, description="K_coord and B_coord of Table I")
+    unilateral: Gains | None = Field(None, description="K_cpl and B_cpl of Table I")
 
 
 class Scene(Part):
@@ -56,8 +169,6 @@ class Scene(Part):
 
     @classmethod
     def across_fields(cls, given: Any) -> list[InitErrorDetails]:
-        from iapb.scene.across import across_parts
-
         return across_parts(given)
 
     @property
@@ -79,7 +190,7 @@ class Scene(Part):
         """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings."""
         return self.model_dump(mode="json")
 
-    def with_values(self, values: dict[str, Any]) -> Scene:
+    def with_values(self, values: dict[str, Any]) -> Self:
         """Return a copy with some values changed, checked like a file.
 
         Parameters
@@ -95,6 +206,77 @@ class Scene(Part):
         SceneError
             values that a scene cannot take; all of them, each with its path.
         """
-        from iapb.scene.changing import changed
+        plain = self.resolved()
+        for path, value in values.items():
+            set_value(plain, path, value)
+        try:
+            made = type(self).model_validate(plain)
+        except ValidationError as failure:
+            raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
+        made._source_text = scene_text(made, f"{self.name} with new values for {', '.join(values) or 'nothing'}")
+        return made
 
-        return changed(self, values)
+
+class SpatialScene(Scene):
+    """A world in space: as `Scene`, with three numbers for vectors."""
+
+    dimensions: Literal[3] = Field(description="3: a scene in space; a scene without this field is planar")
+    gravity: Vector3 | None = Field(None, description="acceleration [m/s2], world axes; default: none")  # type: ignore[assignment]
+    bodies: Annotated[tuple[SpatialBody, ...], Field(min_length=1, max_length=MAX_BODIES)] = Field(  # type: ignore[assignment]
+        description="what can move, each after its parent"
+    )
+    walls: Annotated[tuple[SpatialWall, ...], Field(max_length=MAX_WALLS)] = Field(  # type: ignore[assignment]
+        (), description="the static world"
+    )
+    hand: SpatialHand | None = Field(None, description="the hand that holds the tool; default: nobody")
+
+
+def scene_kind(given: Any) -> type[Scene]:
+    """Return which kind of scene plain values describe."""
+    return SpatialScene if isinstance(given, dict) and "dimensions" in given else Scene
+
+
+def scene_text(scene: Scene, comment: str = "") -> str:
+    """Return YAML text that reads back as this scene, exact to the last bit."""
+    from ruamel.yaml import YAML
+
+    yaml, stream = YAML(typ="safe", pure=True), io.StringIO()
+    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = None, False  # type: ignore[assignment]
+    yaml.dump(scene.resolved(), stream)
+    return (f"# {comment}\n" if comment else "") + stream.getvalue()
+
+
+def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
+    """Put a value at a dotted path of a resolved scene, unchecked; a section that is absent is made."""
+    if not isinstance(path, str) or not path:
+        raise ArgumentError("values", path, "dotted paths as keys, such as contact.friction")
+    steps = path.split(".")
+    place: Any = plain
+    for i, step in enumerate(steps):
+        key = _key(place, step, path)
+        if i == len(steps) - 1:
+            place[key] = _plain(value)
+            return
+        if isinstance(place, dict) and place.get(key) is None:
+            place[key] = {}
+        place = place[key]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of the caller's own: a copy, numpy arrays and numbers as plain ones."""
+    return value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
+
+
+def _key(place: Any, step: str, path: str) -> str | int:
+    """Return the key or index that a step of a path means in this place."""
+    if isinstance(place, dict):
+        return step
+    if not isinstance(place, list):
+        raise ArgumentError("values", path, f"a path into the scene: {step!r} lies below a value")
+    names = [item.get("name") if isinstance(item, dict) else None for item in place]
+    if step in names:
+        return names.index(step)
+    if step.isdecimal() and int(step) < len(place):
+        return int(step)
+    known = [name for name in names if name] or [f"0 to {len(place) - 1}"]
+    raise ArgumentError("values", path, one_of(step, known, f"at {step!r} one of: "))

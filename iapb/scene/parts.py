@@ -1,19 +1,19 @@
-"""What all parts of a scene share: finite bounded numbers, names, and errors that name the known fields."""
+"""What all parts of a scene share: finite bounded numbers, names, and mistakes in the words of a scene's author."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from iapb.errors import Mistake, shown
 from iapb.names import nearest
 
 LARGEST_NUMBER = 1e9  # SI units; products of four such numbers stay far inside double precision
-SMALLEST_POSITIVE = (
-    1e-12  # what must be positive is divided by; its inverse square still is an ordinary number
-)
+SMALLEST_POSITIVE = 1e-12  # what must be positive is divided by; its inverse square still is an ordinary number
 
 _FINITE = {"strict": True, "allow_inf_nan": False}
 Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE)]
@@ -27,6 +27,7 @@ OwnRestitution = Annotated[
     ),
 ]
 Vector2 = tuple[Number, Number]
+Vector3 = tuple[Number, Number, Number]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
 Text = Annotated[str, Field(max_length=2000, strict=True)]
 
@@ -138,3 +139,45 @@ def _follows_from_others(error: Any) -> bool:
     """Return whether a list is called too short only because its wrong items were left out."""
     given = error["input"]
     return error["type"] == "too_short" and len(given) >= error["ctx"]["min_length"]
+
+
+# Mistakes with their place in the file
+
+Place = tuple[str | int, ...]
+StandsAt = Callable[[Place, bool], tuple[int, int]]  # path, whether its key is meant -> line and column
+
+
+def mistakes_of(failure: ValidationError, file: str, read: Any, stands_at: StandsAt | None = None) -> list[Mistake]:
+    """Return pydantic's errors about the values `read` as mistakes; line 0 where nothing tells their place."""
+    return [_mistake(error, file, read, stands_at) for error in failure.errors(include_url=False)]
+
+
+def _mistake(error: Any, file: str, read: Any, stands_at: StandsAt | None) -> Mistake:
+    path, exists = _field_path(error["loc"], read)
+    missing = error["type"] == MISSING
+    value = "(missing)" if missing else shown(error["input"]) + ("" if exists else " (default)")
+    line, column = stands_at(path, error["msg"].startswith("one of the known fields")) if stands_at else (0, 0)
+    return Mistake(file, line, column, written(path), value, error["msg"])
+
+
+def _field_path(where: Place, read: Any) -> tuple[Place, bool]:
+    """Return the path in the file, without the shape kinds that pydantic puts in, and whether it exists there."""
+    path: list[str | int] = []
+    exists = True
+    for key in where:
+        if isinstance(read, dict) and key not in read and key == read.get("kind"):
+            continue
+        path.append(key)
+        try:
+            read = read[key]
+        except (KeyError, IndexError, TypeError):
+            read, exists = None, False
+    return tuple(path), exists
+
+
+def written(path: Place) -> str:
+    """Return a path as it is written in messages, such as ``bodies[0].mass``."""
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text or "(file)"

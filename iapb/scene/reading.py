@@ -1,21 +1,61 @@
-"""Read a scene file; report every mistake in it, each with file, line, column, field path and expectation."""
+"""Find and read scene files; report every mistake, each with file, line, column, field path and expectation."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
 
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
+from iapb.names import one_of
 from iapb.scene.document import MAX_CHARACTERS, DocumentError, Node, read_document
-from iapb.scene.model import Scene
-from iapb.scene.parts import MISSING
+from iapb.scene.model import Scene, scene_kind, scene_text
+from iapb.scene.parts import mistakes_of, written
 from iapb.scene.robots import with_robots
-from iapb.scene.space import scene_kind
-from iapb.scene.writing import scene_text
 
-Place = tuple[str | int, ...]
+
+def scene_folder() -> Path:
+    """Return the folder of the scenes that come with the project.
+
+    Returns
+    -------
+    Path
+        inside an installed package, or in the checkout.
+    """
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "scenes"
+    return installed if installed.is_dir() else package.parent / "scenes"
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the scenes that come with the project, sorted."""
+    return tuple(sorted(path.stem for path in scene_folder().glob("*.yaml")))
+
+
+def find_scene(name: str | Path) -> Path:
+    """Return the scene file that `name` means: a path, or the name of a scene that comes with the project.
+
+    Parameters
+    ----------
+    name : path of a file, or a name such as ``peg_corner``
+
+    Returns
+    -------
+    Path
+        of a file that exists.
+
+    Raises
+    ------
+    ArgumentError
+        If there is neither such a file nor such a scene; the message lists the scenes there are.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    ours = scene_folder() / f"{path.stem}.yaml"
+    if str(name) in (path.stem, path.name) and ours.is_file():
+        return ours
+    raise ArgumentError("scene", str(name), one_of(path.stem, scene_names(), "a file, or one of: "))
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -47,13 +87,8 @@ def load_scene(path: str | Path) -> Scene:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as failure:
         line = content.count(b"\n", 0, failure.start) + 1
-        raise SceneError(
-            [
-                Mistake(
-                    str(path), line, 1, "(file)", shown(content[failure.start : failure.end]), "text in UTF-8"
-                )
-            ]
-        ) from failure
+        wrong = shown(content[failure.start : failure.end])
+        raise SceneError([Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")]) from failure
     return scene_from_text(text, str(path))
 
 
@@ -65,20 +100,12 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     SceneError
         the text is not a scene; carries all of its mistakes.
     """
-    try:
-        root, repeated = read_document(text)
-    except DocumentError as failure:
-        raise SceneError(
-            [Mistake(file, failure.line, failure.column, "(file)", failure.value, failure.expected)]
-        ) from failure
-    mistakes = [
-        Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated
-    ]
-    given, wrong = with_robots(root.value, file, lambda path: _stands_at(root, path, key=False))
+    root, mistakes = read_values(text, file)
+    given, wrong = with_robots(root.value, file, root.stands_at)
     try:
         scene = scene_kind(given).model_validate(given)
     except ValidationError as failure:
-        mistakes += mistakes_of(failure, file, root)
+        mistakes += mistakes_of(failure, file, root.value, root.stands_at)
     mistakes += wrong
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
@@ -86,55 +113,17 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     return scene
 
 
-def mistakes_of(
-    failure: ValidationError, file: str, root: Node | None = None, values: Any = None
-) -> list[Mistake]:
-    """Return pydantic's errors as mistakes, placed by the document's nodes (line 0 where there is no document)."""
-    read = root.value if root is not None else values
-    return [_mistake(error, file, read, root) for error in failure.errors(include_url=False)]
+def read_values(text: str, file: str, what: str = "scene") -> tuple[Node, list[Mistake]]:
+    """Return the values of a YAML text with their places, and its repeated fields as mistakes.
 
-
-def _mistake(error: Any, file: str, read: Any, root: Node | None) -> Mistake:
-    path, exists = _field_path(error["loc"], read)
-    missing = error["type"] == MISSING
-    value = "(missing)" if missing else shown(error["input"]) + ("" if exists else " (default)")
-    line, column = (
-        _stands_at(root, path, key=error["msg"].startswith("one of the known fields")) if root else (0, 0)
-    )
-    return Mistake(file, line, column, written(path), value, error["msg"])
-
-
-def _field_path(where: Place, read: Any) -> tuple[Place, bool]:
-    """Return the path in the file, without the shape kinds that pydantic puts in, and whether it exists there."""
-    path: list[str | int] = []
-    exists = True
-    for key in where:
-        if isinstance(read, dict) and key not in read and key == read.get("kind"):
-            continue
-        path.append(key)
-        try:
-            read = read[key]
-        except (KeyError, IndexError, TypeError):
-            read, exists = None, False
-    return tuple(path), exists
-
-
-def _stands_at(root: Node, path: Place, key: bool) -> tuple[int, int]:
-    """Return line and column of a value (or of its key); of the nearest part around it where it is absent."""
-    node, place = root, (root.line, root.column)
-    for step in path:
-        if key and step == path[-1] and step in node.keys:
-            return node.keys[step]
-        if step not in node.children:
-            break
-        node = node.children[step]
-        place = (node.line, node.column)
-    return place
-
-
-def written(path: Place) -> str:
-    """Return a path as it is written in messages, such as ``bodies[0].mass``."""
-    text = ""
-    for step in path:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return text or "(file)"
+    Raises
+    ------
+    SceneError
+        the text is no document of plain values; `what` it should be, in words.
+    """
+    try:
+        root, repeated = read_document(text)
+    except DocumentError as failure:
+        mistake = Mistake(file, *failure.place, "(file)", failure.value, failure.expected)
+        raise SceneError([mistake], what) from failure
+    return root, [Mistake(file, *r.place, written(r.path), "(repeated)", "each field once") for r in repeated]

@@ -22,16 +22,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from iapb.errors import ArgumentError, Mistake, shown
 from iapb.names import one_of
-from iapb.scene.parts import Name, Number, Part, Text
-from iapb.scene.space import JOINTS, ORIGIN, SpatialShape, Vector3
+from iapb.scene.bodies import JOINTS, ORIGIN, SpatialShape
+from iapb.scene.parts import Name, Number, Part, Place, Text, Vector3, written
 
 HELD = ("box", "sphere")  # of the URDF's geometries, those that the compiled narrow phase knows
 MAX_ROBOTS = 100  # in one scene: each is a file to read
-Place = tuple[str | int, ...]
 
 
 class Robot(Part):
@@ -125,7 +124,7 @@ def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[s
         "mass": link.mass,
         "inertia": link.inertia.tolist(),
         "shapes": shapes,
-        "position": list(robot.position.get(link.name, JOINTS.get(link.joint.kind, (0, 0, ()))[2])),
+        "position": list(robot.position.get(link.name, JOINTS[link.joint.kind].rest)),
         "velocity": list(robot.velocity.get(link.name, ())),
     }
     if link.joint.kind in ("revolute", "continuous", "prismatic"):
@@ -162,8 +161,6 @@ def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, i
 
     `stands_at` gives line and column of a path such as ("robots", 0, "urdf") in the file.
     """
-    from pydantic import ValidationError
-
     if not (isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)):
         return given, []
     listed, mistakes = given.get("bodies"), []
@@ -177,8 +174,7 @@ def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, i
         except ValidationError as failure:
             for error in failure.errors(include_url=False):
                 place = ("robots", i, *error["loc"])
-                where = f"robots[{i}]" + "".join(f".{step}" for step in error["loc"])
-                mistakes.append(Mistake(file, *stands_at(place), where, shown(error["input"]), error["msg"]))
+                mistakes.append(Mistake(file, *stands_at(place), written(place), shown(error["input"]), error["msg"]))
         except ArgumentError as failure:
             where, field = f"robots[{i}].{failure.argument}", failure.argument.split(" ")[0]
             place = ("robots", i, field if field in Robot.model_fields else "urdf")

@@ -6,9 +6,8 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from iapb.scene.model import Scene
+from iapb.scene.model import Scene, SpatialScene
 from iapb.scene.robots import Robot
-from iapb.scene.space import SpatialScene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _HERE = "#/$defs/"

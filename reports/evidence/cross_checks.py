@@ -27,7 +27,7 @@ def _check(quantity: str, against: str, values: list[float], tolerance: float, r
 
 
 def _mechanisms() -> Iterator[CrossCheck]:
-    from iapb.scene_mechanism import mechanism_of
+    from iapb.scene.mechanism import mechanism_of
     from reference.rigid_body import model_of
 
     rng = np.random.default_rng(1)

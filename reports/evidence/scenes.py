@@ -30,7 +30,7 @@ REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Run every scene, at shorter steps too, and keep the books of each."""
-    from iapb.scene_files import scene_names
+    from iapb.scene import scene_names
     from reference.worlds import run_world
     from verification.studies.open_books import open_books
     from verification.studies.scene_measures import measure

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from iapb.scene_files import scene_folder
+from iapb.scene import scene_folder
 from reports.evidence.tables import numbers_tables
 from reports.runner import Runner
 from reports.store.keys import canonical_json, code_version, plain

@@ -33,7 +33,7 @@ def prepare(folder: Path) -> None:
     """Put beside the cases what they may refer to: the robots of the scenes."""
     import shutil
 
-    from iapb.scene_files import scene_folder
+    from iapb.scene import scene_folder
 
     shutil.copytree(scene_folder() / "robots", folder / "robots", dirs_exist_ok=True)
 
@@ -62,7 +62,7 @@ def _only_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:
 
 @cache
 def _scene_texts() -> dict[str, bytes]:
-    from iapb.scene_files import scene_folder
+    from iapb.scene import scene_folder
 
     return {path.name: path.read_bytes() for path in sorted(scene_folder().glob("*.yaml"))}
 
@@ -85,7 +85,7 @@ def _read_scene(path: Path) -> None:
 
 
 def _studies() -> dict[str, bytes]:
-    from iapb.scene_files import scene_folder
+    from iapb.scene import scene_folder
 
     return {path.name: path.read_bytes() for path in sorted((scene_folder() / "sweeps").glob("*.yaml"))}
 
@@ -103,7 +103,7 @@ def _read_study(path: Path) -> None:
 
 
 def _robots() -> dict[str, bytes]:
-    from iapb.scene_files import scene_folder
+    from iapb.scene import scene_folder
 
     return {path.name: path.read_bytes() for path in sorted((scene_folder() / "robots").glob("*.urdf"))}
 

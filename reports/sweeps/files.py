@@ -6,7 +6,7 @@ from pathlib import Path
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from iapb.scene_files import find_scene, scene_folder, scene_names
+from iapb.scene import find_scene, scene_folder, scene_names
 from reports.sweeps.study import Study
 
 

@@ -10,9 +10,9 @@ from pydantic import Field, ValidationError
 from pydantic_core import InitErrorDetails
 
 from iapb.errors import ArgumentError, Mistake, SceneError
-from iapb.scene.document import MAX_CHARACTERS, DocumentError, read_document
-from iapb.scene.parts import Name, Number, Part, Text, located
-from iapb.scene.reading import mistakes_of, written
+from iapb.scene.document import MAX_CHARACTERS
+from iapb.scene.parts import Name, Number, Part, Text, located, mistakes_of
+from iapb.scene.reading import read_values
 
 MAX_POINTS = 1_000_000  # files in one folder: more is no sweep but a slip of the pen
 MAX_VALUES = 100_000  # of one axis
@@ -117,16 +117,11 @@ def load_study(path: str | Path) -> Study:
 
 def study_from_text(text: str, file: str = "(text)") -> Study:
     """Read a study from YAML text; see `load_study`."""
-    try:
-        root, repeated = read_document(text)
-    except DocumentError as failure:
-        mistake = Mistake(file, failure.line, failure.column, "(file)", failure.value, failure.expected)
-        raise SceneError([mistake], "study") from failure
-    mistakes = [Mistake(file, r.line, r.column, written(r.path), "(repeated)", "each field once") for r in repeated]
+    root, mistakes = read_values(text, file, "study")
     try:
         study = Study.model_validate(root.value)
     except ValidationError as failure:
-        raise SceneError(mistakes + mistakes_of(failure, file, root), "study") from failure
+        raise SceneError(mistakes + mistakes_of(failure, file, root.value, root.stands_at), "study") from failure
     if study.size > MAX_POINTS:
         mistakes.append(Mistake(file, 1, 1, "(file)", f"{study.size} points", f"at most {MAX_POINTS}"))
     if mistakes:

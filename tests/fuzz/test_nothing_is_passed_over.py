@@ -15,9 +15,8 @@ import pytest
 from iapb.errors import ArgumentError, IapbError, SceneError
 from iapb.mechanics.urdf import read_urdf
 from iapb.mechanics.urdf_collision import read_collisions
-from iapb.scene import load_scene
+from iapb.scene import load_scene, scene_folder
 from iapb.scene.document import read_document
-from iapb.scene_files import scene_folder
 from reference.datasets import DatasetError, read_problem
 from reports.sweeps.files import find_study, scene_of
 from reports.sweeps.study import study_from_text

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 from reference.worlds import run_world
 

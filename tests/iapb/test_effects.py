@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.effects import EFFECTS, Effect, decide_effects
-from iapb.scene import Scene, load_scene
-from iapb.scene_files import find_scene, scene_names
+from iapb.scene import Scene, find_scene, load_scene, scene_names
 
 PEG = load_scene(find_scene("peg_corner"))
 ARM = load_scene(find_scene("arm_pushing"))

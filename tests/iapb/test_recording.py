@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.recording import chunk_steps
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
 

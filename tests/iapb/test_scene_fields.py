@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from iapb.errors import SceneError
 from iapb.scene import Scene, scene_from_text, scene_schema
-from iapb.scene.changing import scene_text
+from iapb.scene.model import scene_text
 
 FULL = scene_from_text("""\
 name: full

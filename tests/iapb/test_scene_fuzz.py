@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iapb.errors import SceneError
-from iapb.scene import scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, scene_from_text
 
 SOURCES = ["peg_corner", "two_link_arm_a", "wall_1d"]
 TEXTS = [

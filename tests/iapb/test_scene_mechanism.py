@@ -7,7 +7,7 @@ import pytest
 
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, POLYGON
 from iapb.scene import Scene, scene_from_text
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
 CHAIN = scene_from_text("""\

@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from iapb.scene import scene_schema
+from iapb.scene import find_scene, scene_names, scene_schema
 from iapb.scene.document import read_document
-from iapb.scene_files import find_scene, scene_names
 
 SCHEMA = scene_schema()
 

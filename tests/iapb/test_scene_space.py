@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from iapb.errors import SceneError
-from iapb.scene import SpatialScene, load_scene, scene_from_text
+from iapb.scene import SpatialScene, find_scene, load_scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
 from iapb.scene.robots import angles_of, rotation_of
-from iapb.scene_files import find_scene
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of, start_of
 
 BODY = """name: thing
 dimensions: 3

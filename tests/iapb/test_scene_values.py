@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError, SceneError
-from iapb.scene import load_scene, scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene, scene_from_text
 
 PEG = load_scene(find_scene("peg_corner"))
 

@@ -9,9 +9,8 @@ import pytest
 
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.scene import Scene, load_scene
-from iapb.scene_files import find_scene, scene_names
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene import Scene, find_scene, load_scene, scene_names
+from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
 
 
 def contacts_at(scene: Scene, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:

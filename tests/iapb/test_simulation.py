@@ -13,8 +13,7 @@ from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import FREE, Run
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
 

@@ -12,8 +12,7 @@ from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import FourChannel
 from iapb.run import FREE, Run
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, Simulation, simulate
 
 PEG = load_scene(find_scene("peg_corner")).with_values(

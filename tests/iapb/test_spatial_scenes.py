@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.run import Run
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 
 

@@ -8,8 +8,7 @@ import pytest
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene, scene_names
+from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System, coupling_of
 
 PEG = load_scene(find_scene("peg_corner"))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, SolverError
-from iapb.scene import load_scene, scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
 from reference import rigid_friction
 from reference.rigid_friction import friction_step

@@ -7,8 +7,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from iapb.scene import load_scene, scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
 from reference.configurations import configuration_rate, of_length_one
 from reference.event_driven import LinearSystem, event_driven

@@ -9,8 +9,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate
 from reference.worlds import WORLDS, find_world, require_complete, run_world
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iapb.compiled import Entry
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene
 from iapb.simulation import Simulation, simulate
 from reports.compiling import BEGIN, compiling_told, tell_from_worker
 

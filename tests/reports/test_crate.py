@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from reports import companions, provenance
 from reports.codecheck import CODECHECK_NAME
 from reports.companions import DIRTY_NAME, MANIFEST_NAME, REPORT_NAME, remembering, write_companions

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import RunFileError
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records

@@ -10,7 +10,7 @@ import pytest
 
 from iapb import load_scene
 from iapb.run import Run
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene
 from reports.figures import RECIPES, energy_gains, work_precision
 from reports.figures.condition_map import condition_map
 from reports.figures.fig03_energy_loss import arm_energies

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import reference.worlds
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED
 from reports.runner import Runner
 from reports.store import read_run

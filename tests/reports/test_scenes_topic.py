@@ -12,7 +12,7 @@ import pytest
 
 from iapb import find_scene, load_scene
 from iapb.run import Run
-from iapb.scene_mechanism import mechanism_of
+from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 from reports.evidence import scenes
 from reports.evidence.runs import FIGURE_RUNS

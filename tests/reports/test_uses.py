@@ -6,8 +6,7 @@ import shlex
 
 import pytest
 
-from iapb.scene import Scene, load_scene
-from iapb.scene_files import find_scene, scene_names
+from iapb.scene import Scene, find_scene, load_scene, scene_names
 from reports import cli
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.pages.records import StoredFile

@@ -63,8 +63,7 @@ class Study:
 
     def scene(self, name: str) -> Scene:
         """A scene that comes with the project."""
-        from iapb.scene import load_scene
-        from iapb.scene_files import find_scene
+        from iapb.scene import find_scene, load_scene
 
         if name not in self._scenes:
             self._scenes[name] = load_scene(find_scene(name))

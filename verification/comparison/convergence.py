@@ -139,8 +139,7 @@ def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> Con
 
 def _scene(name: str) -> Scene:
     """A scene of `truth_scenes`, or one of the project's."""
-    from iapb.scene import load_scene, scene_from_text
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene, scene_from_text
     from verification.comparison.truth_scenes import TRUTH_SCENES
 
     return scene_from_text(TRUTH_SCENES[name]) if name in TRUTH_SCENES else load_scene(find_scene(name))

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
-from iapb.restitution import restitution_by_pair
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
 from verification.comparison.cases import ImpactCase
 
 Floats = NDArray[np.float64]
@@ -92,8 +91,7 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
 
 def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
     """Simulate a scene that comes with the project and return its impacts."""
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
     from reference.worlds import run_world
 
     scene = load_scene(find_scene(name))

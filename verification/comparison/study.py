@@ -158,7 +158,7 @@ def compare_scenes(
     scenes: Iterable[str] | None = None, progress: Progress | None = None, failures: list[Failure] | None = None
 ) -> tuple[tuple[MapCell, ...], int]:
     """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
-    from iapb.scene_files import scene_names
+    from iapb.scene import scene_names
 
     names, left_out = list(scene_names() if scenes is None else scenes), 0
     found: list[Comparison] = []

@@ -76,8 +76,7 @@ def world_cost(
 
 
 def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
     from iapb.simulation import Simulation
     from reference.worlds import find_world, run_world
 

@@ -35,8 +35,7 @@ def run_in_world(scene: Scene, world: str) -> Run:
 @cache
 def _warm_up() -> None:
     """Compile the step before any clock runs: a short run is timed as one piece."""
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
     from iapb.simulation import simulate
 
     simulate(load_scene(find_scene("two_discs")), steps=1)

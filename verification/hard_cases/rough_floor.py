@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene.reading import scene_from_text
+from iapb.scene import scene_from_text
 from verification.hard_cases.case import Measured, TrajectoryCase
 from verification.hard_cases.energy import largest_gain
 from verification.hard_cases.judge_trajectory import COULOMB

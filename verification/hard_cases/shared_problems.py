@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene.reading import scene_from_text
+from iapb.scene import scene_from_text
 from verification.hard_cases.case import CaseAbsent, HardCase, Measured, TrajectoryCase
 from verification.hard_cases.energy import largest_gain
 

@@ -8,8 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from verification.hard_cases.case import HardCase, Measured, TrajectoryCase
 from verification.hard_cases.energy import largest_gain
 

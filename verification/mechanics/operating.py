@@ -83,8 +83,7 @@ def operating(depth: str = "quick") -> Finding:
 
 
 def _rows(depth: str) -> Iterator[dict[str, Any]]:
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
 
     scene = load_scene(find_scene(SCENE))
     for path in PATHS:

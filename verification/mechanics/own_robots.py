@@ -64,7 +64,7 @@ def compare_scenes(depth: str = "quick", seed: int = SEED) -> Finding:
 def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
     """Yield the scenes that have something moving."""
     from iapb.scene import load_scene
-    from iapb.scene_mechanism import mechanism_of
+    from iapb.scene.mechanism import mechanism_of
 
     for path in sorted(SHIPPED.glob("*.yaml")):
         mechanism = mechanism_of(load_scene(path))

@@ -131,8 +131,7 @@ def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumbl
 
 @cache
 def _scene() -> Any:
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
 
     return load_scene(find_scene("tumbling_body"))
 

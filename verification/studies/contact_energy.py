@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.scene_mechanism import mechanism_of
+from iapb.scene.mechanism import mechanism_of
 
 Floats = NDArray[np.float64]
 

@@ -79,8 +79,7 @@ def _switched_off(filters: tuple[bool, bool]) -> dict[str, float]:
 
 def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
     """The scene with some of its contact's values changed, and its rate [Hz]."""
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
 
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
     return load_scene(find_scene(SCENE)).with_values(values if rate is None else values | {"rate": rate})

@@ -185,8 +185,7 @@ def ending(run: Run, turned: float) -> str:
 
 def study_scenes(names: Sequence[str], worlds: Sequence[str] = ("IAPB",)) -> tuple[SceneMeasure, ...]:
     """Return the measures of scenes that come with the project in the paper's worlds."""
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
     from reference.worlds import run_world
 
     return tuple(measure(run_world(load_scene(find_scene(name)), world)) for name in names for world in worlds)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.scene import Scene, load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 
 STEPS = 100  # the two discs meet in step 51

@@ -13,9 +13,8 @@ from iapb import ArgumentError, resolve_frictional_impact
 from iapb.contact.laws import ImpulseAugmented
 from iapb.mechanics.energy import Floats
 from iapb.run import Run
-from iapb.scene import Scene, load_scene, scene_from_text
-from iapb.scene_files import find_scene
-from iapb.scene_mechanism import mechanism_of
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 
 LAW = ImpulseAugmented(friction_in_impacts=True)

@@ -9,8 +9,7 @@ from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 from iapb.system import System
 

@@ -7,8 +7,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.mechanics.integrators import INTEGRATORS
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 from iapb.system import coupling_of
 

@@ -11,11 +11,9 @@ from hypothesis import strategies as st
 
 from iapb import decide_effects, resolve_impact
 from iapb.mechanics.energy import Floats
-from iapb.restitution import restitution_by_pair
 from iapb.run import Run
-from iapb.scene import Scene, load_scene
-from iapb.scene_files import find_scene
-from iapb.scene_mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
 from iapb.simulation import simulate
 
 BAR, PEG, DISCS = (load_scene(find_scene(name)) for name in ("bar_on_posts", "peg_corner", "two_discs"))

@@ -15,8 +15,7 @@ from iapb.haptics.coupling import FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.device import SimulatedDevice
 from iapb.haptics.kernels import couple, drive_device
 from iapb.run import FREE
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.system import System
 
 FOUR_CHANNEL = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))  # Table I

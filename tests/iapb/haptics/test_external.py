@@ -9,9 +9,8 @@ from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import DeviceReading
 from iapb.recorder import Recorder
-from iapb.scene import load_scene
+from iapb.scene import find_scene, load_scene
 from iapb.scene_device import simulated_device
-from iapb.scene_files import find_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
 

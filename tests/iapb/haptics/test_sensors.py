@@ -8,8 +8,7 @@ import pytest
 from iapb.contact.laws import Penalty
 from iapb.haptics.coupling import FourChannel
 from iapb.haptics.kernels import couple
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from iapb.system import System
 
 RESOLUTION = np.array([1e-3, 2e-3, 0.0])

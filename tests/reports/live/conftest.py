@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from reference.worlds import find_world
 from reports.live.setup import live_simulation
 

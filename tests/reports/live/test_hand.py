@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene
 from iapb.simulation import Simulation
 from reports.live.hand import SpringHand
 

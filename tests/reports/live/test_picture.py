@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene, scene_names
+from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
 from reports.live.picture import extent, held_point, pieces, placements
 

@@ -22,8 +22,7 @@ TICKS = 60
 
 @pytest.fixture(scope="module")
 def module_peg():
-    from iapb.scene import load_scene
-    from iapb.scene_files import find_scene
+    from iapb.scene import find_scene, load_scene
     from reference.worlds import find_world
     from reports.live.setup import live_simulation
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from iapb.scene_files import scene_names
+from iapb.scene import scene_names
 from reference.time_stepping import RigidConstraints
 from verification.comparison.convergence import CASES, WITHOUT_TRUTH, TruthCase, converge
 from verification.comparison.truth_scenes import TRUTH_SCENES

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from iapb.errors import IapbError
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from reference.worlds import run_world
 from verification.comparison.agreement import compare_cases
 from verification.comparison.scene_cases import impacts_of_run

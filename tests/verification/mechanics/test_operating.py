@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.scene import load_scene
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene
 from verification.mechanics import operating as study
 from verification.mechanics.hand_paths import PATHS
 

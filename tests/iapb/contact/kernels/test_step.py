@@ -8,8 +8,7 @@ import pytest
 import iapb.system
 from iapb.contact.kernels.step import OK, advance, locate, touching
 from iapb.contact.laws import Penalty
-from iapb.scene import load_scene, scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
 
 

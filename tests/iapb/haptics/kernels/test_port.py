@@ -12,8 +12,7 @@ from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.haptics.kernels import couple
 from iapb.haptics.kernels.device import command, render
 from iapb.haptics.kernels.pulse import observe_work, shape_impulse
-from iapb.scene import load_scene, scene_from_text
-from iapb.scene_files import find_scene
+from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
 
 GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)

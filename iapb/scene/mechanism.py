@@ -1,0 +1,215 @@
+"""A scene as the engine's mechanism, shapes and candidate pairs, with the restitution of each pair.
+
+The bodies of a planar scene lie in the plane z = 0 of the spatial engine. No BLAS here: its last bits depend on the
+processor.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact import geometry, spatial_geometry
+from iapb.contact.geometry import Shapes, candidate_pairs
+from iapb.errors import ArgumentError
+from iapb.mechanics.bodies import Body
+from iapb.mechanics.joints import Joint
+from iapb.mechanics.mechanism import Mechanism
+from iapb.scene.bodies import WORLD, inertia_matrix
+from iapb.scene.model import Scene, SpatialScene
+from iapb.scene.robots import rotation_of
+
+Floats = NDArray[np.float64]
+
+UNSTATED = 2.0  # larger than any restitution, so that the smaller of two is the one that is given
+
+
+def mechanism_of(scene: Scene) -> Mechanism:
+    """Return the scene's bodies as a mechanism, in the scene's order; q is their positions in a row.
+
+    A planar moment of inertia I about z becomes diag(I/2, I/2, I): the inertia of a flat body, so that the
+    spatial engine sees a physical one. Only its zz entry ever moves in the plane.
+    """
+    return Mechanism(_body_in_space(body) for body in scene.bodies)
+
+
+def start_of(scene: Scene) -> tuple[Floats, Floats]:
+    """Return the scene's first configuration q (nq,) and velocity v (nv,)."""
+    q = [x for body in scene.bodies for x in body.position]
+    v = [x for body in scene.bodies for x in body.velocity]
+    return np.array(q, np.float64), np.array(v, np.float64)
+
+
+def shapes_of(scene: Scene) -> Shapes:
+    """Return the scene's shapes: those of the bodies in order, then the walls.
+
+    A shape of a body that nothing moves (fixed to the world through and through) is static, like a wall.
+    """
+    frames = _frames(scene)
+    described = [_described(shape, frames[owner]) for owner, shape in _owned_shapes(scene)]
+    if isinstance(scene, SpatialScene):
+        return spatial_geometry.make_spatial_shapes(described)
+    return geometry.make_shapes(described)
+
+
+def pairs_of(scene: Scene, shapes: Shapes) -> NDArray[np.int32]:
+    """Return the candidate pairs (k, 2) among the scene's shapes (`shapes_of`), the first of a moving body.
+
+    Bodies of one tree are paired only where ``contact.self_collisions`` asks for it, and never when they are
+    rigidly connected or neighbours across one joint: these touch by construction.
+    """
+    owners = [owner for owner, _ in _owned_shapes(scene)]
+    links = _Links(scene)
+    kept = [pair for pair in candidate_pairs(shapes) if links.may_touch(owners[pair[0]], owners[pair[1]])]
+    return np.array(kept, np.int32).reshape(-1, 2)
+
+
+class _Links:
+    """Which bodies hang together: by a weld (one rigid part), across one joint, or in one tree."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.self_collisions = scene.contact.self_collisions
+        self.root: list[int] = []  # of each body: the first body of its tree
+        self.part: list[int] = []  # of each body: the first body of its rigid part
+        self.carrier: dict[int, int] = {}  # of each part: the part that its joint sits on, -1 = the world
+        for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
+            welded = body.joint == "fixed" and parent >= 0
+            self.root.append(i if parent < 0 else self.root[parent])
+            self.part.append(self.part[parent] if welded else i)
+            if not welded:
+                self.carrier[i] = -1 if parent < 0 else self.part[parent]
+
+    def may_touch(self, a: int, b: int) -> bool:
+        """Return whether two bodies can touch (indices; -1 = a wall)."""
+        if a < 0 or b < 0 or self.root[a] != self.root[b]:
+            return True
+        part_a, part_b = self.part[a], self.part[b]
+        adjoining = part_a == part_b or self.carrier[part_a] == part_b or self.carrier[part_b] == part_a
+        return self.self_collisions and not adjoining
+
+
+def _parents(scene: Scene) -> list[int]:
+    """Return the index of each body's parent, -1 for the world."""
+    index = {body.name: i for i, body in enumerate(scene.bodies)} | {WORLD: -1}
+    return [index[body.parent] for body in scene.bodies]
+
+
+def _owned_shapes(scene: Scene) -> list[tuple[int, Any]]:
+    """Return every shape with the index of its body, -1 for walls."""
+    of_bodies = [(i, shape) for i, body in enumerate(scene.bodies) for shape in body.shapes]
+    return of_bodies + [(-1, wall) for wall in scene.walls]
+
+
+def _turn(placed: Any) -> Floats:
+    """Return the rotation of something with a placement: (3, 3) in space, (2, 2) in the plane."""
+    if hasattr(placed, "rpy"):
+        return rotation_of(placed.rpy)
+    cos, sin = math.cos(placed.angle), math.sin(placed.angle)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def _body_in_space(body: Any) -> Body:
+    flat = len(body.origin) == 2
+    rotation, lift = np.eye(3), (0.0,) if flat else ()
+    turn = _turn(body)
+    rotation[: len(turn), : len(turn)] = turn
+    return Body(
+        name=body.name,
+        parent=None if body.parent == WORLD else body.parent,
+        joint=Joint(body.joint) if body.axis is None else Joint(body.joint, (*body.axis, *lift)),
+        placement=(rotation, np.array([*body.origin, *lift])),
+        mass=body.mass,
+        center_of_mass=np.array([*body.center_of_mass, *lift]),
+        inertia=np.diag([0.5, 0.5, 1.0]) * body.inertia if flat else np.array(inertia_matrix(body.inertia)),
+    )
+
+
+class _Frame(NamedTuple):
+    """Where a shape's numbers are written: the body that carries it (-1 = static), turn and shift to its frame."""
+
+    body: int
+    rotation: Floats
+    shift: Floats
+
+
+def _frames(scene: Scene) -> list[_Frame]:
+    """Return the frame of each body's shapes, and last that of the walls; what nothing moves is in world axes."""
+    n = 3 if isinstance(scene, SpatialScene) else 2
+    parents = _parents(scene)
+    frames = []
+    for owner in range(len(scene.bodies)):
+        rotation, shift, link = np.eye(n), np.zeros(n), owner
+        while link >= 0 and scene.bodies[link].joint == "fixed":
+            turn = _turn(scene.bodies[link])
+            rotation, shift = _product(turn, rotation), _product(turn, shift) + scene.bodies[link].origin
+            link = parents[link]
+        frames.append(_Frame(-1, rotation, shift) if link < 0 else _Frame(owner, np.eye(n), np.zeros(n)))
+    return [*frames, _Frame(-1, np.eye(n), np.zeros(n))]
+
+
+def _described(shape: Any, frame: _Frame) -> Any:
+    """Return a shape of the scene as the narrow phase describes it."""
+    if shape.kind == "half_plane":
+        return geometry.HalfPlane(shape.point, shape.normal)
+    if shape.kind == "half_space":
+        return spatial_geometry.HalfSpace(shape.point, shape.normal)
+    center = _product(frame.rotation, np.array(shape.center)) + frame.shift
+    if shape.kind == "circle":
+        return geometry.Circle(shape.radius, center, frame.body)
+    if shape.kind == "sphere":
+        return spatial_geometry.Sphere(shape.radius, center, frame.body)
+    turn = _product(frame.rotation, _turn(shape))
+    if len(turn) == 3:
+        return spatial_geometry.SpatialBox(shape.size, center, turn, frame.body)
+    corners = _box_corners(*shape.size) if shape.kind == "box" else np.array(shape.vertices)
+    return geometry.Polygon(_product(corners, turn.T) + center, frame.body)
+
+
+def _box_corners(width: float, height: float) -> Floats:
+    return 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """Return the product of a matrix with a matrix or vector, terms added from first to last, without BLAS."""
+    columns = b.reshape(len(b), -1)
+    total = a[:, :1] * columns[0]
+    for k in range(1, len(b)):
+        total = total + a[:, k : k + 1] * columns[k]
+    return total.reshape(len(a), *b.shape[1:])
+
+
+def restitution_by_shape(scene: Scene) -> Floats:
+    """Return what the body or wall of each shape gives (n,), UNSTATED where none; in the order of `shapes_of`."""
+    given = [body.restitution for body in scene.bodies for _ in body.shapes]
+    given += [wall.restitution for wall in scene.walls]
+    return np.array([UNSTATED if e is None else e for e in given], np.float64)
+
+
+def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
+    """Return e of each candidate pair (k, 2) of shapes.
+
+    The rule is the smaller of the two values given; a body or wall that gives none takes the other's, and where
+    neither gives one `contact.restitution` holds. So equal values stay what they are to the last bit, and a soft
+    thing is soft against everything.
+    """
+    own = restitution_by_shape(scene)
+    smaller = np.minimum(own[pairs[:, 0]], own[pairs[:, 1]])
+    return np.where(smaller > 1.0, scene.contact.restitution, smaller)
+
+
+def one_restitution(scene: Scene, pairs: NDArray[np.int32]) -> float:
+    """Return e where all pairs have the same one; for laws that know no other case.
+
+    Raises
+    ------
+    ArgumentError
+        Pairs differ.
+    """
+    values = np.unique(restitution_by_pair(scene, pairs))
+    if len(values) > 1:
+        found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
+        raise ArgumentError("scene", scene.name, found)
+    return float(values[0]) if len(values) else float(scene.contact.restitution)
