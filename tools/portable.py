@@ -286,7 +286,7 @@ def child_runs(path: Path) -> None:
 def _runs() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
     """Label, kind of world and arrays of each run; of a world that refuses a scene, its words."""
     from iapb import IapbError, find_scene, load_scene
-    from iapb.scene_files import scene_names
+    from iapb.scene import scene_names
     from reference.worlds import WORLDS, find_world, run_world
 
     renderings = [("IAPB", rendering) for rendering in ("saturate", "scale", "spread")]
