@@ -1,0 +1,248 @@
+"""A scene as mechanism, shapes and candidate pairs, in the plane and in space; robots from URDF."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.contact.geometry import CIRCLE, HALF_PLANE, POLYGON
+from iapb.errors import SceneError
+from iapb.mechanics.mechanism import Mechanism
+from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.robots import angles_of, rotation_of
+
+# A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
+CHAIN = scene_from_text("""\
+name: chain
+rate: 1000
+duration: 1
+bodies:
+  - name: bracket
+    joint: fixed
+    origin: [1, 2]
+    angle: 1.5707963267948966
+    shapes: [{kind: circle, radius: 0.1, center: [3, 0]}]
+  - {name: one, parent: bracket, joint: revolute, inertia: 1, shapes: [{kind: circle, radius: 0.1}]}
+  - {name: two, parent: one, joint: revolute, inertia: 1, shapes: [{kind: circle, radius: 0.1}]}
+  - {name: three, parent: two, joint: revolute, inertia: 1, shapes: [{kind: circle, radius: 0.1}]}
+  - {name: tool, parent: three, joint: fixed, shapes: [{kind: box, size: [0.1, 0.2], center: [1, 0], angle: 0.3}]}
+  - {name: puck, joint: planar, mass: 2, inertia: 3, shapes: [{kind: circle, radius: 0.1}]}
+walls:
+  - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 2]}
+contact: {self_collisions: true}
+""")
+BRACKET, ONE, TWO, THREE, TOOL, PUCK, FLOOR = range(7)  # shapes, in this order
+
+
+def pairs(scene: Scene) -> set[frozenset[int]]:
+    return {frozenset(map(int, pair)) for pair in pairs_of(scene, shapes_of(scene))}
+
+
+def test_q_and_v_are_the_positions_and_velocities_in_the_order_of_the_bodies() -> None:
+    scene = CHAIN.with_values({"bodies.two.position": [0.5], "bodies.puck.velocity": [1, 2, 3]})
+    mechanism = mechanism_of(scene)
+    q, v = start_of(scene)
+    assert mechanism.names == tuple(body.name for body in scene.bodies)
+    assert q.shape == (mechanism.nq,)
+    assert v.shape == (mechanism.nv,)
+    assert q[mechanism.coordinate_names.index("two.angle")] == 0.5
+    np.testing.assert_array_equal(v[-3:], [1, 2, 3])
+
+
+def test_free_planar_body_has_its_mass_and_moment_of_inertia() -> None:
+    mass = mechanism_of(CHAIN).mass_matrix(start_of(CHAIN)[0])
+    np.testing.assert_array_equal(mass[-3:, -3:], np.diag([2.0, 2.0, 3.0]))
+
+
+def test_flat_bodies_are_physical_in_space() -> None:
+    for body in mechanism_of(CHAIN).bodies:
+        principal = np.diag(body.inertia)
+        assert all(2.0 * principal[k] <= principal.sum() for k in range(3))  # triangle inequality
+        assert (principal >= 0.0).all()
+
+
+def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
+    scene = CHAIN.with_values(
+        {"bodies.puck": {"name": "puck", "joint": "prismatic", "axis": [0, 5], "mass": 2}}
+    )
+    mechanism = mechanism_of(scene)
+    q, _ = start_of(scene)
+    step = np.zeros(mechanism.nv)
+    step[-1] = 0.25
+    moved = mechanism.placements(mechanism.integrate(q, step, 1.0))[1] - mechanism.placements(q)[1]
+    np.testing.assert_allclose(moved[-1], [0.0, 0.25, 0.0], atol=1e-15)
+
+
+def test_shapes_of_a_body_that_nothing_moves_are_static_and_in_world_axes() -> None:
+    shapes = shapes_of(CHAIN)
+    assert list(shapes.body) == [-1, 1, 2, 3, 4, 5, -1]
+    assert list(shapes.kind) == [CIRCLE] * 4 + [POLYGON, CIRCLE, HALF_PLANE]
+    np.testing.assert_allclose(
+        shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15
+    )  # turned by 90°
+    np.testing.assert_array_equal(shapes.vertices[shapes.first[FLOOR] + 1], [0.0, 1.0])
+
+
+def test_box_of_a_moving_body_stays_in_body_axes() -> None:
+    shapes = shapes_of(CHAIN)
+    corners = shapes.vertices[shapes.first[TOOL] : shapes.first[TOOL] + 4]
+    np.testing.assert_allclose(corners.mean(axis=0), [1.0, 0.0], atol=1e-15)
+    edge = corners[1] - corners[0]
+    assert np.arctan2(edge[1], edge[0]) == pytest.approx(0.3)
+    assert np.hypot(*edge) == pytest.approx(0.1)
+
+
+def test_a_turned_box_has_the_bits_of_plain_arithmetic() -> None:
+    """BLAS would fuse multiplications with additions on some processors."""
+    numbers = np.random.default_rng(4).uniform(0.1, 1.0, (40, 4))
+    for width, height, x, angle in numbers.tolist():
+        box = {"kind": "box", "size": [width, height], "center": [x, -x], "angle": angle}
+        shapes = shapes_of(CHAIN.with_values({"bodies.tool.shapes": [box]}))
+        corners = shapes.vertices[shapes.first[TOOL] : shapes.first[TOOL] + 4].tolist()
+        c, s, w, h = math.cos(angle), math.sin(angle), 0.5 * width, 0.5 * height
+        around = [(-w, -h), (w, -h), (w, h), (-w, h)]
+        assert corners == [[a * c - b * s + x, a * s + b * c - x] for a, b in around]
+
+
+def test_moving_shapes_meet_walls_and_other_trees_neighbours_never_meet() -> None:
+    expected = (
+        *({link, FLOOR} for link in (ONE, TWO, THREE, TOOL, PUCK)),
+        *({link, PUCK} for link in (BRACKET, ONE, TWO, THREE, TOOL)),
+        # one tree: more than one joint apart; the tool is welded to link three
+        {BRACKET, TWO}, {BRACKET, THREE}, {BRACKET, TOOL}, {ONE, THREE}, {ONE, TOOL},
+    )  # fmt: skip
+    assert pairs(CHAIN) == {frozenset(pair) for pair in expected}
+
+
+def test_links_of_one_tree_meet_only_where_the_scene_asks_for_it() -> None:
+    left = pairs(CHAIN) - pairs(CHAIN.with_values({"contact.self_collisions": False}))
+    assert left == {
+        frozenset(pair)
+        for pair in ((BRACKET, TWO), (BRACKET, THREE), (BRACKET, TOOL), (ONE, THREE), (ONE, TOOL))
+    }
+
+
+def test_shape_a_of_a_pair_moves() -> None:
+    shapes = shapes_of(CHAIN)
+    assert (shapes.body[pairs_of(CHAIN, shapes)[:, 0]] >= 0).all()
+
+
+BODY = """name: thing
+dimensions: 3
+rate: 1000
+duration: 0.1
+bodies:
+  - {name: thing, joint: free_flyer, mass: 1, inertia: [1, 2, 3]%s}
+"""
+URDF = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 1" rpy="0.1 0.2 0.3"/>
+<axis xyz="0 1 0"/></joint></robot>"""
+
+
+def mistakes_of(text: str, file: str = "(text)") -> str:
+    with pytest.raises(SceneError) as failure:
+        scene_from_text(text, file)
+    return str(failure.value)
+
+
+def test_position_defaults_to_rest_and_must_hold_a_unit_quaternion() -> None:
+    scene = scene_from_text(BODY % "")
+    assert isinstance(scene, SpatialScene)
+    np.testing.assert_array_equal(start_of(scene)[0], [0, 0, 0, 0, 0, 0, 1])
+    assert "length one" in mistakes_of(BODY % ", position: [0, 0, 0, 0, 0, 1, 1]")
+    assert "7 numbers" in mistakes_of(BODY % ", position: [0, 0, 0]")
+
+
+@pytest.mark.parametrize(
+    ("written", "matrix"),
+    [
+        ("[1, 2, 3]", np.diag([1.0, 2.0, 3.0])),
+        ("[1, 2, 3, 0.1, 0.2, 0.3]", np.array([[1, 0.1, 0.2], [0.1, 2, 0.3], [0.2, 0.3, 3]])),
+        ("[[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]]", np.array([[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]])),
+    ],
+)
+def test_inertia_as_three_six_or_nine_numbers(written: str, matrix: np.ndarray) -> None:
+    scene = scene_from_text((BODY % "").replace("[1, 2, 3]", written))
+    np.testing.assert_array_equal(mechanism_of(scene).bodies[0].inertia, matrix)
+
+
+@pytest.mark.parametrize(("inertia", "read"), [
+    ("[1, 2, 1e-12]", True), ("[1, 2, 9.9e-13]", False), ("[1, 1, 1, 0.9999999, 0, 0]", True),
+    ("[1, 1, 1, 1, 0, 0]", False), ("[1, 1, 1, 0.8, 0.8, -0.8]", False), ("[3, 3, 3, -1, -1, -1]", True),
+])  # fmt: skip
+def test_a_body_that_turns_freely_has_inertia_about_every_axis(inertia: str, read: bool) -> None:
+    text = (BODY % "").replace("[1, 2, 3]", inertia)
+    if read:
+        assert scene_from_text(text)
+    else:
+        assert "principal moments" in mistakes_of(text)
+
+
+def test_planar_words_are_refused_in_space_and_the_other_way_round() -> None:
+    assert "joint" in mistakes_of((BODY % "").replace("free_flyer", "planar"))
+    assert "dimensions" in mistakes_of((BODY % "").replace("dimensions: 3", "dimensions: 2"))
+    assert "bodies[0].joint" in mistakes_of((BODY % "").replace("dimensions: 3\n", ""))
+
+
+def test_values_change_in_a_spatial_scene() -> None:
+    scene = scene_from_text(BODY % "").with_values({"bodies.thing.mass": 2.0, "gravity": [0, 0, -9.81]})
+    assert isinstance(scene, SpatialScene)
+    assert scene.bodies[0].mass == 2.0
+    assert scene_from_text(scene.source_text).resolved() == scene.resolved()
+
+
+def scene_with_robot(folder: Path, urdf: str = "r.urdf", more: str = "") -> str:
+    (folder / "r.urdf").write_text(URDF)
+    robot = f"robots: [{{name: rob, urdf: {urdf}, shapes: {{arm: [{{kind: sphere, radius: 0.1}}]}}{more}}}]\n"
+    return (BODY % "") + robot
+
+
+def test_robot_becomes_bodies_and_the_scene_needs_its_file_no_more(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(scene_with_robot(tmp_path, more=", origin: [1, 0, 0], position: {arm: [0.4]}"))
+    scene = load_scene(path)
+    assert [body.name for body in scene.bodies] == ["thing", "rob_base", "rob_arm"]
+    again = scene_from_text(scene.source_text)
+    assert again.resolved() == scene.resolved()
+    own, read = mechanism_of(scene), Mechanism.from_urdf(tmp_path / "r.urdf")
+    R, p = own.placements(start_of(scene)[0])
+    R_read, p_read = read.placements([0.4])
+    np.testing.assert_allclose(R[2], R_read[1], atol=1e-15)
+    np.testing.assert_allclose(p[2], p_read[1] + [1, 0, 0], atol=1e-15)
+
+
+@pytest.mark.parametrize("urdf", ["../r.urdf", "/etc/hostname", "sub/../../r.urdf", "link.urdf"])
+def test_urdf_paths_stay_in_the_scene_folder(tmp_path: Path, urdf: str) -> None:
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    (tmp_path / "r.urdf").write_text(URDF)
+    (folder / "link.urdf").symlink_to(tmp_path / "r.urdf")
+    assert "inside the scene's folder" in mistakes_of(scene_with_robot(folder, urdf), str(folder / "scene.yaml"))
+
+
+def test_unknown_links_and_bad_files_are_mistakes_of_the_scene(tmp_path: Path) -> None:
+    file = str(tmp_path / "scene.yaml")
+    assert "a link of it: arm, base" in mistakes_of(scene_with_robot(tmp_path, more=", position: {leg: [1]}"), file)
+    assert "readable" in mistakes_of(scene_with_robot(tmp_path, "missing.urdf"), file)
+
+
+@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (0.3, -1.2, 2.9), (0.0, np.pi / 2, 0.7), (3.0, 0.1, -3.1)])
+def test_angles_give_back_the_rotation(rpy: tuple[float, float, float]) -> None:
+    rotation: Any = rotation_of(rpy)
+    np.testing.assert_allclose(rotation_of(angles_of(rotation)), rotation, atol=1e-12)
+
+
+def test_neighbouring_links_of_the_arm_are_no_pairs() -> None:
+    scene = load_scene(find_scene("arm_obstacles"))
+    shapes = shapes_of(scene)
+    names = [body.name for body in scene.bodies]
+    joined = {(names.index("arm_upper_arm"), names.index("arm_forearm"))}
+    bodies = {tuple(sorted((int(shapes.body[a]), int(shapes.body[b])))) for a, b in pairs_of(scene, shapes)}
+    assert not joined & bodies
+    assert (names.index("arm_upper_arm"), names.index("arm_tool")) in bodies
