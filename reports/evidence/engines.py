@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from reports.figures.figure import Numbers
-from reports.pages.records import Finding, Topic
+from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED
+from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED, Failure
 
 if TYPE_CHECKING:
     from verification.engines import EngineRecord
@@ -31,9 +31,10 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     """Compare all engines that are here, and name those that are not."""
     from verification.engines import compare_engines
 
-    records = compare_engines(depth=depth, progress=progress)
+    failures: list[Failure] = []
+    records = compare_engines(depth=depth, progress=progress, failures=failures)
     tables = {"errors": errors_table(records), "settings": settings_table(records)}
-    return Topic(ID, TITLE, LEAD, findings(records), tables, verdict_of(records))
+    return with_failures(Topic(ID, TITLE, LEAD, findings(records), tables, verdict_of(records)), failures)
 
 
 def findings(records: Sequence[EngineRecord]) -> tuple[Finding, ...]:

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from reports.evidence import haptic_rate_tables as tables
-from reports.pages.records import Finding, Topic
+from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, attempt
 
 LEAD = (
     "A haptic loop has a millisecond. How much of it a step needs is measured here beside MuJoCo, Pinocchio, the "
@@ -29,15 +29,19 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 def topic_of(study: Any) -> Topic:
     """Findings and tables of a study."""
-    timed = (*_races(study), *_printed(study), *_solvers(study), _growth(study), *_rate(study), _bodies(study),
-             *_robots(study), *_start_up(study), *_trajectories(study))  # fmt: skip
-    findings = (*(replace(finding, timed=True) for finding in timed), _budgets(study))
-    met, last = sum(finding.outcome == REPRODUCED for finding in findings), study.kernels[-1]
-    verdict = (
-        f"{met} of {len(findings)} questions on speed are answered as asked for; with {last.contacts} contacts the "
-        f"factored impact is {last.ratio:.0f} times as fast as the printed formula."
-    )
-    return Topic("haptic-rate", "The haptic rate", LEAD, findings, tables.all_tables(study), verdict)
+    failures, findings = list(study.failures), list[Finding]()
+    for judge in (_races, _printed, _solvers, _growth, _rate, _bodies, _robots, _start_up, _trajectories, _budgets):
+        made = attempt(f"sentences on {judge.__name__.strip('_')}", lambda judge=judge: list(judge(study)),  # type: ignore[misc]
+                       failures) or []  # fmt: skip
+        findings += [replace(finding, timed=judge is not _budgets) for finding in made]
+    met = sum(finding.outcome == REPRODUCED for finding in findings)
+    verdict = f"{met} of {len(findings)} questions on speed are answered as asked for"
+    for last in study.kernels[-1:]:
+        verdict += (f"; with {last.contacts} contacts the factored impact is {last.ratio:.0f} times as fast as the "
+                    "printed formula")  # fmt: skip
+    made_tables = tables.all_tables(study, failures)
+    topic = Topic("haptic-rate", "The haptic rate", LEAD, tuple(findings), made_tables, f"{verdict}.")
+    return with_failures(topic, failures)
 
 
 def _outcome(met: bool) -> str:
@@ -125,13 +129,13 @@ def _listed(contacts: list[int]) -> str:
     return ", ".join(str(count) for count in sorted(contacts))
 
 
-def _growth(study: Any) -> Finding:
+def _growth(study: Any) -> Iterator[Finding]:
     from verification.accuracy_time.scaling import exponent
 
     power, printed = (exponent(study.scaling, method, "contacts") for method in ("factored", "gram_pinv"))
     wide = exponent(study.scaling, "factored", "coordinates")
     sizes = [timing.contacts for timing in study.scaling if timing.method == "factored" and timing.coordinates == 12]
-    return Finding(
+    yield Finding(
         f"The time of the factored impact grows as c to the power {power:.2f} from {min(sizes)} to {max(sizes)} "
         f"contacts, the printed formula's as {printed:.2f}; with coordinates as d to the power {wide:.2f}. Asked for: "
         f"at most {LARGEST_EXPONENT['contacts']:g} in c.", _outcome(power <= LARGEST_EXPONENT["contacts"]))  # fmt: skip
@@ -146,11 +150,11 @@ def _rate(study: Any) -> Iterator[Finding]:
     yield Finding(f"Most contacts with 99.9 % of the impacts under a millisecond: {', '.join(texts)}.", REPRODUCED)
 
 
-def _bodies(study: Any) -> Finding:
+def _bodies(study: Any) -> Iterator[Finding]:
     from verification.studies.many_bodies import growth_exponent
 
     power, costs = growth_exponent(study.bodies), study.bodies
-    return Finding(
+    yield Finding(
         f"A step of {costs[-1].bodies} free bodies takes {costs[-1].seconds * 1e6:.3g} µs; from 20 bodies on its time "
         f"grows as their number to the power {power:.2f}. Asked for: at most {LARGEST_EXPONENT['bodies']:g}.",
         _outcome(power <= LARGEST_EXPONENT["bodies"]))  # fmt: skip
@@ -179,11 +183,11 @@ def _start_up(study: Any) -> Iterator[Finding]:
             f"{found.limit:g} s of computing.", _outcome(found.cpu < found.limit))  # fmt: skip
 
 
-def _budgets(study: Any) -> Finding:
+def _budgets(study: Any) -> Iterator[Finding]:
     rows = study.budgets
     gains = sum(row.most_gain > 0.0 for row in rows)
     half = [row.lost for row in rows if row.budget == row.rank // 2]
-    return Finding(
+    yield Finding(
         f"Stopped after any number of rows, the impact gains energy in {gains} of {len(rows)} sizes and budgets "
         f"(exactly computed); half of the rows already take {100 * min(half):.0f} to {100 * max(half):.0f} % of the "
         "energy that all of them take.", _outcome(gains == 0))  # fmt: skip

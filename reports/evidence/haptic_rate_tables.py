@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 from reports.figures.figure import Numbers
+from verification.finding import Failure, attempt
 
 QUARTILES = ("time [µs]", "lower quartile [µs]", "upper quartile [µs]")
 
 
-def all_tables(study: Any) -> dict[str, Numbers]:
-    """By name."""
-    return {
-        "steps against MuJoCo": races(study), "parts of a step": parts(study), "scaling": scaling(study),
-        "fitted": fitted(study), "contacts at 1 kHz": rate(study), "bodies": bodies(study), "robots": robots(study),
-        "solvers": solvers(study), "start": start(study), "budgets": budgets(study), "motions": motions(study),
+def all_tables(study: Any, failures: list[Failure] | None = None) -> dict[str, Numbers]:
+    """By name; `failures` receives those that cannot be made."""
+    makers = {
+        "steps against MuJoCo": races, "parts of a step": parts, "scaling": scaling, "fitted": fitted,
+        "contacts at 1 kHz": rate, "bodies": bodies, "robots": robots, "solvers": solvers, "start": start,
+        "budgets": budgets, "motions": motions,
     }  # fmt: skip
+    made = {name: attempt(f"table {name}", partial(make, study), failures) for name, make in makers.items()}
+    return {name: table for name, table in made.items() if table is not None}
 
 
 def races(study: Any) -> Numbers:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from reports.evidence import scenes_tables as tables
 from reports.evidence.runs import shipped_scene
 from reports.evidence.scenes_findings import findings_of, verdict_of
-from reports.pages.records import Topic
+from reports.pages.records import Topic, with_failures
 from reports.runner import Runner
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -35,21 +37,29 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     from verification.studies.open_books import open_books
     from verification.studies.scene_measures import measure
 
-    names = scene_names()
-    runs: list[Run] = []
-    measures: list[SceneMeasure] = []
-    books: list[OpenBooks] = []
+    def studied(name: str) -> tuple[Run, SceneMeasure, OpenBooks]:
+        scene = shipped_scene(name)
+        run = runner(scene, WORLD)
+        measured = measure(run, [run_world(scene, WORLD) for _ in range(TIMED_AGAIN)])
+        return run, measured, open_books(scene, lambda refined: runner(refined, WORLD, keep=False), REFINEMENTS[depth])
+
+    names, failures = scene_names(), list[Failure]()
+    found: list[tuple[Run, SceneMeasure, OpenBooks]] = []
     for done, name in enumerate(names):
         progress(done, len(names))
-        scene = shipped_scene(name)
-        runs.append(runner(scene, WORLD))
-        measures.append(measure(runs[-1], [run_world(scene, WORLD) for _ in range(TIMED_AGAIN)]))
-        books.append(open_books(scene, lambda refined: runner(refined, WORLD, keep=False), REFINEMENTS[depth]))
+        records = attempt(name, partial(studied, name), failures)
+        if records is not None:
+            found.append(records)
     progress(len(names), len(names))
-    return topic_of(runs, measures, books)
+    runs, measures, books = zip(*found, strict=True) if found else ((), (), ())
+    return topic_of(runs, measures, books, failures)
 
 
-def topic_of(runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks]) -> Topic:
+def topic_of(
+    runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks], failures: Sequence[Failure] = ()
+) -> Topic:
     """Return the topic of these records."""
-    findings = findings_of(runs, measures, books)
-    return Topic(ID, TITLE, LEAD, findings, tables.all_tables(runs, measures, books), verdict_of(measures, books))
+    more = list(failures)
+    findings = findings_of(runs, measures, books, more)
+    made = tables.all_tables(runs, measures, books)
+    return with_failures(Topic(ID, TITLE, LEAD, findings, made, verdict_of(measures, books)), more)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports.evidence.scenes_tables import YARDSTICK, pace_of
 from reports.pages.records import Finding
-from verification.finding import LIMITED, REFUTED, REPRODUCED
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Failure, attempt
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -23,13 +24,17 @@ ROUNDING = 1e-12  # share of the energy turned over: sums of some thousand terms
 
 
 def findings_of(
-    runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks]
+    runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks],
+    failures: list[Failure] | None = None,
 ) -> tuple[Finding, ...]:
-    """Return every finding."""
-    return (
-        _penetration(runs, measures), _impacts(runs, measures), _order(books), _open(measures), _gains(measures),
-        _endings(measures), _time(measures),
-    )  # fmt: skip
+    """Return every finding; `failures` receives those that cannot be made, as without the scene that is the unit."""
+    judges = {
+        "overlap": partial(_penetration, runs, measures), "impacts": partial(_impacts, runs, measures),
+        "order": partial(_order, books), "open books": partial(_open, measures), "gains": partial(_gains, measures),
+        "endings": partial(_endings, measures), "time": partial(_time, measures),
+    }  # fmt: skip
+    tried = (attempt(f"sentence on {name}", judge, failures) for name, judge in judges.items())
+    return tuple(finding for finding in tried if finding is not None)
 
 
 def verdict_of(measures: Sequence[SceneMeasure], books: Sequence[OpenBooks]) -> str:
@@ -151,6 +156,8 @@ def _plural(ending: str, count: int) -> str:
 def _time(measures: Sequence[SceneMeasure]) -> Finding:
     unit, slow = pace_of(measures), max(measures, key=lambda m: m.seconds_per_step)
     near = min(measures, key=lambda m: m.realtime_factor)
+    if unit is None:
+        return Finding(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
     sentence = (
         f"A step of {slow.scene}, the dearest, takes {slow.seconds_per_step / unit:.0f} times as long as one of "
         f"{YARDSTICK} ({1e6 * unit:.1f} µs on this machine beside other work). Nearest to real time is {near.scene}: "

@@ -28,9 +28,9 @@ def all_tables(
     return {CONTACTS: contacts(measures), LEDGER: ledger(measures), OPEN: left_open(books), OVER_TIME: over_time(runs)}
 
 
-def pace_of(measures: Sequence[SceneMeasure]) -> float:
-    """Return the time of the yardstick's step [s]."""
-    return next(each.seconds_per_step for each in measures if each.scene == YARDSTICK)
+def pace_of(measures: Sequence[SceneMeasure]) -> float | None:
+    """Return the time of the yardstick's step [s]; None where that scene failed."""
+    return next((each.seconds_per_step for each in measures if each.scene == YARDSTICK), None)
 
 
 def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
@@ -43,7 +43,7 @@ def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
     )  # fmt: skip
     rows = tuple(
         (m.scene, m.dimensions, m.steps, 1e3 * m.dt, 1e3 * m.penetration, m.impacts, m.most_rows, m.most_contacts,
-         1e6 * m.seconds_per_step, m.seconds_per_step / unit, m.realtime_factor, m.ending, m.book.turned_over)
+         1e6 * m.seconds_per_step, unit and m.seconds_per_step / unit, m.realtime_factor, m.ending, m.book.turned_over)
         for m in measures
     )  # fmt: skip
     note = "Time of the quickest part of each run, on a machine that did other work too: compare the ratios."

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from verification.accuracy_time.kernels import quartiles
 from verification.accuracy_time.measure import Quartiles
 from verification.accuracy_time.resting_scenes import RestingScene, resting_scenes
+from verification.finding import Failure, attempt
 
 STEPS, ROUNDS = 512, 15  # steps of one sample, as many as a chunk of `simulate`; samples of each
 SOLVERS = ("Newton", "CG", "PGS")
@@ -52,7 +54,7 @@ class StepRace:
 
 def race_mujoco(
     scenes: Sequence[RestingScene] | None = None, rounds: int = ROUNDS, steps: int = STEPS,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> tuple[StepRace, ...]:
     """Time every scene, form and solver.
 
@@ -65,7 +67,7 @@ def race_mujoco(
     found: list[StepRace] = []
     chosen = resting_scenes() if scenes is None else tuple(scenes)
     for done, scene in enumerate(chosen, start=1):
-        found += _race(scene, rounds, steps)
+        found += attempt(f"race on {scene.name}", partial(_race, scene, rounds, steps), failures) or []
         if progress is not None:
             progress(done, len(chosen))
     return tuple(found)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from verification.accuracy_time.kernels import random_impact
+from verification.finding import Failure, attempt
 
 SIZES = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
 
@@ -32,17 +34,19 @@ class BudgetRow:
 
 
 def anytime(
-    impacts: int = 40, seed: int = 0, progress: Callable[[int, int], None] | None = None
+    impacts: int = 40, seed: int = 0, progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[BudgetRow, ...]:
     """Resolve random plastic impacts with every budget from 0 rows to the rank."""
     found = []
     for done, (d, c) in enumerate(SIZES, start=1):
         cases = [random_impact(d, c, np.random.default_rng([seed, d, c, k])) for k in range(impacts)]
         rank = max(1, (2 * d) // 3)
-        found += [_row(d, c, rank, budget, cases) for budget in range(rank + 1)]
+        found += [attempt(f"budget of {budget} rows, d = {d}, c = {c}", partial(_row, d, c, rank, budget, cases),
+                          failures) for budget in range(rank + 1)]  # fmt: skip
         if progress is not None:
             progress(done, len(SIZES))
-    return tuple(found)
+    return tuple(row for row in found if row is not None)
 
 
 def _row(d: int, c: int, rank: int, budget: int, cases: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> BudgetRow:

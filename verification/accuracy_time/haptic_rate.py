@@ -13,6 +13,7 @@ import numpy as np
 
 from reference.one_thread import one_thread
 from verification.accuracy_time.kernels import Floats, factored_loop, printed_impact, random_impact
+from verification.finding import Failure, attempt
 
 DEADLINE = 1e-3  # [s] the haptic rate of 1 kHz
 CALLS, ALLOWED = 1000, 1  # calls of one trial, and how many of them may be late: 99.9 % are in time
@@ -45,7 +46,7 @@ class RateTrial:
 
 def haptic_rate(
     coordinates: tuple[int, ...] = COORDINATES, contacts: tuple[int, ...] = CONTACTS, calls: int = CALLS,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> tuple[RateTrial, ...]:
     """Try both methods at each number of coordinates, with more and more contacts until one is late.
 
@@ -59,8 +60,13 @@ def haptic_rate(
         for done, d in enumerate(coordinates, start=1):
             for method, make in ((FACTORED, _factored), (PRINTED, _printed)):
                 for c in contacts:
-                    trials.append(_trial(method, d, c, make(d, c), calls))
-                    if not trials[-1].in_time:
+                    found = attempt(f"{c} contacts in {d} coordinates by {method}",
+                                    lambda d=d, c=c, method=method, make=make: _trial(  # type: ignore[misc]
+                                        method, d, c, make(d, c), calls), failures)  # fmt: skip
+                    if found is None:
+                        continue
+                    trials.append(found)
+                    if not found.in_time:
                         break
             if progress is not None:
                 progress(done, len(coordinates))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from reference.one_thread import one_thread
 from verification.accuracy_time.measure import Quartiles
+from verification.finding import Failure, attempt
 
 Floats = NDArray[Any]
 
@@ -37,10 +39,15 @@ class KernelTime:
         return self.printed.median / self.factored.median
 
 
-def kernel_times(sizes: tuple[tuple[int, int], ...] = SIZES, rounds: int = 40, seed: int = 0) -> tuple[KernelTime, ...]:
+def kernel_times(
+    sizes: tuple[tuple[int, int], ...] = SIZES, rounds: int = 40, seed: int = 0, failures: list[Failure] | None = None
+) -> tuple[KernelTime, ...]:
     """Return the times at each (d, c), sampled in turn."""
     with one_thread():
-        return tuple(_time_size(d, c, rounds, np.random.default_rng([seed, d, c])) for d, c in sizes)
+        found = [attempt(f"impact of {c} contacts in {d} coordinates",
+                         partial(_time_size, d, c, rounds, np.random.default_rng([seed, d, c])), failures)
+                 for d, c in sizes]  # fmt: skip
+    return tuple(timed for timed in found if timed is not None)
 
 
 def _time_size(d: int, c: int, rounds: int, rng: np.random.Generator) -> KernelTime:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from reference.one_thread import one_thread
 from verification.accuracy_time.kernels import factored_loop, printed_impact, quartiles, random_impact
 from verification.accuracy_time.measure import Quartiles
+from verification.finding import Failure, attempt
 
 CONTACTS = (50, 100, 200, 500, 1000, 2000, 5000)  # at d = 12
 COORDINATES = (3, 6, 12, 24, 48, 96)  # with 60 contacts
@@ -28,7 +30,9 @@ class Timing:
     seconds: Quartiles
 
 
-def scaling(rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None = None) -> tuple[Timing, ...]:
+def scaling(
+    rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
+) -> tuple[Timing, ...]:
     """Time the factored impact, and the printed formula where that ends, over contacts and over coordinates.
 
     All sizes take their turns in every round, so that a slow minute of the machine bends no curve.
@@ -36,17 +40,24 @@ def scaling(rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None =
     sizes = [(12, c) for c in CONTACTS] + [(d, 60) for d in COORDINATES if d != 12]
     with one_thread():
         calls = {(method, d, c): call for d, c in sizes for method, call in _calls(d, c).items()}
-        for call in calls.values():
-            call()
         times: dict[tuple[str, int, int], list[float]] = {size: [] for size in calls}
-        for done in range(rounds):
-            for size, call in calls.items():
-                started = time.thread_time()
-                call()
-                times[size].append(time.thread_time() - started)
+        for done in range(rounds + 1):
+            for size in tuple(times):
+                name = "{}, d = {}, c = {}".format(*size)
+                seconds = attempt(name, partial(_seconds, calls[size]), failures)
+                if seconds is None:
+                    del times[size]
+                elif done:  # the first round warms up
+                    times[size].append(seconds)
             if progress is not None:
-                progress(done + 1, rounds)
+                progress(done, rounds)
     return tuple(Timing(*size, quartiles(found)) for size, found in times.items())
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    started = time.thread_time()
+    call()
+    return time.thread_time() - started
 
 
 def _calls(d: int, c: int) -> dict[str, Callable[[], object]]:

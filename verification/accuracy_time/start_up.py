@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from verification.finding import Failure, attempt
+
 HELP_LIMIT, COMPILE_LIMIT = 0.5, 30.0  # [s]
 _HELPS = 5
 _PROJECT = Path(__file__).parents[2]
@@ -35,17 +37,25 @@ class StartUp:
     limit: float
 
 
-def start_up(depth: str = "quick") -> tuple[StartUp, ...]:
+def start_up(depth: str = "quick", failures: list[Failure] | None = None) -> tuple[StartUp, ...]:
     """Time `iapb --help`; at depth "full" also the first steps without and with a cache of compiled kernels."""
-    helps = [_timed(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
-    found = [StartUp("iapb --help", *_medians(helps), _HELPS, HELP_LIMIT)]
+    found = attempt("iapb --help", _help, failures) or []
     if depth == "full":
-        with tempfile.TemporaryDirectory() as cache:
-            first, second = (_timed(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache}) for _ in range(2))
-        saved = (first[0] - second[0], first[1] - second[1])
-        found += [StartUp("first steps, all kernels compiled", *saved, 1, COMPILE_LIMIT),
-                  StartUp("first steps, kernels from the cache", *second, 1, COMPILE_LIMIT)]  # fmt: skip
+        found += attempt("first steps", _first_steps, failures) or []
     return tuple(found)
+
+
+def _help() -> list[StartUp]:
+    helps = [_timed(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
+    return [StartUp("iapb --help", *_medians(helps), _HELPS, HELP_LIMIT)]
+
+
+def _first_steps() -> list[StartUp]:
+    with tempfile.TemporaryDirectory() as cache:
+        first, second = (_timed(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache}) for _ in range(2))
+    saved = (first[0] - second[0], first[1] - second[1])
+    return [StartUp("first steps, all kernels compiled", *saved, 1, COMPILE_LIMIT),
+            StartUp("first steps, kernels from the cache", *second, 1, COMPILE_LIMIT)]  # fmt: skip
 
 
 def _medians(times: list[tuple[float, float]]) -> tuple[float, float]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from iapb.errors import MissingDependencyError
@@ -17,6 +18,7 @@ from verification.accuracy_time.start_up import StartUp, start_up
 from verification.accuracy_time.step_profile import PartTime, profile_step
 from verification.accuracy_time.trajectories import TrajectoryRun, trajectory_precision
 from verification.comparison.step_cost import CostRow, impact_cost
+from verification.finding import Failure, attempt
 from verification.studies.many_bodies import StepCost, study_many_bodies
 
 SIZES = ((12, 60), (12, 300))  # (d, c) at which the printed formula is to be ten and a hundred times slower
@@ -30,6 +32,7 @@ class HapticStudy:
     """Records of one run.
 
     races : empty where MuJoCo is not installed, then `without_mujoco` says so
+    failures : the cases that raised, which are in nothing else
     robots : rows of `verification.mechanics.robot_timing`; `robots_of` says whose robots they are
     """
 
@@ -46,6 +49,7 @@ class HapticStudy:
     start_up: tuple[StartUp, ...]
     budgets: tuple[BudgetRow, ...]
     trajectories: tuple[TrajectoryRun, ...]
+    failures: tuple[Failure, ...] = ()
 
 
 def haptic_study(depth: str = "quick", progress: Progress | None = None) -> HapticStudy:
@@ -55,24 +59,29 @@ def haptic_study(depth: str = "quick", progress: Progress | None = None) -> Hapt
     def within(stage: str) -> Callable[[int, int], None]:
         return lambda done, total: say(stage, done, total)
 
-    races, missing = _races(20 if full else 9, within("a step against MuJoCo"))
-    scenes = resting_scenes()
-    parts = tuple(part for scene in scenes for part in profile_step(scene, 15 if full else 7))
-    robots, robots_of = _robots(depth)
+    failures: list[Failure] = []
+    races, missing = _races(20 if full else 9, within("a step against MuJoCo"), failures)
+    parts = tuple(part for scene in resting_scenes() for part in attempt(
+        f"parts of a step, {scene.name}", partial(profile_step, scene, 15 if full else 7), failures) or ())
+    robots, robots_of = attempt("robots", partial(_robots, depth), failures) or ((), "")
     say("printed formula and solvers", 0, 1)
-    return HapticStudy(
-        races, missing, parts, kernel_times(SIZES, 40 if full else 7),
-        impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say),
-        scaling(15 if full else 7, within("scaling laws")), haptic_rate(progress=within("contacts at 1 kHz")),
-        study_many_bodies(), robots, robots_of, start_up(depth),
-        anytime(40 if full else 15, progress=within("budgets")),
-        trajectory_precision(depth=depth, progress=within("whole motions")),
+    found = HapticStudy(
+        races, missing, parts, kernel_times(SIZES, 40 if full else 7, failures=failures),
+        impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say, failures=failures),
+        scaling(15 if full else 7, within("scaling laws"), failures),
+        haptic_rate(progress=within("contacts at 1 kHz"), failures=failures),
+        study_many_bodies(failures=failures), robots, robots_of, start_up(depth, failures),
+        anytime(40 if full else 15, progress=within("budgets"), failures=failures),
+        trajectory_precision(depth=depth, progress=within("whole motions"), failures=failures),
     )  # fmt: skip
+    return replace(found, failures=tuple(failures))
 
 
-def _races(rounds: int, progress: Callable[[int, int], None]) -> tuple[tuple[StepRace, ...], str]:
+def _races(
+    rounds: int, progress: Callable[[int, int], None], failures: list[Failure]
+) -> tuple[tuple[StepRace, ...], str]:
     try:
-        return race_mujoco(rounds=rounds, progress=progress), ""
+        return race_mujoco(rounds=rounds, progress=progress, failures=failures), ""
     except MissingDependencyError as error:
         return (), str(error)
 

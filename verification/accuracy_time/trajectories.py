@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from reference.simulators import FixedScene, Settings, Trajectory, find_simulato
 from reference.simulators.scene import rotation
 from reference.simulators.trajectory import steps_between_samples
 from verification.accuracy_time.trajectory_scenes import TRAJECTORY_SCENES
+from verification.finding import Failure, attempt
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +64,7 @@ class TrajectoryRun:
 
 def trajectory_precision(
     scenes: Sequence[str] | None = None, depth: str = "quick", steps: Sequence[float] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> tuple[TrajectoryRun, ...]:
     """Run every method that is installed on every scene with every step, coarse to fine."""
     names, ways = tuple(scenes or TRAJECTORY_SCENES), methods()
@@ -70,9 +72,12 @@ def trajectory_precision(
     with one_thread():
         for done, name in enumerate(names):
             scene = TRAJECTORY_SCENES[name]()
-            judge = _Judge(scene)
+            judge = attempt(f"truth of {scene.title}", partial(_Judge, scene), failures)
+            if judge is None:
+                continue
             for turn, (method, way) in enumerate(ways.items(), start=1):
-                runs += _over_steps(scene, method, way, judge, steps or STEPS[depth], LONGEST[depth])
+                over = partial(_over_steps, scene, method, way, judge, steps or STEPS[depth], LONGEST[depth])
+                runs += attempt(f"{method} on {scene.title}", over, failures) or []
                 if progress is not None:
                     progress(done * len(ways) + turn, len(names) * len(ways))
     return tuple(runs)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, Simulator, find_simulator, fixed_scene
 from verification.engines.measures import measured
 from verification.engines.record import EngineRecord
+from verification.finding import Failure, attempt
 
 OWN, MATCHED = "own", "matched"
 SETTINGS = (OWN, MATCHED)
@@ -36,6 +38,7 @@ def compare_engines(
     scenes: Sequence[str] | None = None,
     depth: str = "full",
     progress: Progress | None = None,
+    failures: list[Failure] | None = None,
 ) -> list[EngineRecord]:
     """Run every engine on every scene at both choices of settings.
 
@@ -43,21 +46,20 @@ def compare_engines(
     ----------
     engines, scenes : names; default: all. An engine that is not installed gets records that say so.
     depth : "quick" shortens the resting scenes
+    failures : receives what raises outside of the engines themselves; what an engine raises in a run is a result
 
     Where an engine's own settings are the matched ones, one run makes both records.
     """
     if depth not in ("quick", "full"):
         raise ArgumentError("depth", depth, "quick or full")
     names, chosen = list(engines or SIMULATORS), list(scenes or FIXED_SCENES)
-    made = [find_simulator(name) for name in names]
+    made = {name: attempt(name, partial(find_simulator, name), failures) for name in names}
     records: list[EngineRecord] = []
-    for name, simulator in zip(names, made, strict=True):
-        for scene in chosen:
-            if progress is not None:
-                progress(len(records) // len(SETTINGS), len(names) * len(chosen))
-            records += _both(name, simulator, scene, depth)
-    if progress is not None:
-        progress(len(names) * len(chosen), len(names) * len(chosen))
+    pairs = [(name, simulator, scene) for name, simulator in made.items() if simulator is not None for scene in chosen]
+    for done, (name, simulator, scene) in enumerate(pairs, 1):
+        records += attempt(f"{name} on {scene}", partial(_both, name, simulator, scene, depth), failures) or []
+        if progress is not None:
+            progress(done, len(pairs))
     return records
 
 

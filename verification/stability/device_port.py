@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from verification.finding import Failure, attempt
 from verification.stability.device_loop import (
     DeviceLoop,
     Floats,
@@ -56,17 +58,20 @@ class PortLeak:
         return self.needed / self.loop.bound
 
 
-def device_port_leaks(depth: str = "quick", progress: Callable[[int, int], None] | None = None) -> tuple[PortLeak, ...]:
+def device_port_leaks(
+    depth: str = "quick", progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
+) -> tuple[PortLeak, ...]:
     """Every wall, sensor and kind of motion."""
     chosen = [(wall, sensors, kind) for wall in WALLS[depth] for sensors in SENSORS for kind in MOTIONS]
     found = []
     for done, ((world, K, B), sensors, kind) in enumerate(chosen, start=1):
         delay, resolution = SENSORS[sensors]
         loop = DeviceLoop(world, K, B, delay=delay, resolution=resolution)
-        found.append(_worst(loop, sensors, kind, SPEEDS[depth]))
+        name = f"hand's port in {world}, K = {K:g} N/m, B = {B:g} N s/m, {sensors} sensors, the hand {kind}"
+        found.append(attempt(name, partial(_worst, loop, sensors, kind, SPEEDS[depth]), failures))
         if progress is not None:
             progress(done, len(chosen))
-    return tuple(found)
+    return tuple(leak for leak in found if leak is not None)
 
 
 def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...]) -> PortLeak:

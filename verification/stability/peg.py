@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.claims.measures import bounces, deepest_penetration, settling_time
 from verification.claims.trace import trace_of
+from verification.finding import Failure, attempt
 
 Runner = Callable[[Scene, str], Run]
 
@@ -41,21 +43,26 @@ class PegContact:
 
 
 def peg_contacts(
-    scene: Scene, run: Runner, depth: str = "quick", progress: Callable[[int, int], None] | None = None
+    scene: Scene, run: Runner, depth: str = "quick", progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[PegContact, ...]:
-    """Every device, wall and world.
+    """Every device and wall, in both worlds in turn; a wall that raises in one is left out.
 
     Parameters
     ----------
     scene : the peg in the corner; run : (scene, world) -> Run, complete or not
     """
-    chosen = [(device, K, B, world) for device in DEVICES for K in STIFFNESSES[depth] for B in DAMPINGS[depth]
-              for world in WORLDS]  # fmt: skip
-    found = []
-    for done, (device, K, B, world) in enumerate(chosen, start=1):
+    chosen = [(device, K, B) for device in DEVICES for K in STIFFNESSES[depth] for B in DAMPINGS[depth]]
+
+    def both(device: str, K: float, B: float) -> list[PegContact]:
         rate, sensors = DEVICES[device]
         values = {"rate": rate, "contact.stiffness": K, "contact.damping": B, **sensors}
-        found.append(_contact(device, K, B, run(scene.with_values(values), world)))
+        return [_contact(device, K, B, run(scene.with_values(values), world)) for world in WORLDS]
+
+    found: list[PegContact] = []
+    for done, case in enumerate(chosen, start=1):
+        name = "peg at {}, K = {:g} N/m, B = {:g} N s/m".format(*case)
+        found += attempt(name, partial(both, *case), failures) or []
         if progress is not None:
             progress(done, len(chosen))
     return tuple(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from iapb.run import Run
 from iapb.scene import Scene
 from verification.claims.measures import bounces, deepest_penetration, settling_time
 from verification.claims.trace import trace_of
+from verification.finding import Failure, attempt
 
 RATE = 1000.0  # [Hz]: aluminium rings at 300 Hz
 
@@ -37,11 +39,16 @@ class WaveformRecord:
     lost: float
 
 
-def compare_waveforms(scene: Scene, run: Callable[[Scene], Run]) -> tuple[WaveformRecord, ...]:
+def compare_waveforms(
+    scene: Scene, run: Callable[[Scene], Run], failures: list[Failure] | None = None
+) -> tuple[WaveformRecord, ...]:
     """Run the scene of the peg at RATE under every waveform; `run` simulates it in the world IAPB."""
-    return tuple(
-        _record(name, run(scene.with_values({"rate": RATE, "device.waveform": name}))) for name in WAVEFORMS
-    )
+
+    def under(name: str) -> WaveformRecord:
+        return _record(name, run(scene.with_values({"rate": RATE, "device.waveform": name})))
+
+    found = (attempt(f"waveform {name}", partial(under, name), failures) for name in WAVEFORMS)
+    return tuple(record for record in found if record is not None)
 
 
 def _record(name: str, run: Run) -> WaveformRecord:

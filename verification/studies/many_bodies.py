@@ -9,9 +9,12 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from iapb.simulation import Simulation
@@ -53,9 +56,10 @@ def field_of_discs(n: int) -> str:
     ])  # fmt: skip
 
 
-def study_many_bodies(counts: Sequence[int] = COUNTS) -> tuple[StepCost, ...]:
+def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | None = None) -> tuple[StepCost, ...]:
     """Return the cost of a step for each number of bodies."""
-    return tuple(_cost(n) for n in counts)
+    found = (attempt(f"{n} bodies", partial(_cost, n), failures) for n in counts)
+    return tuple(cost for cost in found if cost is not None)
 
 
 def growth_exponent(costs: Sequence[StepCost], quantity: str = "seconds", least_bodies: int = 20) -> float:

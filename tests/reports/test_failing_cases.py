@@ -1,0 +1,156 @@
+"""A fault in one case of a topic costs the topic that row only."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iapb import find_scene, load_scene
+from reports.evidence import engines, haptic_rate, scenes, stability
+from reports.pages.records import Topic
+from reports.runner import Runner
+from verification.accuracy_time import (
+    against_mujoco,
+    anytime,
+    kernels,
+    resting_scenes,
+    scaling,
+    start_up,
+    study,
+    trajectories,
+)
+from verification.accuracy_time import haptic_rate as rate
+from verification.comparison import step_cost
+from verification.engines import study as engines_study
+from verification.stability import device_port, maps, peg, waveforms
+from verification.studies import many_bodies
+
+
+def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
+    """`original`, which raises where `here` is true of its arguments."""
+
+    def call(*arguments: Any, **options: Any) -> Any:
+        if here(*arguments):
+            raise ZeroDivisionError("planted")
+        return original(*arguments, **options)
+
+    return call
+
+
+def lost(topic: Topic) -> list[str]:
+    """The cases that failed, each of the planted fault; the topic says how many."""
+    assert {failure.error for failure in topic.failures} == {"ZeroDivisionError"}
+    count = len(topic.failures)
+    assert topic.verdict.endswith(f"{count} case{'s' if count > 1 else ''} failed.")
+    return [failure.case for failure in topic.failures]
+
+
+def nothing(done: int, total: int) -> None:
+    assert 0 <= done <= total
+
+
+def test_stability(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(maps.GRIDS, "quick", (3, 5))
+    monkeypatch.setattr(maps, "touch_walls", broken(maps.touch_walls, lambda loop, *_: loop.rate == 1000.0 and
+                                                    loop.device_damping == 5.0 and not loop.delay))
+    monkeypatch.setattr(peg, "_contact", broken(peg._contact, lambda device, K, B, run: (K, B, run.world) ==
+                                                (500.0, 50.0, "IAPB") and device == "512 Hz"))
+    monkeypatch.setitem(peg.STIFFNESSES, "quick", (500.0, 1000.0))
+    monkeypatch.setitem(peg.DAMPINGS, "quick", (50.0,))
+    monkeypatch.setattr(peg, "DEVICES", {"512 Hz": peg.DEVICES["512 Hz"]})
+    monkeypatch.setattr(waveforms, "_record", broken(waveforms._record, lambda name, _: name == "brake"))
+    monkeypatch.setitem(device_port.WALLS, "quick", (("CBuc", 1e3, 0.0), ("PB", 1e3, 0.0)))
+    monkeypatch.setitem(device_port.SPEEDS, "quick", (0.3,))
+    monkeypatch.setattr(device_port, "_worst", broken(device_port._worst, lambda loop, sensors, kind, _: (
+        loop.world, sensors, kind) == ("PB", "late", "presses")))
+    topic = stability.compute(Runner(tmp_path), "quick", nothing)
+    assert lost(topic) == [
+        "walls at 1000 Hz, delay 0, device damping 5 N s/m", "peg at 512 Hz, K = 500 N/m, B = 50 N s/m",
+        "waveform brake", "hand's port in PB, K = 1000 N/m, B = 0 N s/m, late sensors, the hand presses",
+    ]  # fmt: skip
+    assert len(topic.findings) == 9
+    assert len(topic.tables["maps"].rows) == 3 * 7 and len(topic.tables["peg"].rows) == 2
+    assert len(topic.tables["hand port"].rows) == 2 * len(device_port.SENSORS) * 2 - 1
+
+
+def test_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(engines_study, "SIMULATORS", ("iapb", "rigid"))
+    monkeypatch.setattr(engines_study, "FIXED_SCENES", ("redundant_wedge", "bernoulli"))
+    monkeypatch.setattr(engines_study, "_both", broken(engines_study._both, lambda name, _, scene, depth: (
+        name, scene) == ("rigid", "bernoulli")))
+    topic = engines.compute(Runner(tmp_path), "quick", nothing)
+    assert lost(topic) == ["rigid on bernoulli"]
+    assert [row[2] for row in topic.tables["errors"].rows] == ["redundant wedge"] * 2 + ["bernoulli"] * 2 + [
+        "redundant wedge"] * 2
+
+
+@pytest.mark.parametrize("name", ["tumbling_body", "peg_corner"])
+def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
+    """The second is the scene whose step is the unit of time."""
+    names = ("peg_corner", "two_discs", "tumbling_body")
+    monkeypatch.setattr("iapb.scene_files.scene_names", lambda: names)
+    monkeypatch.setattr(scenes, "shipped_scene", broken(lambda scene: load_scene(find_scene(scene)), name.__eq__))
+    monkeypatch.setattr(scenes, "TIMED_AGAIN", 0)
+    topic = scenes.compute(Runner(tmp_path), "quick", nothing)
+    assert lost(topic) == [name]
+    assert [row[0] for row in topic.tables["energy ledger"].rows] == [each for each in names if each != name]
+    assert len(topic.findings) == 8
+
+
+def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    def races(scene: Any, *_: Any) -> list[against_mujoco.StepRace]:
+        times = [kernels.quartiles([1e-6])] * 3
+        return [against_mujoco.StepRace(scene.name, "box", "Newton", 4, 4, *times, 0.0, 0.0)]
+
+    def cost(d: int, c: int, *_: Any) -> kernels.KernelTime:
+        return kernels.KernelTime(d, c, kernels.quartiles([1e-6]), kernels.quartiles([2e-4]))
+
+    chosen = resting_scenes.resting_scenes()
+    monkeypatch.setattr(against_mujoco, "_mujoco", lambda: None)
+    monkeypatch.setattr(against_mujoco, "_race", broken(races, lambda scene, *_: scene is chosen[1]))
+    for module in (against_mujoco, study):
+        monkeypatch.setattr(module, "resting_scenes", lambda: chosen)
+    monkeypatch.setattr(study, "profile_step", broken(lambda *_: (), lambda scene, _: scene is chosen[0]))
+    monkeypatch.setattr(kernels, "_time_size", broken(cost, lambda d, c, *_: c == 300))
+    monkeypatch.setattr(study, "SOLVER_CONTACTS", {"quick": (1, 2)})
+    monkeypatch.setattr(step_cost, "_time_case", broken(_solver_rows, lambda case, *_: case.contacts == 2))
+    clock = itertools.count(1)
+    monkeypatch.setattr(scaling, "_calls", lambda d, c: {"factored": (d, c), "gram_pinv": (d, c)})
+    monkeypatch.setattr(scaling, "_seconds", broken(lambda size: 1e-6 * next(clock), lambda size: size == (24, 60)))
+    monkeypatch.setattr(rate, "_factored", lambda d, c: None)
+    monkeypatch.setattr(rate, "_printed", lambda d, c: None)
+    monkeypatch.setattr(rate, "_trial", broken(lambda method, d, c, call, calls: rate.RateTrial(method, d, c, 0, 1e-6),
+                                               lambda method, d, c, *_: (method, d, c) == (rate.PRINTED, 3, 60)))
+    monkeypatch.setattr(many_bodies, "_cost", broken(lambda n: many_bodies.StepCost(n, 1e-6 * n, 1.0, 1, n, n),
+                                                     (50).__eq__))
+    monkeypatch.setattr(study, "_robots", broken(lambda depth: ((), ""), lambda depth: True))
+    monkeypatch.setattr(start_up, "_timed", broken(lambda *_: (1.0, 1.0), lambda *_: True))
+    monkeypatch.setattr(anytime, "SIZES", ((6, 24),))
+    monkeypatch.setattr(anytime, "_row", broken(
+        lambda d, c, rank, budget, cases: anytime.BudgetRow(d, c, rank, budget, 1, 0.1, 0.1, -1.0, 0.5),
+        lambda d, c, rank, budget, cases: budget == 1))  # fmt: skip
+    monkeypatch.setattr(trajectories, "_Judge", broken(lambda scene: scene, lambda scene: "cradle" in scene.title))
+    monkeypatch.setattr(trajectories, "methods", lambda: {"IAPB, midpoint": None, "PB, midpoint": None, "other": None})
+    monkeypatch.setattr(trajectories, "_over_steps", broken(_motions, lambda scene, method, *_: method == "other"))
+    topic = haptic_rate.topic_of(study.haptic_study())
+    assert lost(topic) == [
+        f"race on {chosen[1].name}", f"parts of a step, {chosen[0].name}", "robots",
+        "impact of 300 contacts in 12 coordinates", "patch of 2 contacts", "pile of 2 contacts",
+        "factored, d = 24, c = 60", "gram_pinv, d = 24, c = 60", "60 contacts in 3 coordinates by the printed formula",
+        "50 bodies", "iapb --help", "budget of 1 rows, d = 6, c = 24", "truth of cradle, e = 1",
+        "other on bouncing ball, e = 0.7", "other on peg into a corner, e = 0",
+    ]  # fmt: skip
+
+
+def _solver_rows(case: Any, *_: Any) -> list[step_cost.CostRow]:
+    names = (step_cost.IAPB, step_cost.KERNEL, "daqp")
+    return [step_cost.CostRow(case.family, case.contacts, 6, name, "solved", t, t, t, 3, 0.0)
+            for name, t in zip(names, (1.0, 0.1, 2.0), strict=True)]  # fmt: skip
+
+
+def _motions(scene: Any, method: str, *_: Any) -> list[trajectories.TrajectoryRun]:
+    return [trajectories.TrajectoryRun(scene.title, method, 1e-3, "ok", "", 0.1, 0.1, 0.1, 1e-3)]
