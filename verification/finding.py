@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import re
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+from iapb.errors import ArgumentError
+from iapb.names import one_of
+
+Case = TypeVar("Case")
 Result = TypeVar("Result")
 Row = Mapping[str, Any]
 
@@ -20,6 +24,7 @@ REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
     "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
+DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
 FAILED_CASES = "not computed"  # name of the table of cases that failed
@@ -104,6 +109,12 @@ class Table:
     def without(self, *keys: str) -> Table:
         """Return the table without these columns."""
         return self.select([key for key in self.keys if key not in keys])
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether every row that can tell holds; None where none can."""
+        decided = [outcome for outcome in self.holds if outcome is not None]
+        return all(decided) if decided else None
 
     @property
     def keys(self) -> list[str]:
@@ -204,6 +215,12 @@ class Finding:
         return self.verdict != NOT_COMPUTED
 
 
+def check_depth(depth: str) -> None:
+    """Raise ArgumentError unless the depth is one of DEPTHS."""
+    if depth not in DEPTHS:
+        raise ArgumentError("depth", depth, one_of(depth, DEPTHS))
+
+
 def worst(verdicts: Iterable[str]) -> str:
     """Return the worst of some verdicts; NOT_COMPUTED for none."""
     return min(verdicts, key=_WORST_FIRST.index, default=NOT_COMPUTED)
@@ -250,3 +267,16 @@ def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | 
             raise
         failures.append(failure_of(case, error))
         return None
+
+
+def of_each(
+    cases: Iterable[Case], results: Callable[[Case], Iterable[Result]], failures: list[Failure] | None,
+    name: Callable[[Case], str] = str,
+) -> Iterator[Result]:
+    """Yield the results of each case; one that raises is a Failure of that name, and yields none."""
+    for case in cases:
+
+        def listed(case: Case = case) -> list[Result]:
+            return list(results(case))
+
+        yield from attempt(name(case), listed, failures) or ()

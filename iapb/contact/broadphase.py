@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -69,7 +68,7 @@ def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
     if kind in (CIRCLE, POLYGON):
         corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
         middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        reach = max(math.hypot(x, y) for x, y in (corners - middle).tolist())
+        reach = float(np.linalg.norm(corners - middle, axis=1).max())
         return np.array([*middle, 0.0]), reach + float(shapes.radius[i])
-    extent = float(shapes.radius[i]) if kind == SPHERE else math.hypot(*shapes.half_size[i].tolist())
+    extent = float(shapes.radius[i]) if kind == SPHERE else float(np.linalg.norm(shapes.half_size[i]))
     return shapes.center[i].copy(), extent

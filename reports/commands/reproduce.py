@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from reports.pages.records import FailedCases
+
+SHOWN_FAILURES = 20  # of a stage, in the last lines
 
 
 def reproduce(
@@ -54,8 +59,21 @@ def make_report(out: Path, depth: str) -> None:
     print(f"Beside it: {', '.join(file.name for file in beside)}.")
     took["figures and page"] = time.perf_counter() - started - sum(took.values())
     print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
-    if any(topic.failed for topic in evidence.topics):
+    if evidence.failed:
+        _say_what_failed(evidence.failed)
         raise typer.Exit(1)
+
+
+def _say_what_failed(failed: Sequence[FailedCases]) -> None:
+    """The last lines: what was not computed, why, and where the tracebacks are."""
+    count = sum(len(one.failures) for one in failed)
+    print(f"\nNot computed: {count} {'case' if count == 1 else 'cases'}. The next call tries again.")
+    for one in failed:
+        for failure in one.failures[:SHOWN_FAILURES]:
+            print(f"  {one.stage}: {failure.case}: {failure.error}: {failure.reason}")
+        if len(one.failures) > SHOWN_FAILURES:
+            print(f"  {one.stage}: and {len(one.failures) - SHOWN_FAILURES} more")
+        print(f"    tracebacks: {one.file}")
 
 
 def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) -> Callable[[str, int, int], None]:

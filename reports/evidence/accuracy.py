@@ -7,13 +7,14 @@ from collections.abc import Callable
 from typing import Any
 
 from reports.figures.figure import Numbers
+from verification.finding import Failure
 
 
-def compute(progress: Callable[[int, int], None]) -> Numbers:
+def compute(progress: Callable[[int, int], None], failures: list[Failure] | None = None) -> Numbers:
     """The table behind the work-precision figure: a row per method and problem."""
     from verification.accuracy_time import work_precision
 
-    rows = tuple(_row(found) for found in work_precision(progress=progress))
+    rows = tuple(_row(found) for found in work_precision(progress=progress, failures=failures))
     return Numbers(
         ("method", "problem", "time [µs]", "quartiles [µs]", "relative error", "relative energy gain",
          "restitution residual", "failed after [µs]", "outcome"), rows, 3,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from iapb.run import Run
@@ -11,9 +12,12 @@ from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, Numbers
 from reports.pages.records import Claim
 from reports.runner import Runner
+from verification.finding import NOT_COMPUTED, REPRODUCED, Failure
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> tuple[Claim, ...]:
+def compute(
+    runner: Runner, depth: str, progress: Callable[[int, int], None], failures: list[Failure]
+) -> tuple[Claim, ...]:
     """Check every claim with runs from the store; each run is listed under every claim that uses it."""
     from verification.claims import check_claims
 
@@ -33,6 +37,8 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         progress(done, total)
 
     results = check_claims(run, depth, progress=begin, asked=asked)
+    failures += [replace(one, case=f"{result.id}, {one.case}") if one.case != result.id else one
+                 for result in results for one in result.failures]  # fmt: skip
     return tuple(as_record(result) for result in results)
 
 
@@ -41,8 +47,9 @@ def as_record(result: Any) -> Claim:
     headline, table = "", result.table
     if result.decided:
         headline = f"holds in {result.held} of {result.decided} trials"
+    outcome = NOT_COMPUTED if result.failures and result.verdict == REPRODUCED else result.verdict
     return Claim(
-        id=result.id, statement=result.statement, place=result.place, outcome=result.verdict,
+        id=result.id, statement=result.statement, place=result.place, outcome=outcome,
         headline=f"{result.finding} ({headline})" if headline else result.finding, quantity=result.quantity,
         conditions=result.conditions, tolerance=result.tolerance, fails=result.fails,
         numbers=Numbers(table.titles, table.cells, timed=table.timed, timed_rows=bool(table.timed)),

@@ -4,28 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from reports.evidence.runs import shipped_scene
 from reports.figures.figure import Numbers
 from reports.pages.records import SceneEffect
+from verification.finding import Failure, attempt
 
 SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")
 INPUT = "effect_costs"
 
 
-def compute(progress: Callable[[int, int], None]) -> dict[str, tuple[SceneEffect, ...]]:
+def compute(
+    progress: Callable[[int, int], None], failures: list[Failure]
+) -> dict[str, tuple[SceneEffect, ...]]:
     """The effects of each scene in the IAPB world; those that can be left out are measured."""
     found = {}
     for done, name in enumerate(SCENES):
         progress(done, len(SCENES))
-        found[name] = effects_of(shipped_scene(name))
+        found[name] = attempt(name, partial(_effects_of, name, failures), failures)
     progress(len(SCENES), len(SCENES))
-    return found
+    return {name: effects for name, effects in found.items() if effects is not None}
+
+
+def _effects_of(name: str, failures: list[Failure]) -> tuple[SceneEffect, ...]:
+    return effects_of(shipped_scene(name), failures=failures)
 
 
 def effects_of(
-    scene: Any, world: str = "IAPB", progress: Callable[[int, int], None] | None = None
+    scene: Any, world: str = "IAPB", progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[SceneEffect, ...]:
     """Every effect of a scene in a world of the compiled engine, measured where it is on and can be left out."""
     from iapb import decide_effects
@@ -33,7 +42,7 @@ def effects_of(
     from verification.accuracy_time.effect_cost import in_words, measure_effects
 
     chosen = find_world(world)
-    measured = {one.effect: one for one in measure_effects(scene, world, progress=progress)}
+    measured = {one.effect: one for one in measure_effects(scene, world, progress=progress, failures=failures)}
     effects = []
     for effect in decide_effects(scene, chosen.law.name, chosen.coupling_in(scene).name, "full"):
         one = measured.get(effect.name)

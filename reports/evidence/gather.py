@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from reports.pages.records import (
     Counterexample,
     CrossCheck,
     Evidence,
+    FailedCases,
     HardCase,
     Property,
     SceneEffect,
@@ -35,8 +37,10 @@ from reports.pages.records import (
 )
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
+from verification.finding import Failure, attempt
 
 Progress = Callable[[str, int, int], None]
+Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
 
 # what draws random numbers -> module with its SEED
 SEEDS = {
@@ -53,38 +57,35 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     runner = Runner(out / "runs")
     kept = _Kept(out / "tables", depth, progress, runner)
     scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
-    inputs: dict[str, Any] = dict(runs.figure_runs(runner, kept.of("runs of the figures")))
+    inputs: dict[str, Any] = kept.attempt("runs of the figures", partial(runs.figure_runs, runner), {})
     inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
     inputs["arm_energies"] = _arm_energies()
     from verification.proofs.statement import ProofRecord
 
-    ledger = kept.stage("claims", tuple[Claim, ...], lambda done: claims.compute(runner, depth, done))
+    ledger = kept.stage("claims", tuple[Claim, ...], partial(claims.compute, runner, depth))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)
-    bulk = kept.stage("bulk impacts", Numbers, lambda done: properties.bulk(depth, done))
+    bulk = kept.stage("bulk impacts", Numbers, partial(properties.bulk, depth), None)
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
-    hard = kept.stage("hard cases", tuple[HardCase, ...], lambda done: hard_cases.compute(runner, done))
-    timed = kept.stage("accuracy", Numbers, accuracy.compute)
+    hard = kept.stage("hard cases", tuple[HardCase, ...], partial(hard_cases.compute, runner))
+    timed = kept.stage("accuracy", Numbers, accuracy.compute, None)
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
     inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
-    needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute)
+    needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute, {})
     inputs[effects.INPUT] = effects.summary(needed)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
-        cross_checks=checks, hard_cases=hard, effects=needed, topics=topics,
+        cross_checks=checks, hard_cases=hard, effects=needed, topics=topics, failed=kept.failed(),
         provenance=provenance(), manifest=manifest(runner.used, kept.stages, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)
 
 
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
-    """One topic; where it fails the others are still worth their hours, and the next time only this one is tried."""
-    try:
-        topic: Topic = kept.stage(name, Topic, lambda done: compute_topic(name, runner, depth, done))
-    except Exception as failure:
-        topic = failed_topic(name, failure, kept.folder)
-    return topic
+    """One topic, or one that says why it could not be computed."""
+    topic: Topic | None = kept.stage(name, Topic, lambda done, _: compute_topic(name, runner, depth, done), None)
+    return failed_topic(name, kept.failures[name][-1]) if topic is None else topic
 
 
 def provenance() -> dict[str, str]:
@@ -108,20 +109,41 @@ def _arm_energies() -> Mapping[str, Any]:
 
 
 class _Kept:
-    """Stages of one folder and depth, in the order in which they were asked for."""
+    """Stages of one folder and depth, in the order in which they were asked for, and the cases that failed."""
 
     def __init__(self, folder: Path, depth: str, progress: Progress, runner: Runner) -> None:
         self.folder, self.depth, self.progress, self.runner = folder, depth, progress, runner
         self.stages: list[Stage] = []
+        self.failures: dict[str, list[Failure]] = {}
 
-    def of(self, title: str) -> Callable[[int, int], None]:
-        """Progress of one stage."""
-        return lambda done, total: self.progress(title, done, total)
-
-    def stage(self, name: str, kind: Any, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
-        """The records of a stage, computed if they are not there."""
+    def stage(self, name: str, kind: Any, compute: Compute, nothing: Any = ()) -> Any:
+        """The records of a stage, computed if they are not there; `nothing` where it cannot be computed at all."""
         stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth}, depends_of(name))
-        records = stage.get_or_compute(lambda: compute(self.of(name)), self.runner)
+        self.failures[name] = stage.failures
+
+        def records(progress: Callable[[int, int], None], failures: list[Failure]) -> Any:
+            found = stage.get_or_compute(lambda: compute(progress, failures), self.runner)
+            self.stages.append(stage)
+            return found
+
+        return self.attempt(name, records, nothing)
+
+    def attempt(self, name: str, compute: Compute, nothing: Any) -> Any:
+        """What is computed under a name, or `nothing` where that raises; an interrupt passes through."""
+        failures = self.failures.setdefault(name, [])
+        started = len(failures)
+        found = attempt("all of it", lambda: compute(lambda *done: self.progress(name, *done), failures), failures)
         self.progress(name, 1, 1)
-        self.stages.append(stage)
-        return records
+        return nothing if found is None and len(failures) > started else found
+
+    def failed(self) -> tuple[FailedCases, ...]:
+        """What failed in each stage; the tracebacks go to a file beside the tables, in place of older ones."""
+        found = []
+        for name, failures in self.failures.items():
+            path = self.folder / f"{name.replace(' ', '_')}-failed.txt"
+            path.unlink(missing_ok=True)
+            if failures:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in failures), encoding="utf-8")
+                found.append(FailedCases(name, tuple(failures), str(path)))
+        return tuple(found)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from reports.figures.figure import Numbers
 from reports.figures.hard_cases import CASE, INPUT, KIND
 from reports.pages.records import HardCase
 from reports.runner import Runner
+from verification.finding import Failure, attempt
 
 __all__ = ["INPUT", "compute", "summary"]
 
@@ -26,16 +28,18 @@ _NOTES = {
 }  # fmt: skip
 
 
-def compute(runner: Runner, progress: Callable[[int, int], None]) -> tuple[HardCase, ...]:
+def compute(
+    runner: Runner, progress: Callable[[int, int], None], failures: list[Failure]
+) -> tuple[HardCase, ...]:
     """Judge all methods and worlds on all cases of the catalogue; a case without its files is a record that says so."""
     from verification.hard_cases import HARD_CASES
 
     records = []
     for done, name in enumerate(HARD_CASES):
         progress(done, len(HARD_CASES))
-        records.append(_record(name, runner))
+        records.append(attempt(name, partial(_record, name, runner, failures), failures))
     progress(len(HARD_CASES), len(HARD_CASES))
-    return tuple(records)
+    return tuple(record for record in records if record is not None)
 
 
 def summary(cases: Sequence[HardCase]) -> Numbers:
@@ -45,7 +49,7 @@ def summary(cases: Sequence[HardCase]) -> Numbers:
     return Numbers((CASE, KIND, *COLUMNS[:shown]), rows, 2, timed=(TIME,))
 
 
-def _record(name: str, runner: Runner) -> HardCase:
+def _record(name: str, runner: Runner, failures: list[Failure]) -> HardCase:
     from verification.hard_cases import HARD_CASES, CaseAbsent, TrajectoryCase, judge_hard_cases
 
     try:
@@ -54,7 +58,7 @@ def _record(name: str, runner: Runner) -> HardCase:
         title, nothing = name.replace("_", " "), Numbers(COLUMNS, ())
         return HardCase(name, title, "problems of others", "", "", "", "", nothing, skipped=str(absent))
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
-    rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner))
+    rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner, failures=failures))
     noted = any(row[-1] for row in rows)
     numbers = Numbers(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind],
                       timed=(TIME,))

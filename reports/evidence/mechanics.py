@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 
 from reports.evidence import mechanics_sentences as sentences
 from reports.evidence.mechanics_tables import (
+    AGAINST_PINOCCHIO,
     bodies_table,
     filters_table,
     linked_table,
@@ -13,8 +15,9 @@ from reports.evidence.mechanics_tables import (
     study_table,
     times_table,
 )
-from reports.pages.records import Topic
+from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
+from verification.finding import Failure, attempt, of_each
 
 ID, TITLE = "mechanics", "Linkages and free bodies"
 LEAD = (
@@ -31,35 +34,31 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     from verification.studies.linked_impacts import study_linked_impacts
     from verification.studies.many_bodies import study_many_bodies
 
+    failures: list[Failure] = []
     total = len(STUDIES) + 3
-    studies = check_mechanics(depth, lambda done, _: progress(done, total))
-    linked = study_linked_impacts()
+    studies = check_mechanics(depth, lambda done, _: progress(done, total), failures)
+    linked = study_linked_impacts(failures)
     progress(total - 2, total)
-    rolled = study_false_collisions(simulate=lambda scene: runner(scene, "IAPB"))
+    rolled = study_false_collisions(simulate=lambda scene: runner(scene, "IAPB"), failures=failures)
     progress(total - 1, total)
-    costs = study_many_bodies()
+    costs = study_many_bodies(failures=failures)
     progress(total, total)
     tables = {
         "linked impacts": linked_table(linked),
-        "coordinate invariance": study_table(studies["coordinate invariance"]),
-        "tumbling": study_table(studies["tumbling"]),
+        **{name: study_table(studies[name]) for name in ("coordinate invariance", "tumbling") if name in studies},
         "false collisions in time": times_table(rolled),
         "false collisions": filters_table(rolled),
         "against Pinocchio": pinocchio_table(studies),
-        "power balance": study_table(studies["power balance"]),
-        "positive definite": study_table(studies["positive definite"]),
-        "operating": study_table(studies["operating"], leave_out=("fault",)),
+        **{name: study_table(studies[name]) for name in ("power balance", "positive definite") if name in studies},
+        **{name: study_table(studies[name], leave_out=("fault",)) for name in ("operating",) if name in studies},
         "many bodies": bodies_table(costs),
     }
-    findings = (
-        *sentences.against_pinocchio(studies),
-        sentences.positive_definite(studies["positive definite"]),
-        sentences.power_balance(studies["power balance"]),
-        sentences.tumbling(studies["tumbling"]),
-        sentences.coordinate_invariance(studies["coordinate invariance"]),
-        sentences.operating(studies["operating"]),
-        *sentences.linked(linked),
-        sentences.false_collisions(rolled),
-        *sentences.many_bodies(costs),
-    )
-    return Topic(ID, TITLE, LEAD, findings, tables, sentences.verdict(studies, linked))
+    said: list[partial[Iterator[Finding]]] = [
+        *(partial(sentences.against_pinocchio, name, studies[name]) for name in AGAINST_PINOCCHIO if name in studies),
+        *(partial(sentence, studies[name]) for name, sentence in sentences.OF_STUDIES.items() if name in studies),
+        partial(sentences.linked, linked), partial(sentences.rows_decide, linked),
+        partial(sentences.false_collisions, rolled), partial(sentences.many_bodies, costs),
+    ]  # fmt: skip
+    findings = tuple(of_each(said, lambda sentence: sentence(), failures, lambda sentence: sentence.func.__name__))
+    verdict = attempt("verdict", lambda: sentences.verdict(studies, linked), failures) or ""
+    return with_failures(Topic(ID, TITLE, LEAD, findings, tables, verdict), failures)

@@ -9,8 +9,7 @@ import numpy as np
 
 from reports.evidence.mechanics_tables import AGAINST_PINOCCHIO
 from reports.pages.records import Finding
-from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED
-from verification.mechanics.record import Finding as Study
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Table
 from verification.studies.false_collisions import EDGE_JUMP, FalseCollisions
 from verification.studies.linked_impacts import (
     ALL,
@@ -22,7 +21,7 @@ from verification.studies.linked_impacts import (
 )
 from verification.studies.many_bodies import StepCost, growth_exponent
 
-Studies = Mapping[str, Study]
+Studies = Mapping[str, Table]
 # Slope of the pairs tested over the bodies: 1 is linear, all pairs have 2.
 LINEAR = 1.2
 
@@ -39,23 +38,21 @@ def _outcome(passed: bool | None) -> str:
     return NOT_COMPUTED if passed is None else REPRODUCED if passed else REFUTED
 
 
-def against_pinocchio(studies: Studies) -> Iterator[Finding]:
-    """One sentence per set of mechanisms."""
+def against_pinocchio(name: str, study: Table) -> Iterator[Finding]:
+    """The sentence on one set of mechanisms."""
     from verification.mechanics.robots import AGREEMENT, QUANTITIES
 
-    for name in AGAINST_PINOCCHIO:
-        study = studies[name]
-        if study.skipped:
-            yield Finding(f"Robots beside the checkout: not there ({study.skipped}), so not compared.", NOT_COMPUTED)
-            continue
-        rows = study.table.records()
-        states = sum(row["states"] for row in rows)
-        quantity = max(QUANTITIES, key=lambda q: max(row[q] for row in rows)).replace("_", " ")
-        yield Finding(
-            f"{_count(name, rows)} {_AGREE[name]}: at {states:,} random states everything differs from Pinocchio "
-            f"by at most {max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}), the "
-            f"{quantity} most.", _outcome(study.passed),
-        )  # fmt: skip
+    if not study.rows:
+        yield Finding(f"Robots beside the checkout: not there ({study.note}), so not compared.", NOT_COMPUTED)
+        return
+    rows = study.records()
+    states = sum(row["states"] for row in rows)
+    quantity = max(QUANTITIES, key=lambda q: max(row[q] for row in rows)).replace("_", " ")
+    yield Finding(
+        f"{_count(name, rows)} {_AGREE[name]}: at {states:,} random states everything differs from Pinocchio "
+        f"by at most {max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}), the "
+        f"{quantity} most.", _outcome(study.passed),
+    )  # fmt: skip
 
 
 def _count(name: str, rows: Sequence[Mapping[str, Any]]) -> int:
@@ -66,12 +63,12 @@ def _count(name: str, rows: Sequence[Mapping[str, Any]]) -> int:
     return len({row["mechanism"] for row in rows})
 
 
-def positive_definite(study: Study) -> Finding:
+def positive_definite(study: Table) -> Iterator[Finding]:
     """How many matrices, and how near to zero."""
-    rows = study.table.records()
+    rows = study.records()
     judged = sum(row["judged, condition ≤ 1e12"] for row in rows)
     least = min(row["least eigenvalue × condition"] for row in rows)
-    return Finding(
+    yield Finding(
         f"All {judged} of {sum(row['mass matrices'] for row in rows)} random mass matrices whose scaled condition is "
         f"at most 1e12 (up to {max(row['largest condition judged'] for row in rows):.1e}) are positive definite: the "
         f"least eigenvalue times the condition is never below {least:.2g}."
@@ -80,50 +77,50 @@ def positive_definite(study: Study) -> Finding:
     )  # fmt: skip
 
 
-def power_balance(study: Study) -> Finding:
+def power_balance(study: Table) -> Iterator[Finding]:
     """The orders found for each integrator."""
     found = "; ".join(
         f"{_plain(name)} {_span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
-        for name, rows in _by(study.table.records(), "integrator").items()
+        for name, rows in _by(study.records(), "integrator").items()
     )
-    return Finding(
+    yield Finding(
         f"On random trees of 1 to 30 joints the energy changes by the work of the forces with the integrator's order: "
         f"{found}.", _outcome(study.passed))  # fmt: skip
 
 
-def tumbling(study: Study) -> Finding:
+def tumbling(study: Table) -> Iterator[Finding]:
     """The orders found for each integrator and form."""
     series = []
     for (name, form), rows in _by(_judged(study), "integrator", "form").items():
         orders = _span([row["order"] for row in rows])
         series.append(f"{_plain(name)}, {form}: {orders} (declared {rows[0]['declared order']})")
-    return Finding(
+    yield Finding(
         "A free tumbling body converges to the closed form with the declared order, and its energy and angular "
         f"momentum converge no slower: {'; '.join(series)}.", _outcome(study.passed))  # fmt: skip
 
 
-def coordinate_invariance(study: Study) -> Finding:
+def coordinate_invariance(study: Table) -> Iterator[Finding]:
     """Where the conditions are moderate, and where only the bound holds."""
     from verification.mechanics.coordinate_invariance import AGREEMENT
 
-    rows = [(row, held) for row, held in zip(study.table.records(), study.table.holds, strict=True)]
+    rows = [(row, held) for row, held in zip(study.records(), study.holds, strict=True)]
     moderate = [row for row, _ in rows if row["tolerance"] == AGREEMENT]
     beyond = [row for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]
     silent = sum(held is None for _, held in rows)
-    return Finding(
+    yield Finding(
         f"C06: the same impact in two parametrizations agrees to {max(row['error'] for row in moderate):.1e} in the "
         f"{len(moderate)} cases of moderate condition (tolerance {AGREEMENT:g}); in {len(beyond)} worse ones, up to "
         f"the singular pose, the error is at most {max(row['error'] / row['bound'] for row in beyond):.1e} of its "
         f"bound C ε κ/σ_min. In {silent} the bound exceeds 1 and says nothing.", _outcome(study.passed))  # fmt: skip
 
 
-def operating(study: Study) -> Finding:
+def operating(study: Table) -> Iterator[Finding]:
     """How near to singular, how fast, and how well the balance closes."""
-    rows = study.table.records()
+    rows = study.records()
     near = sum(row["steps near singular"] or 0 for row in rows)
     faults = sum(bool(row["fault"]) for row in rows)
     share = max(abs(row["residual"]) / row["tolerance"] for row in rows if not row["fault"])
-    return Finding(
+    yield Finding(
         f"Led by any link and point along {len(rows)} ways through its singular poses ({near:,} steps within a degree "
         f"or so of straight or folded), the simulation breaks off in {faults}; no joint turns faster than "
         f"{max(row['largest joint speed'] for row in rows if not row['fault']):.3g} rad/s, and the energy balance is "
@@ -145,21 +142,20 @@ def linked(outcomes: Sequence[LinkedOutcome]) -> Iterator[Finding]:
         f"With the per-body rows of (13)-(14) energy changes by at most {energy:.1e}, but in all {len(lost)} cases "
         f"momentum changes by {least:.2g} times what there was or more: the striker comes back as from a wall "
         "(erratum 3).", REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
-    yield _rows_decide(outcomes)
 
 
 def _changes(outcomes: Sequence[LinkedOutcome]) -> tuple[float, float]:
     return max(abs(o.energy_change) for o in outcomes), max(o.momentum_change for o in outcomes)
 
 
-def _rows_decide(outcomes: Sequence[LinkedOutcome]) -> Finding:
+def rows_decide(outcomes: Sequence[LinkedOutcome]) -> Iterator[Finding]:
     """The cradle of five by three choices of rows that all conserve everything."""
     five = {(o.treatment, o.rows): o.velocity[:, 0] for o in outcomes if o.problem == "cradle of 5"}
     found = {"all touching rows": five[RELATIVE, ALL], "the approaching row": five[RELATIVE, APPROACHING],
              "one after the other": next(v for (_, rows), v in five.items() if "one after" in rows)}  # fmt: skip
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in found.items())
     apart = min(float(np.abs(a - b).max()) for a, b in _pairs(list(found.values())))
-    return Finding(
+    yield Finding(
         f"Conservation does not decide the outcome, the rows do. Cradle of five, velocities after: {words} m/s. The "
         "paper takes the rows that approach; only the sequence hands the blow to the last ball.",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
@@ -169,7 +165,7 @@ def _pairs(values: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
     return ((a, b) for k, a in enumerate(values) for b in values[k + 1 :])
 
 
-def false_collisions(found: Sequence[FalseCollisions]) -> Finding:
+def false_collisions(found: Sequence[FalseCollisions]) -> Iterator[Finding]:
     """C18 at the scene's own distances: with both filters, then each alone."""
     of: dict[str, dict[float, FalseCollisions]] = {}
     for run in found:
@@ -180,7 +176,7 @@ def false_collisions(found: Sequence[FalseCollisions]) -> Finding:
     bounce = "".join(f" At {damping:g} N s/m the ball leaves the facets ({run.lifted} steps off them) and comes back "
                      "as a new contact." for damping, run in left.items() if run.lifted)  # fmt: skip
     lost = max(run.energy_lost / run.potential_drop for run in none.values())
-    return Finding(
+    yield Finding(
         f"C18: a ball that rolls in the faceted socket, at damping {', '.join(f'{b:g}' for b in both)} N s/m and with "
         f"distances beyond the {1e3 * EDGE_JUMP:.1f} mm of an edge, collides falsely: {counts}. Without filters up to "
         f"{lost:.0%} of the fall's energy goes with them. Coherence removes them, clustering the doubled contacts "
@@ -200,10 +196,17 @@ def many_bodies(costs: Sequence[StepCost]) -> Iterator[Finding]:
         f"with {last.bodies} here (exponent {growth_exponent(costs):.2f}).", REPRODUCED, timed=True)  # fmt: skip
 
 
+# What is said of each study by itself.
+OF_STUDIES = {
+    "positive definite": positive_definite, "power balance": power_balance, "tumbling": tumbling,
+    "coordinate invariance": coordinate_invariance, "operating": operating,
+}  # fmt: skip
+
+
 def verdict(studies: Studies, outcomes: Sequence[LinkedOutcome]) -> str:
     """The sentence of the first page."""
-    compared = [studies[name] for name in AGAINST_PINOCCHIO if not studies[name].skipped]
-    worst = max(row["worst"] for study in compared for row in study.table.records())
+    compared = [studies[name] for name in AGAINST_PINOCCHIO if name in studies]
+    worst = max(row["worst"] for study in compared for row in study.records())
     energy, momentum = _changes([o for o in outcomes if o.treatment != PER_BODY])
     least = min(o.momentum_change for o in outcomes if o.treatment == PER_BODY)
     return (f"Trees, scenes and robots differ from Pinocchio by at most {worst:.1e}; linked impacts keep energy and "
@@ -212,9 +215,9 @@ def verdict(studies: Studies, outcomes: Sequence[LinkedOutcome]) -> str:
             "ball does not bounce.")  # fmt: skip
 
 
-def _judged(study: Study) -> list[dict[str, Any]]:
+def _judged(study: Table) -> list[dict[str, Any]]:
     """The rows that decide."""
-    return [row for row, held in zip(study.table.records(), study.table.holds, strict=True) if held is not None]
+    return [row for row, held in zip(study.records(), study.holds, strict=True) if held is not None]
 
 
 def _by(rows: Sequence[dict[str, Any]], *names: str) -> dict[Any, list[dict[str, Any]]]:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.figure import Numbers
-from verification.finding import WORDS
-from verification.mechanics.record import Finding as Study
+from verification.finding import WORDS, Table
+from verification.mechanics.robots import TOLERANCE
 from verification.studies.false_collisions import FalseCollisions
 from verification.studies.linked_impacts import LinkedOutcome
 from verification.studies.many_bodies import StepCost
@@ -21,22 +21,23 @@ _ENERGIES = ("kinetic_energy", "potential_energy")
 _KINEMATICS = ("placement", "frame_jacobian", "point_jacobian")
 
 
-def study_table(study: Study, leave_out: Sequence[str] = ()) -> Numbers:
+def study_table(study: Table, leave_out: Sequence[str] = ()) -> Numbers:
     """Return the trials of a study with their outcomes."""
-    table = study.table.without(*leave_out)
-    return Numbers(table.titles, table.cells, note=f"{study.statement} Tolerance: {study.tolerance}.")
+    table = study.without(*leave_out)
+    return Numbers(table.titles, table.cells, note=table.note)
 
 
-def pinocchio_table(studies: Mapping[str, Study]) -> Numbers:
+def pinocchio_table(studies: Mapping[str, Table]) -> Numbers:
     """Return one row per mechanism: the largest relative difference of each quantity from Pinocchio's."""
     rows = tuple(
         (words, *_differences(row), WORDS[held])
         for name, words in AGAINST_PINOCCHIO.items()
-        for row, held in zip(studies[name].table.records(), studies[name].table.holds, strict=True)
+        if name in studies
+        for row, held in zip(studies[name].records(), studies[name].holds, strict=True)
     )
     columns = ("set", "mechanism", "base", "velocities", "states", "mass matrix", "placements and Jacobians", "bias",
                "gravity", "inverse dynamics", "energies", "momentum", "worst", "holds")  # fmt: skip
-    note = f"Largest difference over all states. Tolerance: {studies['random trees'].tolerance}."
+    note = f"Largest difference over all states. Tolerance: {TOLERANCE}."
     return Numbers(columns, rows, digits=2, note=note)
 
 

@@ -22,6 +22,7 @@ from reports.runner import Runner
 from reports.store.keys import canonical_json, code_version, plain
 from reports.store.tables import Column, Table, read_tables, write_tables
 from reports.uses import UsedRun, add_use
+from verification.finding import Failure
 
 _RECORDS, _RUNS = "records", "runs used"
 
@@ -53,6 +54,8 @@ class Stage:
     Attributes
     ----------
     runs : the runs that the records were made from, by file; known once there are records.
+    failures : the cases that raised. Where there are some, the records go to a file that no later call takes for
+        complete: the stage is computed again.
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class Stage:
         self.name = name
         self.path = folder / f"{name}-{self.key[:16]}.h5"
         self.runs: dict[str, UsedRun] = {}
+        self.failures: list[Failure] = []
         self._kind = kind
 
     def get_or_compute(self, compute: Callable[[], Any], runner: Runner | None = None) -> Any:
@@ -78,6 +82,11 @@ class Stage:
         records = self._computed(compute, runner)
         text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
         read_back = adapter.validate_python(json.loads(text))  # what is no such record is not written
+        self.failures += getattr(records, "failures", ())
+        incomplete = self.path.with_name(f"{self.path.stem}-incomplete.h5")
+        incomplete.unlink(missing_ok=True)
+        if self.failures:
+            self.path = incomplete
         self.path.parent.mkdir(parents=True, exist_ok=True)
         runs = (self._runs_table(),) if self.runs else ()
         write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures.figure import Numbers
-from reports.pages.records import Finding, Topic
+from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import REFUTED, REPRODUCED
+from verification.finding import REFUTED, REPRODUCED, Failure, of_each
 
 LEAD = (
     "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
@@ -26,34 +27,29 @@ _SAID = 160  # characters of a message that a table shows
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Do every fault, and simulate the runs of the figures again from their files."""
     from reports.faults import try_faults
+    from reports.fuzz import fuzz
+    from reports.fuzz.kinds import kinds
 
+    failures: list[Failure] = []
     with tempfile.TemporaryDirectory() as folder:
-        faults = try_faults(Path(folder), TIMES[depth], progress)
-    repeated = tuple(_repeated(runner))
-    inputs = tuple(_wrong_inputs(INPUTS[depth]))
+        faults = try_faults(Path(folder), TIMES[depth], progress, failures)
+    repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
+    inputs = tuple(of_each(kinds(), lambda kind: [fuzz(kind, range(INPUTS[depth]))], failures))
     tables = {"faults": _fault_table(faults), "simulated again": _repeated_table(repeated),
               "wrong input": _input_table(inputs)}  # fmt: skip
     findings = (_faults(faults), _repetitions(repeated), _inputs(inputs))
     verdict = " ".join(finding.sentence for finding in findings)
-    return Topic("survival", "Runs that survive", LEAD, findings, tables, verdict)
+    return with_failures(Topic("survival", "Runs that survive", LEAD, findings, tables, verdict), failures)
 
 
-def _repeated(runner: Runner) -> Any:
+def _repeated(runner: Runner, name: str) -> Any:
     from reports.resimulate import repeat_run
 
-    for name, (scene, values, world, rendering) in FIGURE_RUNS.items():
-        source = shipped_scene(scene, values)
-        runner(source, world, rendering)
-        path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
-        yield name, repeat_run(path)
-
-
-def _wrong_inputs(count: int) -> Any:
-    from reports.fuzz import fuzz
-    from reports.fuzz.kinds import kinds
-
-    for kind in kinds():
-        yield fuzz(kind, range(count))
+    scene, values, world, rendering = FIGURE_RUNS[name]
+    source = shipped_scene(scene, values)
+    runner(source, world, rendering)
+    path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
+    yield name, repeat_run(path)
 
 
 def _inputs(records: Any) -> Finding:

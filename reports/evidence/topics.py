@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 
 from reports.pages.records import Finding, Topic
 from reports.runner import Runner
-from verification.finding import NOT_COMPUTED
+from verification.finding import NOT_COMPUTED, Failure
 
 # id of the topic -> module of reports.evidence
 TOPICS: dict[str, str] = {
@@ -29,12 +27,8 @@ def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int
     return topic
 
 
-def failed_topic(name: str, failure: Exception, folder: Path) -> Topic:
-    """A topic in place of one that could not be computed: it says why; where it happened goes to a file in `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{name}-failed.txt"
-    path.write_text("".join(traceback.format_exception(failure)), encoding="utf-8")
-    why = (str(failure).splitlines() or ["no reason given"])[0]
-    sentence = f"Not computed, after {type(failure).__name__}: {why} ({path.name} says where)."
+def failed_topic(name: str, failure: Failure) -> Topic:
+    """A topic in place of one that could not be computed: it says why."""
+    sentence = f"Not computed, after {failure.error}: {failure.reason}."
     title = name.replace("-", " ").capitalize()
-    return Topic(name, title, "", (Finding(sentence, NOT_COMPUTED),), verdict=sentence, failed=True)
+    return Topic(name, title, "", (Finding(sentence, NOT_COMPUTED),), verdict=sentence)

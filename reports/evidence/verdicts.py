@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from reports.pages.records import Evidence, Verdict
-from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, VERDICTS
+from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, VERDICTS, Failure
 
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 
@@ -14,9 +15,25 @@ _ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact me
 
 
 def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
-    """One verdict for each topic that was computed."""
-    return (*_claims(evidence), *_passivity(evidence), *_proofs(evidence), *_laws(evidence), *_checks(evidence),
-            *_hard_cases(evidence), *_topics(evidence))  # fmt: skip
+    """One verdict for each topic that was computed; what failed never counts as holding."""
+    failed = {one.stage: one.failures for one in evidence.failed}
+    found = {stage: tuple(said(evidence)) for stage, said in _STAGES.items()}
+    marked = (_marked(found[stage], TITLES[stage], failed.get(stage, ())) for stage in _STAGES)
+    return (*(verdict for group in marked for verdict in group), *_topics(evidence))
+
+
+def _marked(found: tuple[Verdict, ...], about: tuple[str, str], failures: Sequence[Failure]) -> Iterator[Verdict]:
+    """The verdicts of a stage, with how many of its cases failed."""
+    if failures and not found:
+        title, link = about
+        yield Verdict(title, NOT_COMPUTED, f"Not computed, after {failures[0].error}: {failures[0].reason}.", link)
+    for one in found:
+        if not failures:
+            yield one
+            continue
+        count = f"{len(failures)} {'case' if len(failures) == 1 else 'cases'} failed."
+        outcome = NOT_COMPUTED if one.outcome == REPRODUCED else one.outcome
+        yield replace(one, outcome=outcome, sentence=f"{one.sentence} {count}")
 
 
 def _claims(evidence: Evidence) -> Iterator[Verdict]:
@@ -35,7 +52,9 @@ def _passivity(evidence: Evidence) -> Iterator[Verdict]:
     if evidence.bulk is None:
         return
     totals = {row[0]: row for row in evidence.bulk.rows if row[1] == "all"}
-    ours, printed = totals["factored"], totals["gram_pinv, as printed"]
+    ours, printed = totals.get("factored"), totals.get("gram_pinv, as printed")
+    if ours is None or printed is None:
+        return
     sentence = (f"In {ours[2]:,} random impacts the engine's largest relative energy gain is {ours[3]:.1e}, at most "
                 f"{ours[4]:.2g} of its bound 10 d ε √κ(M); the printed formula gains up to {printed[3]:.1e}.")
     yield Verdict("Passive in floating point", REPRODUCED if ours[6] == 0 else REFUTED, sentence, "properties")
@@ -94,3 +113,15 @@ def _topics(evidence: Evidence) -> Iterator[Verdict]:
                 outcome = NOT_COMPUTED  # what failed never counts as holding
             timed = any(finding.timed for finding in topic.findings)
             yield Verdict(topic.title, outcome, topic.verdict, topic.id, timed)
+
+
+# stage -> its sentences; stage -> title and section
+_STAGES = {
+    "claims": _claims, "bulk impacts": _passivity, "proofs": _proofs, "properties": _laws, "cross-checks": _checks,
+    "hard cases": _hard_cases,
+}  # fmt: skip
+TITLES = {
+    "claims": ("The paper's claims", "claims"), "bulk impacts": ("Passive in floating point", "properties"),
+    "proofs": ("Proofs", "proofs"), "properties": ("Properties", "properties"),
+    "cross-checks": ("Independent answers", "cross-checks"), "hard cases": ("Hard cases", "hard-cases"),
+}  # fmt: skip

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+
+from verification.finding import Failure, attempt
 
 
 @dataclass(frozen=True)
@@ -37,15 +40,21 @@ FAULTS: dict[str, tuple[str, str]] = {
 
 
 def try_faults(
-    folder: Path, times: int = 20, progress: Callable[[int, int], None] | None = None
+    folder: Path, times: int = 20, progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[FaultRecord, ...]:
-    """Do every fault `times` times, each in a folder of its own below `folder`."""
+    """Do every fault `times` times, each in a folder of its own below `folder`.
+
+    `failures` receives the kinds that raise; without it that passes through.
+    """
     records = []
     for done, (name, (module, function)) in enumerate(FAULTS.items(), start=1):
         place = folder / function
         place.mkdir(parents=True)
-        found = getattr(import_module(f"{__name__}.{module}"), function)(place, times)
-        records.append(FaultRecord(name, *found))
+        do = getattr(import_module(f"{__name__}.{module}"), function)
+        found = attempt(name, partial(do, place, times), failures)
+        if found is not None:
+            records.append(FaultRecord(name, *found))
         if progress is not None:
             progress(done, len(FAULTS))
     return tuple(records)

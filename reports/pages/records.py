@@ -133,7 +133,6 @@ class Topic:
     lead : two or three sentences that say what is asked and how
     tables : by name; a figure asks for one as "<id>/<name>", and those that none asks for are printed
     verdict : the sentence of the first page, empty for none; its outcome is the worst of the findings
-    failed : nothing was found, because computing it stopped
     failures : the cases that raised; their rows are missing from the tables
     """
 
@@ -143,7 +142,6 @@ class Topic:
     findings: tuple[Finding, ...]
     tables: Mapping[str, Numbers] = field(default_factory=dict)
     verdict: str = ""
-    failed: bool = False
     failures: tuple[Failure, ...] = ()
 
 
@@ -200,6 +198,15 @@ class StoredFile:
 
 
 @dataclass(frozen=True)
+class FailedCases:
+    """What could not be computed of a stage, and the file with the tracebacks."""
+
+    stage: str
+    failures: tuple[Failure, ...]
+    file: str
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Everything the report may show. `inputs` holds runs, resolved scenes and tables by the names that the figures
     ask for (`needs` of each recipe)."""
@@ -216,6 +223,7 @@ class Evidence:
     bulk: Numbers | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
     topics: tuple[Topic, ...] = ()
+    failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     manifest: tuple[StoredFile, ...] = ()
     figure_command: str = "iapb reproduce --figure {key}"

@@ -37,7 +37,7 @@ def _topic(id: str, title: str) -> Section:
 SECTIONS: tuple[Section, ...] = (
     Section("idea", "The idea", _always),
     Section("claims", "Claims ledger", lambda evidence: bool(evidence.claims), tables=("claims",)),
-    Section("figures", "Figures of the paper", _always),
+    Section("figures", "Figures of the paper", _always, tables=("runs of the figures",)),
     Section("couplings", "Device and tool", _always),
     Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
     Section("properties", "Properties", lambda evidence: bool(evidence.properties),

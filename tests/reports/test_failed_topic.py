@@ -10,7 +10,7 @@ from reports.evidence import gather
 from reports.evidence.verdicts import verdicts
 from reports.pages.records import Evidence, Finding, Topic
 from reports.runner import Runner
-from verification.finding import NOT_COMPUTED
+from verification.finding import NOT_COMPUTED, failure_of
 
 COMPUTED = Topic("engines", "Other engines", "", (Finding("all well", "reproduced"),), verdict="all well")
 
@@ -27,20 +27,23 @@ def test_the_reason_is_said_and_the_next_time_it_is_tried_again(
 
     stages = kept(tmp_path)
     monkeypatch.setattr(gather, "compute_topic", compute)
-    failed = gather._topic(stages, "engines", stages.runner, "quick")
-    assert failed.failed and failed.id == "engines"
-    assert [finding.outcome for finding in failed.findings] == [NOT_COMPUTED]
-    assert "RuntimeError: the disk went away" in failed.verdict and "and more" not in failed.verdict
-    assert "in compute" in (tmp_path / "tables" / "engines-failed.txt").read_text()
+    topic = gather._topic(stages, "engines", stages.runner, "quick")
+    assert topic.id == "engines" and [finding.outcome for finding in topic.findings] == [NOT_COMPUTED]
+    assert "RuntimeError: the disk went away" in topic.verdict and "and more" not in topic.verdict
+    [failed] = stages.failed()
+    assert failed.file == str(tmp_path / "tables" / "engines-failed.txt")
+    assert "in compute" in Path(failed.file).read_text()
     monkeypatch.setattr(gather, "compute_topic", lambda *given: COMPUTED)
+    stages = kept(tmp_path)
     assert gather._topic(stages, "engines", stages.runner, "quick") == COMPUTED
+    assert not stages.failed() and not Path(failed.file).exists()
 
 
-def test_the_first_page_says_so(tmp_path: Path) -> None:
+def test_the_first_page_says_so() -> None:
     from reports.evidence.topics import failed_topic
 
-    failed = failed_topic("haptic-rate", ValueError(), tmp_path)
-    said = verdicts(Evidence(inputs={}, topics=(failed,)))
+    topic = failed_topic("haptic-rate", failure_of("all of it", ValueError()))
+    said = verdicts(Evidence(inputs={}, topics=(topic,)))
     assert [(verdict.outcome, verdict.link) for verdict in said] == [(NOT_COMPUTED, "haptic-rate")]
 
 

@@ -26,7 +26,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[HardCase, ...]:
         patch.setattr("verification.hard_cases.judge.HARD_CASES", chosen)
         patch.setattr("verification.hard_cases.HARD_CASES", chosen, raising=False)
         runner = Runner(tmp_path_factory.mktemp("runs"))
-        found = compute(runner, lambda done, total: None)
+        found = compute(runner, lambda done, total: None, [])
         assert any("chatter" in label for label in runner.used)  # its runs are stored, and listed
     return found
 

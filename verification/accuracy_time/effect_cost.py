@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from iapb.errors import IapbError
 from iapb.scene import Scene
 from reference.worlds import World, find_world
+from verification.finding import Failure, attempt
 
 Floats = NDArray[np.float64]
 
@@ -83,9 +85,13 @@ class EffectMeasure:
 
 
 def measure_effects(
-    scene: Scene, world: str = "IAPB", pairs: int = PAIRS, progress: Callable[[int, int], None] | None = None
+    scene: Scene, world: str = "IAPB", pairs: int = PAIRS, progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[EffectMeasure, ...]:
-    """Measure every effect that is on in a world of the compiled engine and that can be left out."""
+    """Measure every effect that is on in a world of the compiled engine and that can be left out.
+
+    `failures` receives the effects that raise anything but an `IapbError`; without it that passes through.
+    """
     from iapb import decide_effects
 
     chosen = find_world(world)
@@ -95,7 +101,9 @@ def measure_effects(
     whole.sample()
     found = []
     for done, name in enumerate(on, start=1):
-        found.append(_measure(scene, chosen, whole, name, pairs))
+        measured = attempt(f"{scene.name}, {name}", partial(_measure, scene, chosen, whole, name, pairs), failures)
+        if measured is not None:
+            found.append(measured)
         if progress is not None:
             progress(done, len(on))
     return tuple(found)

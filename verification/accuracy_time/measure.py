@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from iapb.errors import IapbError
 from reference.one_thread import one_thread
 from verification.accuracy_time.methods import METHODS
 from verification.accuracy_time.problems import Floats, TimedProblem, timed_problems
+from verification.finding import Failure, attempt
 
 ROUNDS = 30
 _ENOUGH = 0.5  # seconds spent on one method of one problem; slow methods get fewer rounds, never less than three
@@ -63,6 +65,7 @@ def work_precision(
     methods: Iterable[str] | None = None,
     rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> tuple[Measurement, ...]:
     """Measure error, energy gain and time of every method on every problem, methods interleaved.
 
@@ -72,6 +75,7 @@ def work_precision(
     methods : names of impact methods, by default all
     rounds : how often each is timed
     progress : called with (problems done, problems) after each
+    failures : receives what raises anything but an `IapbError`, which is a record; without it that passes through
 
     Returns
     -------
@@ -83,17 +87,20 @@ def work_precision(
     records: list[Measurement] = []
     for done, problem in enumerate(chosen, start=1):
         with one_thread():
-            records.extend(_measure(problem, names, rounds))
+            records.extend(_measure(problem, names, rounds, failures))
         if progress is not None:
             progress(done, len(chosen))
     return tuple(records)
 
 
-def _measure(problem: TimedProblem, names: tuple[str, ...], rounds: int) -> list[Measurement]:
-    answers = {name: _try(name, problem) for name in names}  # also the warming up
-    working = [name for name in names if not isinstance(answers[name], str)]
+def _measure(
+    problem: TimedProblem, names: tuple[str, ...], rounds: int, failures: list[Failure] | None
+) -> list[Measurement]:
+    tried = {name: attempt(f"{problem.label}, {name}", partial(_try, name, problem), failures) for name in names}
+    answers = {name: answer for name, answer in tried.items() if answer is not None}  # trying them warms up, too
+    working = [name for name, answer in answers.items() if not isinstance(answer, str)]
     times = _interleaved(problem, working, rounds)
-    return [_record(problem, name, answers[name], times.get(name, [])) for name in names]
+    return [_record(problem, name, answer, times.get(name, [])) for name, answer in answers.items()]
 
 
 def _seconds_to_fail(name: str, problem: TimedProblem) -> float:

@@ -94,4 +94,4 @@ def _robots(depth: str) -> tuple[tuple[dict[str, Any], ...], str]:
 
     files, _ = robot_files()
     found = time_robots(None if files else SHIPPED / "robots", depth)
-    return tuple(found.table.records()), "robots of others" if files else "the project's own robots"
+    return tuple(found.records()), "robots of others" if files else "the project's own robots"

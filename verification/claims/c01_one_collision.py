@@ -19,7 +19,7 @@ IMPACTS = {"quick": 16, "full": 200}
 
 def measure(study: Study) -> Table:
     """Random impacts at one contact, and some in rationals."""
-    return table_of(COLUMNS, loss_batches(FAMILIES, IMPACTS[study.depth], study.seed))
+    return table_of(COLUMNS, loss_batches(study, FAMILIES, IMPACTS[study.depth]))
 
 
 def finding(table: Table) -> str:

@@ -23,7 +23,7 @@ IMPACTS = {"quick": 12, "full": 150}
 
 def measure(study: Study) -> Table:
     """Random impacts at more contacts than are independent, and some in rationals."""
-    return table_of(COLUMNS, loss_batches(FAMILIES, IMPACTS[study.depth], study.seed))
+    return table_of(COLUMNS, loss_batches(study, FAMILIES, IMPACTS[study.depth]))
 
 
 def finding(table: Table) -> str:

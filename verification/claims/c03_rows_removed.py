@@ -34,9 +34,9 @@ RESTITUTION = 0.5
 def measure(study: Study) -> Table:
     """All rows by the pseudo-inverse against independent rows alone."""
     count = IMPACTS[study.depth]
-    batches = [row for family in FAMILIES for row in _batches(family, count, study.seed)]
-    exact = [row for family in FAMILIES[::3] for row in _exact_batches(family, count // 4, study.seed)]
-    return table_of(COLUMNS, batches + exact)
+    batches = study.each(FAMILIES, lambda family: _batches(family, count, study.seed))
+    exact = study.each(FAMILIES[::3], lambda family: _exact_batches(family, count // 4, study.seed))
+    return table_of(COLUMNS, [*batches, *exact])
 
 
 def _batches(family: Family, count: int, seed: int) -> Iterator[dict[str, Any]]:

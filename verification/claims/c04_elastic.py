@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,25 +28,25 @@ IMPACTS = {"quick": 12, "full": 200}
 def measure(study: Study) -> Table:
     """e = 1 at one contact and at redundant ones."""
     count = IMPACTS[study.depth]
-    return table_of(COLUMNS, [*_batches(count, study.seed), *_exact_batches(count // 4, study.seed)])
+    batches = study.each(FAMILIES, lambda family: [_batch(family, count, study.seed)])
+    exact = study.each(FAMILIES[::3], lambda family: [_exact_batch(family, count // 4, study.seed)])
+    return table_of(COLUMNS, [*batches, *exact])
 
 
-def _batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for family in FAMILIES:
-        instances = list(draw(family, count, seed))
-        after = [resolve_impact(*instance[:3], 1.0).velocity for instance in instances]
-        yield {**_names(family), "part": DOUBLES, "condition number": family.condition_number, "impacts": count,
-               "error": worst(np.abs(energy_gains(instances, after))),
-               "bound": solve_bound(family.coordinates, family.condition_number)}  # fmt: skip
+def _batch(family: Family, count: int, seed: int) -> dict[str, Any]:
+    instances = list(draw(family, count, seed))
+    after = [resolve_impact(*instance[:3], 1.0).velocity for instance in instances]
+    return {**_names(family), "part": DOUBLES, "condition number": family.condition_number, "impacts": count,
+            "error": worst(np.abs(energy_gains(instances, after))),
+            "bound": solve_bound(family.coordinates, family.condition_number)}  # fmt: skip
 
 
-def _exact_batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
+def _exact_batch(family: Family, count: int, seed: int) -> dict[str, Any]:
     from reference.exact import exact_impact
 
-    for family in FAMILIES[::3]:
-        impacts = [exact_impact(*instance[:3], 1) for instance in whole_numbers(family, count, seed)]
-        error = worst(float(abs(i.energy_after - i.energy_before)) for i in impacts)
-        yield {**_names(family), "part": EXACT, "impacts": count, "error": error, "bound": 0.0}
+    impacts = [exact_impact(*instance[:3], 1) for instance in whole_numbers(family, count, seed)]
+    error = worst(float(abs(i.energy_after - i.energy_before)) for i in impacts)
+    return {**_names(family), "part": EXACT, "impacts": count, "error": error, "bound": 0.0}
 
 
 def _names(family: Family) -> dict[str, Any]:

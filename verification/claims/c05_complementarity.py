@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,20 +24,19 @@ IMPACTS = {"quick": 8, "full": 100}
 
 def measure(study: Study) -> Table:
     """The resolver's impulse against the multiplier of Newton's LCP, at one approaching contact."""
-    return table_of(COLUMNS, _batches(IMPACTS[study.depth], study.seed))
+    count = IMPACTS[study.depth]
+    cases = product(FAMILIES, RESTITUTIONS, SOLVERS)
+    return table_of(COLUMNS, study.each(cases, lambda case: [_batch(*case, count, study.seed)]))
 
 
-def _batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for family in FAMILIES:
-        instances = [approaching(instance) for instance in draw(family, count, seed)]
-        for e in RESTITUTIONS:
-            for solver in SOLVERS:
-                yield {
-                    "part": f"LCP by {solver}", "coordinates": family.coordinates, "contacts": 1,
-                    "condition number": family.condition_number, "restitution": e, "impacts": count,
-                    "error": worst(_difference(instance, e, solver) for instance in instances),
-                    "bound": solve_bound(family.coordinates, family.condition_number),
-                }  # fmt: skip
+def _batch(family: Family, e: float, solver: str, count: int, seed: int) -> dict[str, Any]:
+    instances = (approaching(instance) for instance in draw(family, count, seed))
+    return {
+        "part": f"LCP by {solver}", "coordinates": family.coordinates, "contacts": 1,
+        "condition number": family.condition_number, "restitution": e, "impacts": count,
+        "error": worst(_difference(instance, e, solver) for instance in instances),
+        "bound": solve_bound(family.coordinates, family.condition_number),
+    }  # fmt: skip
 
 
 def _difference(instance: Instance, e: float, solver: str) -> float:

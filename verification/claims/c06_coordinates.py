@@ -40,20 +40,21 @@ IMPACTS = {"quick": 12, "full": 150}
 def measure(study: Study) -> Table:
     """q = T r: the impact solved for q̇, and solved for ṙ and brought back."""
     count = IMPACTS[study.depth]
-    return table_of(COLUMNS, [*_batches(count, study.seed), *_exact_batches(count // 4, study.seed)])
+    batches = study.each(FAMILIES, lambda family: _batches(family, count, study.seed))
+    exact = study.each(FAMILIES[::2], lambda family: [_exact_batch(family, count // 4, study.seed)])
+    return table_of(COLUMNS, [*batches, *exact])
 
 
-def _batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for family in FAMILIES:
-        rng = np.random.default_rng([seed, family.coordinates, family.contacts])
-        instances = list(draw(family._replace(condition_number=MASS_CONDITION), count, seed))
-        changes = [random_change(rng, family.coordinates, family.condition_number) for _ in instances]
-        bound = solve_bound(family.coordinates, MASS_CONDITION * family.condition_number**2)
-        for e in RESTITUTIONS:
-            pairs = zip(instances, changes, strict=True)
-            yield {**_names(family), "condition number": family.condition_number, "part": DOUBLES,
-                   "restitution": e, "impacts": count, "bound": bound,
-                   "error": worst(_distance(instance, change, e) for instance, change in pairs)}  # fmt: skip
+def _batches(family: Family, count: int, seed: int) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng([seed, family.coordinates, family.contacts])
+    instances = list(draw(family._replace(condition_number=MASS_CONDITION), count, seed))
+    changes = [random_change(rng, family.coordinates, family.condition_number) for _ in instances]
+    bound = solve_bound(family.coordinates, MASS_CONDITION * family.condition_number**2)
+    for e in RESTITUTIONS:
+        pairs = zip(instances, changes, strict=True)
+        yield {**_names(family), "condition number": family.condition_number, "part": DOUBLES,
+               "restitution": e, "impacts": count, "bound": bound,
+               "error": worst(_distance(instance, change, e) for instance, change in pairs)}  # fmt: skip
 
 
 def random_change(rng: np.random.Generator, size: int, condition_number: float) -> Floats:
@@ -73,20 +74,19 @@ def _distance(instance: Instance, change: Floats, e: float) -> float:
     return float(np.sqrt(kinetic_energy(mass, here - back) / kinetic_energy(mass, velocity)))
 
 
-def _exact_batches(count: int, seed: int) -> Iterator[dict[str, Any]]:
+def _exact_batch(family: Family, count: int, seed: int) -> dict[str, Any]:
     from reference.exact import exact_impact
 
-    for family in FAMILIES[::2]:
-        different = 0
-        for mass, rows, velocity, _ in whole_numbers(family, count, seed):
-            shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
-            unshear = np.round(np.linalg.inv(shear))  # whole numbers, as the determinant is 1
-            here = np.array(exact_impact(mass, rows, velocity, 0.5).velocity)
-            there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, 0.5).velocity
-            back = shear.astype(int).astype(object) @ np.array(there)
-            different += bool(np.any(here != back))
-        yield {**_names(family), "part": EXACT, "restitution": 0.5, "impacts": count, "error": float(different),
-               "bound": 0.0}  # fmt: skip
+    different = 0
+    for mass, rows, velocity, _ in whole_numbers(family, count, seed):
+        shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
+        unshear = np.round(np.linalg.inv(shear))  # whole numbers, as the determinant is 1
+        here = np.array(exact_impact(mass, rows, velocity, 0.5).velocity)
+        there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, 0.5).velocity
+        back = shear.astype(int).astype(object) @ np.array(there)
+        different += bool(np.any(here != back))
+    return {**_names(family), "part": EXACT, "restitution": 0.5, "impacts": count, "error": float(different),
+            "bound": 0.0}  # fmt: skip
 
 
 def _names(family: Family) -> dict[str, Any]:

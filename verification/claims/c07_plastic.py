@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,19 +37,15 @@ ROUNDING = 1e-12
 
 def measure(study: Study) -> Table:
     """The arm of Fig. 2 struck across its second link, at A and B, elsewhere, and with the elbow bent."""
-    return table_of(COLUMNS, _trials(study))
+    cases = (case for case in product((RODS, POINTS), ANGLES, PLACES) if case != (POINTS, 0.0, 1.0))
+    arms = {reading: arm_of(study, reading) for reading in (RODS, POINTS)}
+    return table_of(COLUMNS, study.each(cases, lambda case: [_trial(arms[case[0]], *case)]))
 
 
-def _trials(study: Study) -> Iterator[dict[str, Any]]:
-    for reading, at_b in ((RODS, ALL), (POINTS, SOME)):
-        arm = arm_of(study, reading)
-        for angle in ANGLES:
-            for place in PLACES:
-                expected = at_b if (angle, place) == (0.0, PLACE_B) and reading == RODS else SOME
-                if reading == POINTS and (angle, place) == (0.0, 1.0):
-                    continue
-                yield {"reading": reading, "place along the second link": place, "expected": expected,
-                       "angle of the second link": angle} | strike(arm, place, angle, 0.0)  # fmt: skip
+def _trial(arm: Mechanism, reading: str, angle: float, place: float) -> dict[str, Any]:
+    expected = ALL if (reading, angle, place) == (RODS, 0.0, PLACE_B) else SOME
+    return {"reading": reading, "place along the second link": place, "expected": expected,
+            "angle of the second link": angle} | strike(arm, place, angle, 0.0)  # fmt: skip
 
 
 def arm_of(study: Study, reading: str) -> Mechanism:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from iapb import resolve_impact
@@ -36,26 +36,25 @@ IMPACTS = {"quick": 8, "full": 150}
 
 def measure(study: Study) -> Table:
     """Random impacts with e of either sign, and every impact of the peg at a limited device."""
-    return table_of(COLUMNS, [*_random(IMPACTS[study.depth], study.seed), *_rendered(study)])
+    count = IMPACTS[study.depth]
+    drawn = study.each(product(FAMILIES, RESTITUTIONS), lambda case: [_random(*case, count, study.seed)])
+    return table_of(COLUMNS, [*drawn, *(_rendered(study, *each) for each in RENDERED.items())])
 
 
-def _random(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for family in FAMILIES:
-        instances = list(draw(family, count, seed))
-        for e in RESTITUTIONS:
-            after = [resolve_impact(*instance[:3], e).velocity for instance in instances]
-            yield {"part": RANDOM, "coordinates": family.coordinates, "contacts": family.contacts,
-                   "condition number": family.condition_number, "restitution": e, "impacts": count,
-                   "error": worst(energy_gains(instances, after)),
-                   "bound": energy_bound(*family[::3])}  # fmt: skip
+def _random(family: Family, e: float, count: int, seed: int) -> dict[str, Any]:
+    instances = list(draw(family, count, seed))
+    after = [resolve_impact(*instance[:3], e).velocity for instance in instances]
+    return {"part": RANDOM, "coordinates": family.coordinates, "contacts": family.contacts,
+            "condition number": family.condition_number, "restitution": e, "impacts": count,
+            "error": worst(energy_gains(instances, after)),
+            "bound": energy_bound(*family[::3])}  # fmt: skip
 
 
-def _rendered(study: Study) -> Iterator[dict[str, Any]]:
-    for rendering, part in RENDERED.items():
-        traces = [study.trace(condition, "IAPB", rendering) for condition in study.starts()]
-        yield {"part": part, "coordinates": 3, "restitution": 0.0,
-               "impacts": sum(len(trace.impact_step) for trace in traces),
-               "error": worst(map(_largest_gain, traces)), "bound": 100.0 * EPSILON}  # fmt: skip
+def _rendered(study: Study, rendering: str, part: str) -> dict[str, Any]:
+    traces = list(study.each(study.starts(), lambda condition: [study.trace(condition, "IAPB", rendering)]))
+    return {"part": part, "coordinates": 3, "restitution": 0.0,
+            "impacts": sum(len(trace.impact_step) for trace in traces),
+            "error": worst(map(_largest_gain, traces)), "bound": 100.0 * EPSILON}  # fmt: skip
 
 
 def _largest_gain(trace: Trace) -> float:

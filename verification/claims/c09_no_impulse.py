@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from verification.finding import Column, Table, table_of
 if TYPE_CHECKING:
     from iapb.run import Run
     from iapb.scene import Scene
+    from verification.claims.conditions import Condition
     from verification.claims.study import Study
 
 RESOLVER = "velocity after an impact with e = -1"
@@ -40,24 +42,24 @@ SAME_TRAJECTORY = 1e-11
 
 def measure(study: Study) -> Table:
     """Impacts with e = −1, and runs of the peg with e = −1, and just above it."""
-    return table_of(COLUMNS, [*_impacts(IMPACTS[study.depth], study.seed), *_trajectories(study)])
+    count = IMPACTS[study.depth]
+    drawn = study.each(FAMILIES, lambda family: [_impacts(family, count, study.seed)])
+    return table_of(COLUMNS, [*drawn, *study.each(study.starts(), partial(_trajectories, study))])
 
 
-def _impacts(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for family in FAMILIES:
-        instances = draw(family, count, seed)
-        moved = worst(float(np.abs(resolve_impact(*i[:3], -1.0).velocity - i.velocity).max()) for i in instances)
-        yield {"part": RESOLVER, "contacts": family.contacts, "impacts": count, "error": moved, "bound": 0.0}
+def _impacts(family: Family, count: int, seed: int) -> dict[str, Any]:
+    instances = draw(family, count, seed)
+    moved = worst(float(np.abs(resolve_impact(*i[:3], -1.0).velocity - i.velocity).max()) for i in instances)
+    return {"part": RESOLVER, "contacts": family.contacts, "impacts": count, "error": moved, "bound": 0.0}
 
 
-def _trajectories(study: Study) -> Iterator[dict[str, Any]]:
-    for condition in study.starts():
-        scene = study.place(condition)
-        penalty = study.trace(condition, "PB")
-        for part, e, bound in ((TRAJECTORY, -1.0, 0.0), (ALMOST, JUST_ABOVE, SAME_TRAJECTORY)):
-            run = _run_with(scene, e)
-            error = max(float(np.abs(run.device_q - penalty.device).max()), float(np.abs(run.q - penalty.tool).max()))
-            yield condition.record() | {"part": part, "impacts": len(run.impacts.step), "error": error, "bound": bound}
+def _trajectories(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    scene = study.place(condition)
+    penalty = study.trace(condition, "PB")
+    for part, e, bound in ((TRAJECTORY, -1.0, 0.0), (ALMOST, JUST_ABOVE, SAME_TRAJECTORY)):
+        run = _run_with(scene, e)
+        error = max(float(np.abs(run.device_q - penalty.device).max()), float(np.abs(run.q - penalty.tool).max()))
+        yield condition.record() | {"part": part, "impacts": len(run.impacts.step), "error": error, "bound": bound}
 
 
 def _run_with(scene: Scene, restitution: float) -> Run:

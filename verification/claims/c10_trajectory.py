@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from verification.claims.claim import Claim
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 def measure(study: Study) -> Table:
     """Every start, in the four worlds."""
-    return table_of(COLUMNS, (row for condition in study.starts() for row in distances(study, condition, "full")))
+    return table_of(COLUMNS, study.each(study.starts(), partial(distances, study, rendering="full")))
 
 
 def finding(table: Table) -> str:

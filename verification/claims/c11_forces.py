@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
@@ -35,7 +36,7 @@ NOTHING = 1e-9
 
 def measure(study: Study) -> Table:
     """Every start; peaks, resting forces and the momentum given so far, per coordinate."""
-    return table_of(COLUMNS, (row for condition in study.starts() for row in _trials(study, condition)))
+    return table_of(COLUMNS, study.each(study.starts(), partial(_trials, study)))
 
 
 def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ COLUMNS = (
 
 def measure(study: Study) -> Table:
     """Every start, without limits and with the impulses spread."""
-    return table_of(COLUMNS, (row for condition in study.starts() for row in _trials(study, condition)))
+    return table_of(COLUMNS, study.each(study.starts(), partial(_trials, study)))
 
 
 def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:

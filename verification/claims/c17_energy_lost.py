@@ -30,7 +30,7 @@ SHORTLY = 0.020  # [s] after first contact: what a penalty takes in the time it 
 
 def measure(study: Study) -> Table:
     """Two tilts, five stiffnesses, five dampings."""
-    return table_of(COLUMNS, (_trial(study, condition) for condition in wall_conditions()))
+    return table_of(COLUMNS, study.each(wall_conditions(), lambda condition: [_trial(study, condition)]))
 
 
 def _trial(study: Study, condition: Condition) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
@@ -40,11 +41,10 @@ COLUMNS = (
 
 def measure(study: Study) -> Table:
     """The ball in the socket at every pair of distances, over damping and rate."""
-    return table_of(COLUMNS, (row for rate in RATES[study.depth] for damping in DAMPING
-                              for row in _trials(study, damping, rate)))  # fmt: skip
+    return table_of(COLUMNS, study.each(product(RATES[study.depth], DAMPING), lambda case: _trials(study, *case)))
 
 
-def _trials(study: Study, damping: float, rate: float) -> Iterator[dict[str, Any]]:
+def _trials(study: Study, rate: float, damping: float) -> Iterator[dict[str, Any]]:
     def simulate(scene: Scene) -> Run:
         return study.run(scene, "IAPB", "full")
 

@@ -28,11 +28,12 @@ _STEPS = 2000
 
 def measure(study: Study) -> Table:
     """The motion that a wall feeds most (see `hand_port.quickest_motion`), against walls on both sides of the bound."""
-    return table_of(COLUMNS, (
-        _trial(rate, stiffness, device, share)
+    cases = (
+        (rate, stiffness, device, share)
         for rate in (512.0, 1000.0) for stiffness in STIFFNESSES for device in DEVICE_DAMPINGS
         for share in (DAMPINGS if device > 1.0 else (0.0, 1.0))
-    ))  # fmt: skip
+    )  # fmt: skip
+    return table_of(COLUMNS, study.each(cases, lambda case: [_trial(*case)]))
 
 
 def _trial(rate: float, K: float, device: float, share: float) -> dict[str, Any]:

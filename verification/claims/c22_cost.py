@@ -34,7 +34,7 @@ LONGEST = 1.0  # seconds for one impact, beyond which a solver is not asked for 
 
 def measure(study: Study) -> Table:
     """Impacts and steps, each by complementarity and by IAPB in turns, as ratios of their times."""
-    return table_of(COLUMNS, (*_impacts(study), *_steps(study)))
+    return table_of(COLUMNS, study.each((_impacts, _steps), lambda part: part(study)))
 
 
 def _impacts(study: Study) -> Iterator[dict[str, Any]]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Row, Table
+from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Row, Table
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -53,6 +53,11 @@ class Claim:
         """Measure, judge and conclude."""
         return self.conclude(self.judge(self.measure(study)))
 
+    def not_computed(self) -> ClaimResult:
+        """Return the record of a claim of which nothing was measured."""
+        return ClaimResult(self.id, self.statement, self.place, self.quantity, self.tolerance, NOT_COMPUTED,
+                           "Not computed.", "", "", (), Table(()), self.map_axes, self.map_panels)  # fmt: skip
+
     def conclude(self, table: Table) -> ClaimResult:
         """Return the record of a judged table."""
         parts = parts_of(table)
@@ -78,6 +83,7 @@ class ClaimResult:
 
     conditions : the range over which it was computed; fails : where it does not hold, empty if nowhere
     parts : the verdict of each part of the claim, one of no name where it has no parts
+    failures : the cases that raised; they are in nothing else
     """
 
     id: str
@@ -93,6 +99,7 @@ class ClaimResult:
     table: Table
     map_axes: tuple[str, str] | None = None
     map_panels: str | None = None
+    failures: tuple[Failure, ...] = ()
 
     @property
     def held(self) -> int:

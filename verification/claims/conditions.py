@@ -39,6 +39,12 @@ class Condition:
     approach_velocity: float = 1e-6
     force_limit: float = 1.0
 
+    def __str__(self) -> str:
+        """What differs from the paper's start."""
+        default = Condition()
+        changed = (f"{name} {value:g}" for name, value in asdict(self).items() if value != getattr(default, name))
+        return ", ".join(changed) or "the paper's start"
+
     def seen_by(self, world: str, rendering: str) -> Condition:
         """The same trial as a world sees it: what it ignores takes its default."""
         default, ignored = Condition(), IGNORED[world]

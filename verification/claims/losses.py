@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import Any
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from verification.claims.algebraic import (
 )
 from verification.claims.instances import Family, Instance, draw, whole_numbers
 
+if TYPE_CHECKING:
+    from verification.claims.study import Study
+
 PASSIVE = "kinetic energy does not rise"
 WITH_HALF = "loss is ½(1 − e²) of the form"
 AS_PRINTED = "loss is (1 − e²) of the form, as printed"
@@ -26,14 +30,11 @@ EXACT = "loss is ½(1 − e²) of the form, in rationals"
 RESTITUTIONS = (0.0, 0.5, 0.9, 1.0)
 
 
-def loss_batches(families: Sequence[Family], count: int, seed: int) -> Iterator[dict[str, Any]]:
+def loss_batches(study: Study, families: Sequence[Family], count: int) -> Iterator[dict[str, Any]]:
     """Yield the parts of the claim for every family and restitution."""
-    for family in families:
-        for e in RESTITUTIONS:
-            yield from _batch(family, e, count, seed)
-    for family in families:
-        if family.condition_number == families[0].condition_number:
-            yield _exact_batch(family, 0.5, max(count // 4, 2), seed)
+    exact = [family for family in families if family.condition_number == families[0].condition_number]
+    yield from study.each(product(families, RESTITUTIONS), lambda case: _batch(*case, count, study.seed))
+    yield from study.each(exact, lambda family: [_exact_batch(family, 0.5, max(count // 4, 2), study.seed)])
 
 
 def _batch(family: Family, e: float, count: int, seed: int) -> Iterator[dict[str, Any]]:

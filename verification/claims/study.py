@@ -8,9 +8,10 @@ Nothing is written here; whoever wants the runs kept passes a `run` that keeps t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
@@ -25,7 +26,10 @@ from verification.claims.conditions import (
     wall_conditions,
 )
 from verification.claims.trace import Trace, trace_of
+from verification.finding import Failure, attempt, of_each
 
+Case = TypeVar("Case")
+Result = TypeVar("Result")
 Runner = Callable[[Scene, str, str], Run]
 Asked = Callable[[Scene, str, str], None]
 
@@ -48,12 +52,14 @@ class Study:
     depth : "quick" or "full", how fine the conditions are
     seed : of the random impacts
     asked : called whenever a claim uses a run, also one that was made for an earlier claim
+    failures : receives the cases that raise; without it their exceptions pass through
     """
 
     run: Runner = run_directly
     depth: str = "quick"
     seed: int = SEED
     asked: Asked | None = None
+    failures: list[Failure] | None = None
     _traces: dict[tuple[Any, ...], Trace] = field(default_factory=dict, repr=False)
     _scenes: dict[Any, Scene] = field(default_factory=dict, repr=False)
 
@@ -99,6 +105,10 @@ class Study:
         """Simulations asked for so far."""
         return len(self._traces)
 
+    def each(self, cases: Iterable[Case], trials: Callable[[Case], Iterable[Result]]) -> Iterator[Result]:
+        """Yield the trials of each case; a case that raises is among the `failures`, where there is such a list."""
+        return of_each(cases, trials, self.failures)
+
 
 def check_claims(
     run: Runner = run_directly,
@@ -107,7 +117,7 @@ def check_claims(
     progress: Callable[[int, int, str], None] | None = None,
     asked: Asked | None = None,
 ) -> tuple[ClaimResult, ...]:
-    """Check the paper's claims and return one record each.
+    """Check the paper's claims and return one record each; what raises is among the failures of its claim.
 
     Parameters
     ----------
@@ -132,7 +142,10 @@ def check_claims(
     for done, name in enumerate(chosen):
         if progress is not None:
             progress(done, len(chosen), name)
-        results.append(CLAIMS[name].check(study))
+        failures: list[Failure] = []
+        study.failures = failures
+        result = attempt(name, partial(CLAIMS[name].check, study), failures) or CLAIMS[name].not_computed()
+        results.append(replace(result, failures=tuple(failures)))
     if progress is not None:
         progress(len(chosen), len(chosen), "")
     return tuple(results)

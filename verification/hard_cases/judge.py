@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from reference.one_thread import one_thread
+from verification.finding import Failure, of_each
 from verification.hard_cases.case import AnyCase, CaseAbsent, HardCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge_impact import METHODS, judge_impact
@@ -15,7 +16,8 @@ from verification.hard_cases.verdict import HardCaseVerdict
 
 
 def judge_hard_cases(
-    methods: Iterable[str] | None = None, cases: Iterable[str] | None = None, simulate: Simulate = run_in_world
+    methods: Iterable[str] | None = None, cases: Iterable[str] | None = None, simulate: Simulate = run_in_world,
+    failures: list[Failure] | None = None,
 ) -> tuple[HardCaseVerdict, ...]:
     """Return the verdict of each method or world on each case.
 
@@ -25,6 +27,7 @@ def judge_hard_cases(
     cases : names in `HARD_CASES`, by default all of them. Cases of files that are absent are left out: ask
         `HARD_CASES[name]()` for the reason, which it raises as `CaseAbsent`.
     simulate : how a scene is run in a world: ``simulate(scene, world) -> Run``.
+    failures : receives what raises anything but an `IapbError`, which is a verdict; without it that passes through.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def judge_hard_cases(
     for name in names:
         if name not in HARD_CASES:
             raise ArgumentError("cases", name, one_of(name, HARD_CASES))
-    found = (verdict for name in names for verdict in _of(name, wanted, simulate))
+    found = (verdict for name in names for verdict in _of(name, wanted, simulate, failures))
     with one_thread():
         return tuple(found)
 
@@ -60,11 +63,13 @@ def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_worl
     return judge_trajectory(case, method, simulate)
 
 
-def _of(name: str, wanted: tuple[str, ...] | None, simulate: Simulate) -> Iterator[HardCaseVerdict]:
+def _of(
+    name: str, wanted: tuple[str, ...] | None, simulate: Simulate, failures: list[Failure] | None
+) -> Iterator[HardCaseVerdict]:
     try:
         case = HARD_CASES[name]()
     except CaseAbsent:
         return
-    for method in methods_for(case):
-        if wanted is None or method in wanted:
-            yield judge_hard_case(case, method, simulate)
+    methods = (method for method in methods_for(case) if wanted is None or method in wanted)
+    yield from of_each(methods, lambda method: [judge_hard_case(case, method, simulate)], failures,
+                       lambda method: f"{name}, {method}")  # fmt: skip

@@ -1,15 +1,18 @@
-"""Studies of the mechanics: plain records, no files written. `STUDIES` has them by name, each `study(depth)`.
+"""Studies of the mechanics, no files written. `STUDIES` has them by name, each `study(depth, failures)`.
 
+Each returns a Table with the outcome of every row; its note says what must hold, and how closely.
 Timing (`robot_timing.time_robots`) stands apart: its figures belong to a machine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 
-from verification.mechanics.record import DEPTHS, Finding
+from verification.finding import Failure, Table, attempt
 
-__all__ = ["DEPTHS", "STUDIES", "Finding", "check_mechanics"]
+__all__ = ["STUDIES", "check_mechanics"]
 
 # name: (module, function)
 STUDIES = {
@@ -27,15 +30,25 @@ STUDIES = {
 
 
 def check_mechanics(
-    depth: str = "quick", progress: Callable[[int, int], None] | None = None
-) -> dict[str, Finding]:
-    """Run every study and return its record by name; `progress(done, total)` after each."""
+    depth: str = "quick",
+    progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
+) -> dict[str, Table]:
+    """Run every study and return its table by name; `progress(done, total)` after each.
+
+    `failures` receives the cases that raise, and studies that do as a whole; without it that passes through.
+    """
     from importlib import import_module
 
-    findings: dict[str, Finding] = {}
-    for name, (module, function) in STUDIES.items():
+    found: dict[str, Table] = {}
+    for done, (name, (module, function)) in enumerate(STUDIES.items(), 1):
         study = getattr(import_module(f"{__name__}.{module}"), function)
-        findings[name] = study(depth=depth)
+        cases: list[Failure] | None = None if failures is None else []
+        table: Table | None = attempt(name, partial(study, depth=depth, failures=cases), failures)
+        if failures is not None:
+            failures += [replace(one, case=f"{name}, {one.case}") for one in cases or ()]
+        if table is not None:
+            found[name] = table
         if progress is not None:
-            progress(len(findings), len(STUDIES))
-    return findings
+            progress(done, len(STUDIES))
+    return found

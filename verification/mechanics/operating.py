@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,9 +19,8 @@ from numpy.typing import NDArray
 from iapb.errors import IapbError
 from iapb.scene import Scene
 from iapb.simulation import Simulation
-from verification.finding import Column, Table, table_of
+from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
 from verification.mechanics.hand_paths import PATHS, Path
-from verification.mechanics.record import Finding, check_depth
 
 Floats = NDArray[np.float64]
 
@@ -68,10 +68,10 @@ class Grip(NamedTuple):
         return sum(LENGTHS[link] for link in links[: links.index(self.body)]) + self.distance
 
 
-def operating(depth: str = "quick") -> Finding:
+def operating(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
     """Lead the arm by every link and point along every path at every speed."""
     check_depth(depth)
-    table = table_of(COLUMNS, _rows(depth))
+    table = table_of(COLUMNS, _rows(depth, failures))
     statement = (
         "Led by any link and point, the arm passes its singular poses with finite motion and bounded energy."
     )
@@ -79,25 +79,21 @@ def operating(depth: str = "quick") -> Finding:
         "every number finite; of the energy exchanged the integrator makes up at most the largest turn per step [rad], "
         "as a first-order method may, and arm and spring hold at most so much more than the hand has put in"
     )
-    return Finding("Operating a linkage through singular poses", statement, tolerance, judged(table))
+    return replace(judged(table), note=f"{statement} Tolerance: {tolerance}.")
 
 
-def _rows(depth: str) -> Iterator[dict[str, Any]]:
+def _rows(depth: str, failures: list[Failure] | None) -> Iterator[dict[str, Any]]:
     from iapb.scene import find_scene, load_scene
 
     scene = load_scene(find_scene(SCENE))
-    for path in PATHS:
-        for grip in (Grip(body, part * length) for body, length in LENGTHS.items() for part in HOLDS[depth]):
-            for speed in SPEEDS[depth]:
-                for rate in RATES[depth]:
-                    head = {
-                        "path": path,
-                        "held link": grip.body,
-                        "held at": grip.distance,
-                        "speed": speed,
-                        "rate": rate,
-                    }
-                    yield head | operate(scene, grip, path, speed, rate)
+    grips = [Grip(body, part * length) for body, length in LENGTHS.items() for part in HOLDS[depth]]
+
+    def rows_of(case: tuple[str, Grip, float, float]) -> Iterator[dict[str, Any]]:
+        path, grip, speed, rate = case
+        head = {"path": path, "held link": grip.body, "held at": grip.distance, "speed": speed, "rate": rate}
+        yield head | operate(scene, grip, path, speed, rate)
+
+    return of_each(product(PATHS, grips, SPEEDS[depth], RATES[depth]), rows_of, failures)
 
 
 def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> dict[str, Any]:

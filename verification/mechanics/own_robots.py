@@ -6,6 +6,8 @@ The robots of others (`robots.compare_robots`) need a folder that is not part of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,9 +18,8 @@ from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
-from verification.finding import table_of
+from verification.finding import Failure, Table, check_depth, of_each, table_of
 from verification.mechanics.random_urdf import random_urdf
-from verification.mechanics.record import Finding, check_depth
 from verification.mechanics.robots import (
     COLUMNS,
     SEED,
@@ -37,28 +38,37 @@ SHIPPED = Path(__file__).parents[2] / "scenes"
 Reader = Callable[[Path, bool], PinocchioMechanism]
 
 
-def compare_kinds(depth: str = "quick", seed: int = SEED) -> Finding:
+def compare_kinds(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Compare trees that have one kind of joint only."""
     check_depth(depth)
-    rows = []
-    for kind in KINDS:
-        for joints in KIND_SIZES:
-            rng = np.random.default_rng([seed, joints])
-            kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree that is fixed has nothing to compare
-            tree = random_mechanism(rng, joints, kinds)
-            if tree.nv:
-                rows.append(_row(f"{joints} {kind}", "random", [(tree, model_of(tree))], rng))
+    rows = of_each(product(KINDS, KIND_SIZES), lambda case: _kind(*case, seed), failures)
     statement = "Each kind of joint, alone and in a tree of its own kind, is that of Pinocchio."
-    return Finding("Joint kinds against Pinocchio", statement, TOLERANCE, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {TOLERANCE}.")
 
 
-def compare_scenes(depth: str = "quick", seed: int = SEED) -> Finding:
+def _kind(kind: str, joints: int, seed: int) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng([seed, joints])
+    kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree that is fixed has nothing to compare
+    tree = random_mechanism(rng, joints, kinds)
+    if tree.nv:
+        yield _row(f"{joints} {kind}", "random", [(tree, model_of(tree))], rng)
+
+
+def compare_scenes(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Compare the mechanism of every scene that comes with the project."""
     check_depth(depth)
-    rows = [_row(name, "of the scene", [(mechanism, model_of(mechanism))], np.random.default_rng(seed))
-            for name, mechanism in scene_mechanisms()]  # fmt: skip
+
+    def rows_of(case: tuple[str, Mechanism]) -> list[dict[str, Any]]:
+        name, mechanism = case
+        return [_row(name, "of the scene", [(mechanism, model_of(mechanism))], np.random.default_rng(seed))]
+
+    rows = of_each(scene_mechanisms(), rows_of, failures, lambda case: case[0])
     statement = "The mechanism of every scene is the one that Pinocchio makes of the same bodies."
-    return Finding("Scenes against Pinocchio", statement, TOLERANCE, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {TOLERANCE}.")
 
 
 def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
@@ -72,18 +82,23 @@ def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
             yield path.stem, mechanism
 
 
-def compare_written(depth: str = "quick", seed: int = SEED, reader: Reader = model_from_urdf) -> Finding:
+def compare_written(
+    depth: str = "quick", seed: int = SEED, reader: Reader = model_from_urdf, failures: list[Failure] | None = None
+) -> Table:
     """Compare the project's own robots and random URDF texts, read by the engine and by Pinocchio's parser."""
     check_depth(depth)
-    rows: list[dict[str, Any]] = []
+
+    def rows_of(case: tuple[tuple[str, list[Path]], bool]) -> list[dict[str, Any]]:
+        (label, files), floating = case
+        rng = np.random.default_rng([seed, floating])
+        pairs = [(Mechanism.from_urdf(file, floating), reader(file, floating)) for file in files]
+        return [_row(label, "floating" if floating else "fixed", pairs, rng)]
+
     with TemporaryDirectory() as scratch:
-        for label, files in (*_own(), *_written(Path(scratch), WRITTEN[depth], seed)):
-            for floating in (False, True):
-                rng = np.random.default_rng([seed, floating])
-                pairs = [(Mechanism.from_urdf(file, floating), reader(file, floating)) for file in files]
-                rows.append(_row(label, "floating" if floating else "fixed", pairs, rng))
+        texts = (*_own(), *_written(Path(scratch), WRITTEN[depth], seed))
+        rows = list(of_each(product(texts, (False, True)), rows_of, failures, lambda case: case[0][0]))
     statement = "A URDF text is read by the engine as Pinocchio's own parser reads it."
-    return Finding("URDF texts against Pinocchio", statement, TOLERANCE, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {TOLERANCE}.")
 
 
 def _own() -> Iterator[tuple[str, list[Path]]]:

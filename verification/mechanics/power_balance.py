@@ -7,8 +7,8 @@ wrong it stays.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
-from verification.finding import Column, Row, Table, table_of
-from verification.mechanics.record import Finding, check_depth
+from verification.finding import Column, Failure, Row, Table, check_depth, of_each, table_of
 
 Floats = NDArray[np.float64]
 
@@ -55,17 +54,21 @@ DEFINITE_COLUMNS = (
 )
 
 
-def power_balance(depth: str = "quick", seed: int = SEED) -> Finding:
+def power_balance(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Measure the order with which the power balance closes, for every integrator and size of tree."""
     check_depth(depth)
-    rows = [
-        _row(method, joints, TREES[depth], np.random.default_rng([seed, joints]))
-        for method in INTEGRATORS.values()
-        for joints in SIZES
-    ]
+
+    def rows_of(case: tuple[Integrator, int]) -> list[dict[str, Any]]:
+        method, joints = case
+        return [_row(method, joints, TREES[depth], np.random.default_rng([seed, joints]))]
+
+    cases = product(INTEGRATORS.values(), SIZES)
+    rows = of_each(cases, rows_of, failures, lambda case: f"{case[0].name}, {case[1]} joints")
     statement = "Energy changes by the work of the generalized forces, to the order of the integrator."
     tolerance = f"median order within {ORDER_TOLERANCE} of the declared order"
-    return Finding("Power balance of random trees", statement, tolerance, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {tolerance}.")
 
 
 def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -133,26 +136,29 @@ def _holds(row: Row) -> bool:
     return bool(enough and abs(row["median order"] - row["declared order"]) <= ORDER_TOLERANCE)
 
 
-def positive_definite(depth: str = "quick", seed: int = SEED) -> Finding:
+def positive_definite(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Judge the least eigenvalue of random trees' mass matrices, scaled to a unit diagonal."""
     check_depth(depth)
-    table = table_of(DEFINITE_COLUMNS, _definite_rows(10 * TREES[depth], seed))
+    rows = of_each(SIZES, lambda joints: [_definite(joints, 10 * TREES[depth], seed)], failures,
+                   lambda joints: f"{joints} joints")  # fmt: skip
+    table = table_of(DEFINITE_COLUMNS, rows)
     holds = tuple(bool(row["least eigenvalue × condition"] > 0.0) for row in table.records())
     statement = "The mass matrix is positive definite wherever rounding leaves that to be judged."
     tolerance = f"least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}"
-    return Finding("Mass matrices positive definite", statement, tolerance, replace(table, holds=holds))
+    return replace(replace(table, holds=holds), note=f"{statement} Tolerance: {tolerance}.")
 
 
-def _definite_rows(count: int, seed: int) -> Iterator[dict[str, Any]]:
-    for joints in SIZES:
-        rng = np.random.default_rng([seed, joints, 1])
-        conditions, least = [], []
-        for _ in range(count):
-            mechanism = random_mechanism(rng, joints)
-            mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
-            condition = _condition(mass) if mechanism.nv else np.inf
-            if condition <= LARGEST_CONDITION:
-                conditions.append(condition)
-                least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
-        yield {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
-               "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
+def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
+    rng = np.random.default_rng([seed, joints, 1])
+    conditions, least = [], []
+    for _ in range(count):
+        mechanism = random_mechanism(rng, joints)
+        mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
+        condition = _condition(mass) if mechanism.nv else np.inf
+        if condition <= LARGEST_CONDITION:
+            conditions.append(condition)
+            least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
+    return {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
+            "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_state
 from reference.rigid_body import model_from_urdf
-from verification.finding import Column, Table, table_of
-from verification.mechanics.record import Finding, check_depth
+from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
 from verification.mechanics.robots import SEED, robot_files
 
 Floats = NDArray[np.float64]
@@ -41,18 +40,21 @@ COLUMNS = (
 ONE, MANY = "one state per call", f"{STATES} states in one call"
 
 
-def time_robots(folder: str | Path | None = None, depth: str = "quick") -> Finding:
+def time_robots(
+    folder: str | Path | None = None, depth: str = "quick", failures: list[Failure] | None = None
+) -> Table:
     """Time every URDF file of a folder (default `shared/robots` beside the checkout)."""
     check_depth(depth)
     files, skipped = robot_files(folder)
-    table = table_of(COLUMNS, [row for path in files for row in _rows(path, ROUNDS[depth])])
+    table = table_of(COLUMNS, of_each(files, lambda path: _rows(path, ROUNDS[depth]), failures,
+                                      lambda path: path.stem))
     statement = (
         "M and B cost little more per call from Python than Pinocchio's, and less for many states at once."
     )
     tolerance = (
         f"median ratio at most {LARGEST_RATIO:g} per call, below 1 for many states; rounds interleaved"
     )
-    return Finding("Time of M and B", statement, tolerance, _judged(table), skipped)
+    return replace(_judged(table), note=skipped or f"{statement} Tolerance: {tolerance}.")
 
 
 def _rows(path: Path, rounds: int) -> Iterator[dict[str, Any]]:

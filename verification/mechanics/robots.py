@@ -5,8 +5,8 @@ A robot is read twice from its URDF file, by the engine's reader and by Pinocchi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,7 @@ from iapb.mechanics.mechanism import Mechanism
 from reference.mechanism_comparison import compare
 from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
-from verification.finding import Column, Table, table_of
-from verification.mechanics.record import Finding, check_depth
+from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
 
 # Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.
 AGREEMENT = 1e-11
@@ -46,24 +45,31 @@ TOLERANCE = (
 )
 
 
-def compare_trees(depth: str = "quick", seed: int = SEED) -> Finding:
+def compare_trees(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Compare random trees of every joint kind, nearly singular inertias among them, at 100 states each."""
     check_depth(depth)
-    rows = []
-    for joints in TREE_SIZES:
-        rng = np.random.default_rng([seed, joints])
-        trees = [random_mechanism(rng, joints) for _ in range(TREES[depth])]
-        found = [worst_of(tree, model_of(tree), rng) for tree in trees if tree.nv]
-        rows.append({"mechanism": f"{len(found)} trees of {joints}", "base": "random", "bodies": joints,
-                     "velocities": max((tree.nv for tree in trees), default=0),
-                     "states": STATES * len(found), **largest_of(found)})  # fmt: skip
+    rows = of_each(TREE_SIZES, lambda joints: [_trees(joints, TREES[depth], seed)], failures,
+                   lambda joints: f"trees of {joints}")  # fmt: skip
     statement = (
         "Mass matrix, Jacobians, forces, energies and momentum of random trees are those of Pinocchio."
     )
-    return Finding("Random trees against Pinocchio", statement, TOLERANCE, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {TOLERANCE}.")
 
 
-def compare_robots(folder: str | Path | None = None, depth: str = "quick", seed: int = SEED) -> Finding:
+def _trees(joints: int, count: int, seed: int) -> dict[str, Any]:
+    rng = np.random.default_rng([seed, joints])
+    trees = [random_mechanism(rng, joints) for _ in range(count)]
+    found = [worst_of(tree, model_of(tree), rng) for tree in trees if tree.nv]
+    return {"mechanism": f"{len(found)} trees of {joints}", "base": "random", "bodies": joints,
+            "velocities": max((tree.nv for tree in trees), default=0),
+            "states": STATES * len(found), **largest_of(found)}  # fmt: skip
+
+
+def compare_robots(
+    folder: str | Path | None = None, depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
     """Compare every URDF file of a folder, with a fixed and with a floating base, at 100 states each.
 
     Parameters
@@ -73,10 +79,11 @@ def compare_robots(folder: str | Path | None = None, depth: str = "quick", seed:
     """
     check_depth(depth)
     files, skipped = robot_files(folder)
-    rows = list(_robot_rows(files, seed))
+    rows = of_each(product(files, (False, True)), lambda case: [_robot(*case, seed)], failures,
+                   lambda case: case[0].stem)  # fmt: skip
     statement = "Robots read by the engine are those that Pinocchio reads, in every quantity."
     table = judged(table_of(COLUMNS, rows))
-    return Finding("Robots against Pinocchio", statement, TOLERANCE, table, skipped)
+    return replace(table, note=skipped or f"{statement} Tolerance: {TOLERANCE}.")
 
 
 def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
@@ -86,14 +93,12 @@ def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
     return files, "" if files else f"no URDF files in {place.name}/, which is not part of the project"
 
 
-def _robot_rows(files: list[Path], seed: int) -> Iterator[dict[str, Any]]:
-    for path in files:
-        for floating in (False, True):
-            mechanism, model = Mechanism.from_urdf(path, floating), model_from_urdf(path, floating)
-            rng = np.random.default_rng([seed, floating])
-            yield {"mechanism": path.stem, "base": "floating" if floating else "fixed",
-                   "bodies": len(mechanism.bodies), "velocities": mechanism.nv, "states": STATES,
-                   **largest_of([worst_of(mechanism, model, rng)])}  # fmt: skip
+def _robot(path: Path, floating: bool, seed: int) -> dict[str, Any]:
+    mechanism, model = Mechanism.from_urdf(path, floating), model_from_urdf(path, floating)
+    rng = np.random.default_rng([seed, floating])
+    return {"mechanism": path.stem, "base": "floating" if floating else "fixed",
+            "bodies": len(mechanism.bodies), "velocities": mechanism.nv, "states": STATES,
+            **largest_of([worst_of(mechanism, model, rng)])}  # fmt: skip
 
 
 def worst_of(mechanism: Mechanism, model: PinocchioMechanism, rng: np.random.Generator) -> dict[str, float]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +17,7 @@ from numpy.typing import NDArray
 
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from verification.finding import Column, Table, table_of
-from verification.mechanics.record import Finding, check_depth
+from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
 from verification.mechanics.torque_free import TorqueFreeBody
 
 Floats = NDArray[np.float64]
@@ -71,21 +71,24 @@ class Tumble(NamedTuple):
     velocity: Floats
 
 
-def tumbling(depth: str = "quick") -> Finding:
+def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
     """Measure every integrator in both forms on both motions, over a row of halved steps."""
     check_depth(depth)
-    rows = []
-    for motion, body in MOTIONS.items():
-        for method in INTEGRATORS.values():
-            for form, path, order in _forms(method):
-                head = {"motion": motion, "integrator": method.name, "form": form, "declared order": order}
-                rows += [head | row for row in _halved(body, method, path, HALVINGS[depth])]
+
+    def rows_of(case: tuple[str, Integrator, int]) -> Iterator[dict[str, Any]]:
+        motion, method, which = case
+        form, path, order = _forms(method)[which]
+        head = {"motion": motion, "integrator": method.name, "form": form, "declared order": order}
+        return (head | row for row in _halved(MOTIONS[motion], method, path, HALVINGS[depth]))
+
+    rows = of_each(product(MOTIONS, INTEGRATORS.values(), (0, 1)), rows_of, failures,
+                   lambda case: f"{case[0]}, {case[1].name}")  # fmt: skip
     statement = (
         "Attitude and rate converge to the closed form with the order that the integrator declares; the drifts of "
         "energy and angular momentum fall at least as fast."
     )
     tolerance = f"order within {ORDER_TOLERANCE} of the declared one, by the two finest steps above rounding"
-    return Finding("Free tumbling body", statement, tolerance, judged(table_of(COLUMNS, rows)))
+    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {tolerance}.")
 
 
 def _forms(method: Integrator) -> tuple[tuple[str, Callable[..., Tumble], int], ...]:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
 from iapb.scene import Scene
+from verification.finding import Failure, of_each
 
 DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: from a ball that bounces at edges to one that does not
 SCENE = "faceted_socket"
@@ -62,14 +64,15 @@ class FalseCollisions:
 
 
 def study_false_collisions(
-    dampings: Sequence[float] = DAMPINGS, simulate: Simulate | None = None
+    dampings: Sequence[float] = DAMPINGS, simulate: Simulate | None = None, failures: list[Failure] | None = None
 ) -> tuple[FalseCollisions, ...]:
     """Return the counts for each damping and each of the four settings of the filters, at the scene's distances."""
-    return tuple(
-        count_false(socket(filters | {"damping": damping}), simulate)
-        for damping in dampings
-        for filters in map(_switched_off, SETTINGS.values())
-    )
+
+    def found(case: tuple[float, str]) -> list[FalseCollisions]:
+        damping, setting = case
+        return [count_false(socket(_switched_off(SETTINGS[setting]) | {"damping": damping}), simulate)]
+
+    return tuple(of_each(product(dampings, SETTINGS), found, failures, lambda case: f"{case[1]}, {case[0]:g} N s/m"))
 
 
 def _switched_off(filters: tuple[bool, bool]) -> dict[str, float]:

@@ -18,6 +18,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from verification.finding import Failure, of_each
+
 Floats = NDArray[np.float64]
 
 # Start gaps that put contacts in an order for the event-driven reference, where gaps are linear: any size will do.
@@ -147,7 +149,7 @@ def _event_driven(balls: LinkedBalls, order: str, start: Floats) -> LinkedOutcom
     return LinkedOutcome(balls.name, SEQUENTIAL, order, balls.velocity, path.v[-1].reshape(-1, 2))
 
 
-def study_linked_impacts() -> tuple[LinkedOutcome, ...]:
+def study_linked_impacts(failures: list[Failure] | None = None) -> tuple[LinkedOutcome, ...]:
     """Return all outcomes: cradles of two to seven balls, and Bernoulli's problem."""
     problems = [*(cradle(n) for n in range(2, 8)), bernoulli()]
-    return tuple(outcome for problem in problems for outcome in outcomes(problem))
+    return tuple(of_each(problems, outcomes, failures, lambda balls: balls.name))

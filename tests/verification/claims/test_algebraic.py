@@ -50,7 +50,7 @@ def test_theorem_1_and_2_fail_only_in_the_printed_factor():
 @pytest.mark.parametrize("fault", [energetic, lossy])
 def test_losses_notice_a_wrong_energy(monkeypatch, fault):
     monkeypatch.setattr(losses, "resolve_impact", fault)
-    rows = list(losses.loss_batches([Family(3, 1, 1, 1e2)], 4, seed=1))
+    rows = list(losses.loss_batches(Study(seed=1), [Family(3, 1, 1, 1e2)], 4))
     wrong = {row["part"] for row in rows if row["error"] > row["bound"]}
     assert losses.WITH_HALF in wrong
     assert (losses.PASSIVE in wrong) == (fault is energetic)

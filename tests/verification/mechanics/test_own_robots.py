@@ -20,19 +20,19 @@ def few(monkeypatch):
 def test_every_kind_of_joint_agrees_alone():
     finding = own_robots.compare_kinds()
     assert finding.passed
-    assert {name.split()[1] for name in finding.table.column("mechanism")} == set(KINDS)
+    assert {name.split()[1] for name in finding.column("mechanism")} == set(KINDS)
 
 
 def test_every_scene_has_a_mechanism_that_agrees():
     finding = own_robots.compare_scenes()
     assert finding.passed
-    assert {"peg_corner", "tumbling_body", "arm_obstacles"} <= set(finding.table.column("mechanism"))
+    assert {"peg_corner", "tumbling_body", "arm_obstacles"} <= set(finding.column("mechanism"))
 
 
 def test_texts_are_read_as_pinocchio_reads_them():
     finding = own_robots.compare_written()
     assert finding.passed
-    assert set(finding.table.column("base")) == {"fixed", "floating"}
+    assert set(finding.column("base")) == {"fixed", "floating"}
 
 
 def test_a_reading_that_turns_inertias_wrongly_is_found(tmp_path):
@@ -42,7 +42,7 @@ def test_a_reading_that_turns_inertias_wrongly_is_found(tmp_path):
         return model_from_urdf(other, floating)
 
     finding = own_robots.compare_written(reader=careless)
-    assert finding.passed is False and len(finding.failures.rows) == len(finding.table.rows)
+    assert finding.passed is False and len(finding.that(False).rows) == len(finding.rows)
 
 
 def test_a_text_has_every_joint_type_and_repeats_with_its_seed():

@@ -45,7 +45,7 @@ def test_a_missing_term_is_seen(term, monkeypatch):
 def test_mass_matrices_are_positive_definite(monkeypatch):
     monkeypatch.setattr(study, "TREES", {"quick": 3})
     finding = study.positive_definite()
-    assert finding.passed and finding.table.column("joints") == list(study.SIZES)
+    assert finding.passed and finding.column("joints") == list(study.SIZES)
 
 
 def test_an_indefinite_mass_matrix_fails(monkeypatch):

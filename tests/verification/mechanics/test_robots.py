@@ -8,7 +8,6 @@ import pytest
 from iapb.errors import ArgumentError
 from reference.random_mechanisms import random_mechanism
 from verification.mechanics import robot_timing, robots
-from verification.mechanics.record import Finding
 
 ARM = """<robot name="arm">
   <link name="base"/>
@@ -30,23 +29,23 @@ def folder(tmp_path):
 
 def test_robots_of_a_folder_agree_with_a_fixed_and_a_floating_base(folder):
     finding = robots.compare_robots(folder)
-    assert finding.passed and not finding.skipped
-    assert finding.table.column("base") == ["fixed", "floating"]
-    assert finding.table.column("states") == [robots.STATES] * 2
+    assert finding.passed and finding.rows
+    assert finding.column("base") == ["fixed", "floating"]
+    assert finding.column("states") == [robots.STATES] * 2
 
 
 def test_a_folder_that_is_not_there_is_skipped_with_the_reason(tmp_path):
     for study in (robots.compare_robots, robot_timing.time_robots):
         finding = study(tmp_path / "nowhere")
-        assert finding.passed is None and finding.table.rows == () and "nowhere" in finding.skipped
+        assert finding.passed is None and finding.rows == () and "nowhere" in finding.note
 
 
 def test_random_trees_agree_in_every_quantity(monkeypatch):
     monkeypatch.setattr(robots, "STATES", 10)
     monkeypatch.setattr(robots, "TREES", {"quick": 1})
     finding = robots.compare_trees()
-    assert finding.passed and finding.table.column("bodies") == list(robots.TREE_SIZES)
-    assert all(value is not None for row in finding.table.rows for value in row)
+    assert finding.passed and finding.column("bodies") == list(robots.TREE_SIZES)
+    assert all(value is not None for row in finding.rows for value in row)
 
 
 def test_the_comparison_fails_when_one_mass_is_wrong(monkeypatch):
@@ -61,13 +60,13 @@ def test_the_comparison_fails_when_one_mass_is_wrong(monkeypatch):
     monkeypatch.setattr(robots, "model_of", heavier)
     monkeypatch.setattr(robots, "random_mechanism", lambda rng, n: random_mechanism(rng, n, ("revolute",)))
     finding = robots.compare_trees()
-    assert finding.passed is False and len(finding.failures.rows) == len(finding.table.rows)
+    assert finding.passed is False and len(finding.that(False).rows) == len(finding.rows)
 
 
 def test_times_are_positive_and_judged_by_form(folder, monkeypatch):
     monkeypatch.setattr(robot_timing, "STATES", 3)
     monkeypatch.setattr(robot_timing, "ROUNDS", {"quick": 2})
-    table = robot_timing.time_robots(folder).table
+    table = robot_timing.time_robots(folder)
     assert len(table.rows) == 4 and len(table.holds) == 4
     assert all(np.array([row[4:] for row in table.rows]).ravel() > 0.0)
 
@@ -75,4 +74,4 @@ def test_times_are_positive_and_judged_by_form(folder, monkeypatch):
 def test_depths_are_checked_and_an_empty_finding_is_undecided(tmp_path):
     with pytest.raises(ArgumentError, match="depth"):
         robots.compare_trees("deeper")
-    assert Finding("t", "s", "", robot_timing.time_robots(tmp_path).table).passed is None
+    assert robot_timing.time_robots(tmp_path).passed is None
