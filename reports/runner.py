@@ -4,16 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
-from reports.store import Checkpoint, RunStore
-from reports.uses import UsedRun, add_use, read_use, run_command
+from reference import worlds
+from reports.store.folder import Checkpoint, Place, RunStore
+from reports.store.runs import RunEntry
+from reports.uses import UsedRun, add_use, run_command
 
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Fetched:
+    """A run, what its file says of itself, where it belongs, and whether its file existed before."""
+
+    run: Run
+    entry: RunEntry
+    place: Place
+    existed: bool
 
 
 class Runner:
@@ -30,7 +42,7 @@ class Runner:
         self.progress = progress
         self.used: dict[str, UsedRun] = {}  # by file name, in the order of use
         self.user = ""  # who is said to use what is asked for now
-        self._held: dict[str, Run] = {}
+        self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
 
     def __call__(
@@ -40,22 +52,22 @@ class Runner:
 
         An incomplete run is stored as partial; then what stopped it is raised, or with `partial` the run returned.
         """
-        from reference.worlds import require_complete
+        fetched = self.fetch(scene, world, rendering, keep=keep)
+        if not partial:
+            worlds.require_complete(fetched.run)
+        self._note(fetched, scene, world, rendering)
+        return fetched.run
 
-        inputs, label = self.inputs(scene, world, rendering), self.label(scene, world, rendering)
-        path = self.store.path_of(inputs, label)
-        if path.name not in self._held:
-            run = self.store.get_or_run(inputs, self._computer(scene, world, rendering), label)
-            if not partial:
-                require_complete(run)
-            if not run.complete:
-                path = self.store.partial_path_of(inputs, label)
-            if not (keep and run.complete):
-                self._use(path, scene, world, rendering)
-                return run
-            self._held[path.name] = run
-        self._use(path, scene, world, rendering)
-        return self._held[path.name]
+    def fetch(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Fetched:
+        """Return the run of `scene` in `world` with its place, even where the simulation gave up."""
+        place = self._place(scene, world, rendering)
+        if place.path.name in self._held:
+            return self._held[place.path.name]
+        existed = place.path.is_file()
+        fetched = Fetched(*self.store.fetch(place, self._computer(scene, world, rendering)), place, existed)
+        if keep and fetched.run.complete:
+            self._held[place.path.name] = fetched
+        return fetched
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:
@@ -76,13 +88,20 @@ class Runner:
 
     def file_of(self, scene: Scene, world: str, rendering: str = "full") -> str:
         """Name of the file of a run."""
-        return self.store.path_of(self.inputs(scene, world, rendering), self.label(scene, world, rendering)).name
+        return self._place(scene, world, rendering).path.name
 
-    def _use(self, path: Path, scene: Scene, world: str, rendering: str) -> None:
-        if path.name not in self._known:
-            command = run_command(scene, world, rendering)
-            self._known[path.name] = read_use(path, self.label(scene, world, rendering), command)
-        self.use_again(path.name)
+    def _place(self, scene: Scene, world: str, rendering: str) -> Place:
+        return self.store.place_of(self.inputs(scene, world, rendering), self.label(scene, world, rendering))
+
+    def _note(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
+        """Say that the present user uses a run."""
+        name, entry = fetched.entry.file, fetched.entry
+        if name not in self._known:
+            command = run_command(scene, world, rendering) or f"iapb store again out/runs/{name}"
+            size = (self.store.folder / name).stat().st_size
+            self._known[name] = UsedRun(self.label(scene, world, rendering), name, entry.run_key, entry.content_hash,
+                                        command, size, entry.status)
+        self.use_again(name)
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
@@ -92,19 +111,20 @@ class Runner:
     @staticmethod
     def inputs(scene: Scene, world: str, rendering: str = "full") -> dict[str, Any]:
         """Everything that determines the run, besides the code."""
-        from reference.worlds import find_world
-
-        found = find_world(world, rendering)
-        coupling = found.coupling_in(scene)
-        return {
-            "scene": scene.resolved(), "law": found.law.name, "law settings": dict(found.law.settings),
-            "coupling": coupling.name, "coupling settings": dict(coupling.settings), "world": world,
-        }  # fmt: skip
+        found = worlds.find_world(world, rendering)
+        return run_inputs(scene, found.law, found.coupling_in(scene), world)
 
     def _computer(self, scene: Scene, world: str, rendering: str) -> Callable[[Checkpoint], Run]:
         def compute(checkpoint: Checkpoint) -> Run:
-            from reference.worlds import run_world
-
-            return run_world(scene, world, rendering, progress=self.progress, partial=True, checkpoint=checkpoint)
+            return worlds.run_world(scene, world, rendering, progress=self.progress, partial=True,
+                                    checkpoint=checkpoint)  # fmt: skip
 
         return compute
+
+
+def run_inputs(scene: Scene, law: Any, coupling: Any, world: str) -> dict[str, Any]:
+    """Return everything that determines a run, besides the code."""
+    return {
+        "scene": scene.resolved(), "law": law.name, "law settings": dict(law.settings),
+        "coupling": coupling.name, "coupling settings": dict(coupling.settings), "world": world,
+    }  # fmt: skip

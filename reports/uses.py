@@ -7,11 +7,12 @@ import shlex
 from collections.abc import Iterator, Mapping, MutableMapping
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-from iapb.errors import IapbError
-from iapb.scene import Scene
+from iapb.errors import ArgumentError, IapbError
+from iapb.scene import Scene, find_scene, load_scene, scene_names
+from iapb.scene.document import DocumentError, read_document
+from iapb.scene.model import set_value
 
 COMPLETE, PARTIAL = "complete", "partial"
 
@@ -39,15 +40,6 @@ class UsedRun:
     used_by: tuple[str, ...] = ()
 
 
-def read_use(path: Path, name: str, command: str) -> UsedRun:
-    """Return the run in a file, used by nobody yet."""
-    from reports.store.runs import read_head
-
-    head = read_head(path)
-    return UsedRun(name, path.name, str(head["run_key"]), str(head["content_hash"]),
-                   command or f"iapb store again out/runs/{path.name}", path.stat().st_size, str(head["status"]))
-
-
 def add_use(used: MutableMapping[str, UsedRun], run: UsedRun) -> None:
     """Add a run to those used, by file; who used it before stays known."""
     before = used[run.file].used_by if run.file in used else ()
@@ -59,9 +51,6 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
 
     Its values are tried before it is returned: as the command reads them, they must give the scene to the last bit.
     """
-    from iapb.scene.model import set_value
-    from reports.commands.run import parsed
-
     shipped = _shipped(scene.name)
     if shipped is None:
         return ""
@@ -78,10 +67,22 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
     return shlex.join(words + (["--rendering", rendering] if rendering != "full" else []))
 
 
+def parsed(assignments: list[str] | None) -> dict[str, Any]:
+    """Turn ``path=value`` into values by path; values are read as YAML."""
+    values = {}
+    for text in assignments or []:
+        path, equals, value = text.partition("=")
+        if not equals or not path:
+            raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")
+        try:
+            values[path.strip()] = read_document(value)[0].value
+        except DocumentError as error:
+            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {error.expected}") from None
+    return values
+
+
 @cache
 def _shipped(name: str) -> Scene | None:
-    from iapb.scene import find_scene, load_scene, scene_names
-
     return load_scene(find_scene(name)) if name in scene_names() else None
 
 

@@ -15,10 +15,10 @@ def inspect(
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
     from reports.commands.inspect_impact import describe_impact
     from reports.commands.run import describe
-    from reports.store.runs import read_head, read_provenance, read_run
+    from reports.store.runs import read_provenance, read_stored
     from reports.store_impact import read_broken_impact
 
-    run, head = read_run(file), read_head(file)
+    run, entry = read_stored(file)
     broken = read_broken_impact(file)
     if broken is None:
         describe(run, existed=True)
@@ -39,7 +39,7 @@ def inspect(
     print("\nProvenance:")
     for name, text in read_provenance(file).items():
         print(f"  {name}: {text.splitlines()[0] if text else ''}")
-    print(f"\nrun key      {head['run_key']}\ncontent hash {head['content_hash']}")
+    print(f"\nrun key      {entry.run_key}\ncontent hash {entry.content_hash}")
 
 
 def _list_impacts(run: object, count: int) -> None:

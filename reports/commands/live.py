@@ -40,11 +40,11 @@ def live(
     from iapb.simulation import INTERRUPTED
     from reference.worlds import find_world
     from reports.commands.progress import to_log
-    from reports.commands.run import parsed
     from reports.compiling import compiling_told
     from reports.live.files import write_live
     from reports.live.measure import summary
     from reports.live.setup import live_simulation
+    from reports.uses import parsed
 
     if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")

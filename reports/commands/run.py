@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,37 +26,19 @@ def run(
     from iapb.simulation import INTERRUPTED
     from reports.commands.progress import step_progress
     from reports.runner import Runner
+    from reports.uses import parsed
 
     source = load_scene(find_scene(scene)).with_values(parsed(set_)) if set_ else load_scene(find_scene(scene))
     runner = Runner(out)
-    inputs, label = runner.inputs(source, world, rendering), runner.label(source, world, rendering)
-    existed = inputs in runner.store
     with step_progress(f"{source.name} in {world}") as runner.progress:
-        result = runner(source, world, rendering, partial=True)
-    path = runner.store.path_of(inputs, label)
-    describe(result, existed)
+        fetched = runner.fetch(source, world, rendering)
+    result = fetched.run
+    describe(result, fetched.existed)
     if result.complete:
-        print(f"Stored in {path}")
+        print(f"Stored in {fetched.place.path}")
     else:
-        print(f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {path}.partial")
+        print(f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {fetched.place.partial}")
         raise typer.Exit(130 if result.stopped == INTERRUPTED else 1)
-
-
-def parsed(assignments: list[str] | None) -> dict[str, Any]:
-    """Turn ``path=value`` into values by path; values are read as YAML."""
-    from iapb.errors import ArgumentError
-    from iapb.scene.document import DocumentError, read_document
-
-    values = {}
-    for text in assignments or []:
-        path, equals, value = text.partition("=")
-        if not equals or not path:
-            raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")
-        try:
-            values[path.strip()] = read_document(value)[0].value
-        except DocumentError as error:
-            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {error.expected}") from None
-    return values
 
 
 SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads

@@ -7,37 +7,22 @@ theirs makes the stage run again, a change of the report not. Beside the records
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from iapb.scene import scene_folder
 from reports.evidence.tables import numbers_tables
+from reports.provenance import collect_provenance
 from reports.runner import Runner
-from reports.store.keys import canonical_json, code_version, plain
+from reports.store.keys import SOURCES, evidence_version, hash_of, plain
 from reports.store.tables import Column, Table, read_tables, write_tables
 from reports.uses import UsedRun, add_use
 from verification.finding import Failure
 
 _RECORDS, _RUNS = "records", "runs used"
-
-
-@cache
-def evidence_version() -> str:
-    """Hash of everything that can change a verdict: engine, references, verification, these stages, and the scenes."""
-    digest = hashlib.sha256(code_version().encode())
-    root = Path(__file__).resolve().parents[2]
-    for folder in ("verification", "reports/evidence"):
-        for path in sorted((root / folder).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    for path in sorted(path for path in scene_folder().rglob("*") if path.is_file()):
-        digest.update(path.relative_to(scene_folder()).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
 
 
 class Stage:
@@ -62,7 +47,7 @@ class Stage:
         self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any], depends: Mapping[str, str] | None = None
     ) -> None:
         given = {"stage": name, "inputs": inputs, "code": evidence_version(), "depends": depends or {}}
-        self.key = hashlib.sha256(canonical_json(given).encode()).hexdigest()
+        self.key = hash_of(given)
         self.name = name
         self.path = folder / f"{name}-{self.key[:16]}.h5"
         self.runs: dict[str, UsedRun] = {}
@@ -89,7 +74,8 @@ class Stage:
             self.path = incomplete
         self.path.parent.mkdir(parents=True, exist_ok=True)
         runs = (self._runs_table(),) if self.runs else ()
-        write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs))
+        write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs),
+                     collect_provenance() | {SOURCES: evidence_version()})
         return read_back
 
     def _computed(self, compute: Callable[[], Any], runner: Runner | None) -> Any:

@@ -48,7 +48,7 @@ def _repeated(runner: Runner, name: str) -> Any:
     scene, values, world, rendering = FIGURE_RUNS[name]
     source = shipped_scene(scene, values)
     runner(source, world, rendering)
-    path = runner.store.path_of(runner.inputs(source, world, rendering), runner.label(source, world, rendering))
+    path = runner.store.folder / runner.file_of(source, world, rendering)
     yield name, repeat_run(path)
 
 

@@ -1,8 +1,8 @@
 """Runs and tables on the disk: HDF5 files that are whole or not there, found again by what they were made from."""
 
-from reports.store.folder import Checkpoint, RunEntry, RunStore
+from reports.store.folder import Checkpoint, RunStore
 from reports.store.keys import content_hash, run_key
-from reports.store.runs import read_provenance, read_run, write_run
+from reports.store.runs import RunEntry, read_provenance, read_run, write_run
 from reports.store.tables import Column, Table, read_table, read_tables, write_table, write_tables
 
 __all__ = [

@@ -16,8 +16,8 @@ from typing import Any
 from iapb.errors import RunFileError
 from reports.store.folder import INDEX_NAME, PARTIAL_SUFFIX, read_index
 from reports.store.io import WRITING, opened
-from reports.store.keys import run_key
-from reports.store.runs import read_head, read_run
+from reports.store.keys import SOURCES, evidence_version, run_key
+from reports.store.runs import read_entry, read_provenance, read_run
 from reports.store.schema import FORMAT
 
 Progress = Callable[[int, int], None]
@@ -112,8 +112,6 @@ def garbage(folder: Path | str) -> tuple[FileState, ...]:
 
 
 def _garbage(folder: Path) -> Iterator[FileState]:
-    from reports.evidence.stage import evidence_version
-
     for path in _files(folder):
         if path.name.endswith((WRITING, DAMAGED_SUFFIX)):
             yield _state(path)
@@ -121,7 +119,7 @@ def _garbage(folder: Path) -> Iterator[FileState]:
             if path.with_name(path.name.removesuffix(PARTIAL_SUFFIX)).is_file():
                 yield FileState(path, PARTIAL, "the finished run is there")
         elif path.parent.name == "tables":
-            if not _is_present_table(path, evidence_version()):
+            if not _is_present_table(path):
                 yield FileState(path, STALE, "a table of older code")
         elif _is_stale_run(path):
             yield FileState(path, STALE, "a run of older code")
@@ -130,7 +128,7 @@ def _garbage(folder: Path) -> Iterator[FileState]:
 def _is_stale_run(path: Path) -> bool:
     """Whether the code would now store this run under another key; a file that is no run is left alone."""
     try:
-        stored = read_head(path).get("run_key", "")
+        stored = read_entry(path).run_key
         inputs = _inputs(path)
     except RunFileError:
         return False
@@ -148,18 +146,12 @@ def _inputs(path: Path) -> dict[str, Any]:
     return {name: json.loads(text) if name in _AS_JSON else text for name, text in texts.items()}
 
 
-def _is_present_table(path: Path, version: str) -> bool:
-    """Whether a stage of the present code has this file: its name ends with the stage's key."""
-    import hashlib
-
-    from reports.store.keys import canonical_json
-
-    name, _, key = path.stem.rpartition("-")
-    for depth in ("quick", "full"):
-        text = canonical_json({"stage": name, "inputs": {"depth": depth}, "code": version})
-        if hashlib.sha256(text.encode()).hexdigest().startswith(key):
-            return True
-    return False
+def _is_present_table(path: Path) -> bool:
+    """Whether the present code made this table."""
+    try:
+        return read_provenance(path).get(SOURCES) == evidence_version()
+    except RunFileError:
+        return False
 
 
 def collect_garbage(folder: Path | str) -> tuple[FileState, ...]:

@@ -27,7 +27,7 @@ from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store.io import remove_abandoned, written_aside
 from reports.store.keys import run_key
-from reports.store.runs import read_head, read_run, write_run
+from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
 PARTIAL_SUFFIX = ".partial"
 INDEX_NAME = "index.jsonl"
@@ -63,10 +63,23 @@ class Checkpoint:
         if not (force or self.due):
             return False
         start = time.monotonic()
-        write_run(self.path, run, key=self.key, replace=True)
+        store_run(self.path, run, key=self.key, replace=True)
         end = time.monotonic()
         self._next = end + max(self.pause, _PAUSE_PER_WRITE * (end - start))
         return True
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run belongs: its key, its file, and the file of its last checkpoint while it is under way."""
+
+    key: str
+    path: Path
+
+    @property
+    def partial(self) -> Path:
+        """File of the last checkpoint."""
+        return self.path.with_name(self.path.name + PARTIAL_SUFFIX)
 
 
 class RunStore:
@@ -90,23 +103,18 @@ class RunStore:
             raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
         remove_abandoned(self.folder)
 
-    def key(self, inputs: Mapping[str, Any]) -> str:
-        """Return the run key of `inputs`."""
-        return run_key(inputs, self.code)
-
-    def path_of(self, inputs: Mapping[str, Any], label: str = "run") -> Path:
-        """Return the file that the run of `inputs` has, or will have.
+    def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
+        """Return the key of `inputs`, and the file that their run has or will have.
 
         `label` starts the name, for people; it is no part of the key, and a run is found under any label.
         """
-        key = self.key(inputs)
+        key = run_key(inputs, self.code)
         found = sorted(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"))
-        return found[0] if found else self.folder / f"{_file_name(label)}-{key[:_KEY_DIGITS]}.h5"
+        return Place(key, found[0] if found else self.folder / file_name(label, key))
 
-    def partial_path_of(self, inputs: Mapping[str, Any], label: str = "run") -> Path:
-        """Return the file that holds the last checkpoint of an unfinished run of `inputs`."""
-        path = self.path_of(inputs, label)
-        return path.with_name(path.name + PARTIAL_SUFFIX)
+    def path_of(self, inputs: Mapping[str, Any], label: str = "run") -> Path:
+        """Return the file that the run of `inputs` has, or will have."""
+        return self.place_of(inputs, label).path
 
     def __contains__(self, inputs: Mapping[str, Any]) -> bool:
         return self.path_of(inputs).is_file()
@@ -119,13 +127,16 @@ class RunStore:
         RunFileError
             If its file is damaged. It is never replaced in silence: remove it to have the run computed again.
         """
-        path = self.path_of(inputs)
-        if not path.is_file():
+        found = self._read(self.place_of(inputs))
+        return None if found is None else found[0]
+
+    def _read(self, place: Place) -> tuple[Run, RunEntry] | None:
+        if not place.path.is_file():
             return None
-        stored = read_head(path)["run_key"]
-        if stored != self.key(inputs):
-            raise RunFileError(f"{path}: run key is {stored}: expected {self.key(inputs)}")
-        return read_run(path)
+        run, entry = read_stored(place.path)
+        if entry.run_key != place.key:
+            raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
+        return run, entry
 
     def get_or_run(
         self, inputs: Mapping[str, Any], compute: Callable[[Checkpoint], Run], label: str = "run"
@@ -146,28 +157,33 @@ class RunStore:
         Run
             With ``complete=False`` where `compute` gave up early: stored as partial, computed again next time.
         """
-        stored = self.get(inputs)
+        return self.fetch(self.place_of(inputs, label), compute)[0]
+
+    def fetch(self, place: Place, compute: Callable[[Checkpoint], Run]) -> tuple[Run, RunEntry]:
+        """Return the run that belongs in a place, and what its file says of itself; see `get_or_run`."""
+        stored = self._read(place)
         if stored is not None:
             return stored
-        checkpoint = Checkpoint(self.partial_path_of(inputs, label), self.key(inputs))
-        run = compute(checkpoint)
+        run = compute(Checkpoint(place.partial, place.key))
         if not isinstance(run, Run):
             raise ArgumentError("compute", run, "a function that returns a Run")
         if not run.complete:
-            checkpoint(run, force=True)
-            return run
-        self.put(inputs, run, label)
-        return run
+            return run, store_run(place.partial, run, key=place.key, replace=True)
+        return run, self._keep(place, run)
 
     def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
         """Store a finished run, and return its file; a file that is already there stays as it is."""
         if not run.complete:
             raise ArgumentError("run.complete", run.complete, "True: unfinished runs are kept by Checkpoint")
-        path = self.path_of(inputs, label)
-        write_run(path, run, key=self.key(inputs))
-        self.partial_path_of(inputs, label).unlink(missing_ok=True)
-        add_to_index(self.folder, path)
-        return path
+        place = self.place_of(inputs, label)
+        self._keep(place, run)
+        return place.path
+
+    def _keep(self, place: Place, run: Run) -> RunEntry:
+        entry = store_run(place.path, run, key=place.key)
+        place.partial.unlink(missing_ok=True)
+        _add_to_index(self.folder, entry)
+        return entry
 
     def entries(self) -> tuple[RunEntry, ...]:
         """Return the index: one entry per finished run in the folder, by file name."""
@@ -178,32 +194,14 @@ class RunStore:
         return tuple(sorted(self.folder.glob(f"*.h5{PARTIAL_SUFFIX}")))
 
 
-def _file_name(label: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run"
+def file_name(label: str, key: str) -> str:
+    """Return the name of a run's file: a label for people, and the start of the run key."""
+    return (re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run") + f"-{key[:_KEY_DIGITS]}.h5"
 
 
-@dataclass(frozen=True)
-class RunEntry:
-    """One line of the index."""
-
-    file: str  # name within the folder
-    title: str  # scene and world
-    run_key: str
-    content_hash: str
-    status: str
-
-
-def entry_of(path: Path) -> RunEntry:
-    """Return the entry of a run file, from its attributes."""
-    head = read_head(path)
-    return RunEntry(
-        path.name, str(head["title"]), str(head["run_key"]), str(head["content_hash"]), str(head["status"])
-    )
-
-
-def add_to_index(folder: Path, path: Path) -> None:
+def _add_to_index(folder: Path, entry: RunEntry) -> None:
     """Append the entry of a new file; one short write, so that several processes may do it at once."""
-    line = json.dumps(asdict(entry_of(path)), ensure_ascii=False) + "\n"
+    line = json.dumps(asdict(entry), ensure_ascii=False) + "\n"
     handle = os.open(folder / INDEX_NAME, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     try:
         os.write(handle, line.encode())
@@ -221,7 +219,7 @@ def read_index(folder: Path) -> tuple[RunEntry, ...]:
             entries.append(listed[path.name])
         else:
             with suppress(RunFileError):  # a table, or damaged: not a run
-                entries.append(entry_of(path))
+                entries.append(read_entry(path))
     if {entry.file for entry in entries} != set(listed):
         _write_index(folder, entries)
     return tuple(entries)

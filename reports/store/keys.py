@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
+import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
+from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +18,13 @@ import numpy as np
 
 from iapb.errors import ArgumentError
 from iapb.run import Run
+from reports.store.io import written_aside
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # What can change a number in a run: the engine, the reference worlds, and the numeric packages under them.
 _SOURCES = ("iapb", "reference")
+SOURCES = "sources"  # entry of a table's provenance: the `evidence_version` that made it
+_ROOT = Path(__file__).resolve().parents[2]
 _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
 
 
@@ -43,17 +50,61 @@ def canonical_json(value: Any) -> str:
 def code_version() -> str:
     """Return a hash of everything that can change a run's numbers.
 
-    Source text rather than a commit: it also tells apart uncommitted changes, and does not change with
-    a change of the report. Taken once per process, when first asked for.
+    Sources rather than a commit: it also tells apart uncommitted changes, and does not change with a change of the
+    report. Taken once per process, when first asked for.
     """
-    digest = hashlib.sha256()
-    root = Path(__file__).resolve().parents[2]
-    for package in _SOURCES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    for package in _NUMERIC_PACKAGES:
-        digest.update(f"{package} {version(package)}\0".encode())
-    return digest.hexdigest()
+    packages = [f"{package} {version(package)}" for package in _NUMERIC_PACKAGES]
+    return hash_of([*packages, *(sources_hash(package) for package in _SOURCES)])
+
+
+@cache
+def evidence_version() -> str:
+    """Hash of everything that can change a verdict: engine, references, verification, its stages, and the scenes."""
+    from iapb.scene import scene_folder  # with pydantic
+
+    files = sorted(path for path in scene_folder().rglob("*") if path.is_file())
+    scenes = {path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8") for path in files}
+    return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes])
+
+
+def hash_of(value: Any) -> str:
+    """Return sha256 of the one JSON text of `value`, in hexadecimal."""
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
+@cache
+def sources_hash(folder: str) -> str:
+    """Return a hash of the Python files below a folder of the checkout: their code without comments and docstrings.
+
+    To parse all sources takes seconds, so what a file's bytes lead to is remembered beside the compiled modules.
+    """
+    files = {path.relative_to(_ROOT).as_posix(): path.read_bytes() for path in (_ROOT / folder).rglob("*.py")}
+    names = {name: hashlib.sha256(source).hexdigest() for name, source in files.items()}
+    kept = Path(cache_from_source(__file__)).with_name(f"code-{folder.replace('/', '-')}-{sys.version_info.minor}.json")
+    known = _remembered(kept)
+    codes = {names[name]: known.get(names[name]) or code_hash(source) for name, source in files.items()}
+    if codes != known:
+        with suppress(OSError):  # the folder may be read-only
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with written_aside(kept, replace=True) as aside:
+                aside.write_text(json.dumps(codes), encoding="utf-8")
+    return hash_of({name: codes[digest] for name, digest in names.items()})
+
+
+def _remembered(kept: Path) -> dict[str, str]:
+    with suppress(OSError, ValueError, TypeError):
+        return dict(json.loads(kept.read_text(encoding="utf-8")))
+    return {}
+
+
+def code_hash(source: bytes) -> str:
+    """Return a hash of Python code that comments, docstrings and layout do not enter."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            if ast.get_docstring(node, clean=False) is not None:
+                node.body = node.body[1:]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
 def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
@@ -66,8 +117,7 @@ def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
     code
         Version of the code; the engine's by default. Give your own to cover a law of your own.
     """
-    text = canonical_json({"inputs": inputs, "code": code_version() if code is None else code})
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
 
 
 def add_array(digest: Any, name: str, array: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,16 @@ from reports.store.schema import (
     unit_of,
 )
 
-_HEAD = ("title", "status", "run_key", "content_hash", "dt")
+
+@dataclass(frozen=True)
+class RunEntry:
+    """What a run file says of itself, without its arrays: a line of the index."""
+
+    file: str  # name within the folder
+    title: str  # scene and world
+    run_key: str
+    content_hash: str
+    status: str
 
 
 def write_run(
@@ -62,6 +72,20 @@ def write_run(
     more
         Writes groups of its own into the open file; who reads the run passes over them.
     """
+    store_run(path, run, key=key, provenance=provenance, replace=replace, more=more)
+    return Path(path)
+
+
+def store_run(
+    path: Path | str,
+    run: Run,
+    *,
+    key: str,
+    provenance: Mapping[str, str] | None = None,
+    replace: bool = False,
+    more: Callable[[Any], None] | None = None,
+) -> RunEntry:
+    """Write one run as `write_run` does; return what the new file says of itself."""
     path = Path(path)
     with new_file(path, replace=replace) as file:
         _write_head(file, run, key)
@@ -78,7 +102,7 @@ def write_run(
             write_text(file["provenance"], name, text)
         if more is not None:
             more(file)
-    return path
+        return _entry(file, path)
 
 
 def _json(value: Any) -> str:
@@ -155,11 +179,17 @@ def read_run(path: Path | str) -> Run:
     RunFileError
         If the file is absent, damaged or not a run.
     """
+    return read_stored(path)[0]
+
+
+def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
+    """Return the run in a file and what the file says of itself; raises as `read_run`."""
     with opened(path) as file:
+        entry = _entry(file, path)
         run = Run(**_texts(file, path), **_head(file), **_arrays(file, path))
-        if content_hash(run) != file.attrs["content_hash"]:
+        if content_hash(run) != entry.content_hash:
             raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
-        return run
+        return run, entry
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
@@ -188,20 +218,24 @@ def _group(file: Any, name: str, path: Path | str) -> Any:
     return file[name]
 
 
-def read_head(path: Path | str) -> dict[str, Any]:
-    """Return a run file's attributes: title, status, run_key, content_hash, dt. Reads no array.
+def read_entry(path: Path | str) -> RunEntry:
+    """Return what a run file says of itself. Reads no array.
 
     Raises
     ------
     RunFileError
-        If the file is absent, damaged, no run, or lacks one of them.
+        If the file is absent, damaged, no run, or does not say it.
     """
     with opened(path) as file:
-        head = dict(file.attrs)
-    absent = [name for name in _HEAD if name not in head]
+        return _entry(file, path)
+
+
+def _entry(file: Any, path: Path | str) -> RunEntry:
+    names = [field.name for field in fields(RunEntry) if field.name != "file"]
+    absent = [name for name in names if name not in file.attrs]
     if absent:
         raise RunFileError(f"{path}: {', '.join(absent)} missing among its attributes")
-    return head
+    return RunEntry(Path(path).name, *(str(file.attrs[name]) for name in names))
 
 
 def _texts(file: Any, path: Path | str) -> dict[str, Any]:

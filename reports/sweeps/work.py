@@ -12,8 +12,14 @@ import numpy as np
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
 from iapb.run import Run
-from iapb.scene import Scene
-from reports.store.keys import code_version, content_hash, run_key
+from iapb.scene import Scene, find_scene, load_scene
+from iapb.simulation import simulate
+from reference.one_thread import one_thread
+from reference.worlds import find_world, require_complete
+from reports.runner import run_inputs
+from reports.store.folder import file_name
+from reports.store.keys import code_version, run_key
+from reports.store.runs import RunEntry, read_stored, store_run
 from reports.sweeps.points import Point
 
 DONE, FAILED = "done", "failed"
@@ -58,39 +64,28 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
         raise IapbError(f"a worker does not see the folder {folder}: the machines of a cluster must share it")
     key = point.key(code)
     try:
-        run, path = _run(point, Path(folder))
+        run, entry = _run(point, Path(folder))
     except IapbError as error:
         return Result(point.index, key, FAILED, note=" ".join(str(error).split()))
-    return Result(point.index, key, DONE, path.name, content_hash(run), "", **_measures(run))
+    return Result(point.index, key, DONE, entry.file, entry.content_hash, "", **_measures(run))
 
 
-def _run(point: Point, folder: Path) -> tuple[Run, Path]:
-    """The run of a point and its file; BLAS on one thread, or the sums would depend on the machine's cores."""
-    from iapb.simulation import simulate
-    from reference.one_thread import one_thread
-    from reference.worlds import find_world, require_complete
-    from reports.store.runs import read_run, write_run
-
+def _run(point: Point, folder: Path) -> tuple[Run, RunEntry]:
+    """The run of a point and its file's entry; BLAS on one thread, or the sums would depend on the machine's cores."""
     scene = _scene(point.scene).with_values(point.values)
     world = find_world(point.world, point.rendering)
     law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
-    key = run_key({
-        "scene": scene.resolved(), "law": law.name, "law settings": dict(law.settings),
-        "coupling": coupling.name, "coupling settings": dict(coupling.settings), "world": point.world,
-    })  # fmt: skip
-    path = folder / f"{scene.name}-{point.world}-{key[:16]}.h5"
+    key = run_key(run_inputs(scene, law, coupling, point.world))
+    path = folder / file_name(f"{scene.name}-{point.world}", key)
     if path.is_file():
-        return read_run(path), path
+        return read_stored(path)
     with one_thread():
         run = require_complete(simulate(scene, law, coupling, world=point.world))
-    write_run(path, run, key=key)
-    return run, path
+    return run, store_run(path, run, key=key)
 
 
 @cache
 def _scene(name: str) -> Scene:
-    from iapb import find_scene, load_scene
-
     return load_scene(find_scene(name))
 
 

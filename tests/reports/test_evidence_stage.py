@@ -16,6 +16,7 @@ from reports.evidence.stage import Stage, plain_records
 from reports.evidence.tables import numbers_table, numbers_tables
 from reports.figures.figure import Numbers
 from reports.runner import Runner
+from reports.store import keys
 from reports.store.tables import read_table
 
 
@@ -96,10 +97,10 @@ def test_what_a_stage_reads_beside_the_project_is_in_its_key(tmp_path, monkeypat
 
 def test_a_changed_scene_is_another_key(tmp_path, monkeypatch):
     (tmp_path / "peg.yaml").write_text("name: peg")
-    monkeypatch.setattr(stages, "scene_folder", lambda: tmp_path)
-    versions = [stages.evidence_version.__wrapped__()]
+    monkeypatch.setattr("iapb.scene.scene_folder", lambda: tmp_path)
+    versions = [keys.evidence_version.__wrapped__()]
     (tmp_path / "peg.yaml").write_text("name: pig")
-    versions.append(stages.evidence_version.__wrapped__())
+    versions.append(keys.evidence_version.__wrapped__())
     assert versions[0] != versions[1]
 
 

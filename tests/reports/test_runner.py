@@ -46,7 +46,7 @@ def test_whatever_changes_a_run_changes_its_key(tmp_path):
     cases = [(PEG, "IAPB", "full"), (PEG, "IAPB", "scale"), (PEG, "PB", "full"), (PEG, "ideal", "full"),
              (PEG, "CBuc", "full"), (PEG.with_values({"contact.friction": 0.123}), "IAPB", "full"),
              (PEG.with_values({"couplings.four_channel.damping": [1, 1, 1]}), "IAPB", "full")]  # fmt: skip
-    assert len({store.key(Runner.inputs(*case)) for case in cases}) == len(cases)
+    assert len({store.place_of(Runner.inputs(*case)).key for case in cases}) == len(cases)
     assert len({Runner.label(*case) for case in cases}) == 5
 
 

@@ -14,6 +14,7 @@ import pytest
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.evidence.runs import shipped_scene
+from reports.evidence.stage import Stage
 from reports.resimulate import differences, repeat_run
 from reports.runner import Runner
 from reports.store import Column, Table, content_hash, read_run, write_run, write_table
@@ -105,7 +106,9 @@ def test_garbage_is_what_no_present_code_asks_for(filled: Path) -> None:
     write_run(runs(filled)[0].with_name(runs(filled)[0].name + ".partial"), run)
     (filled / "tables").mkdir()
     (filled / "tables" / "claims-0123456789abcdef.h5").write_bytes(b"old")
-    kept = {path.name for path in runs(filled)} - {"old-0000000000000000.h5"}
+    made = Stage(filled / "tables", "cost", tuple[float, ...], {"depth": "quick"}, {"a package": "2.1"})
+    made.get_or_compute(lambda: (1.0,))
+    kept = {path.name for path in runs(filled)} - {"old-0000000000000000.h5"} | {made.path.name}
     assert sorted(state.state for state in garbage(filled)) == sorted([STALE, LEFTOVER, PARTIAL, STALE])
     collect_garbage(filled)
     assert {path.name for path in filled.rglob("*.h5*")} == kept

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import os
 import signal
@@ -9,13 +10,14 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store import Checkpoint, RunStore, read_run, run_key
+from reports.store import Checkpoint, RunStore, folder, read_run, run_key, runs
 from reports.store.folder import INDEX_NAME
 from reports.store.keys import content_hash
 
@@ -99,7 +101,29 @@ def test_an_exception_keeps_the_last_checkpoint(tmp_path: Path, make_run: MakeRu
     store = RunStore(tmp_path)
     with pytest.raises(KeyboardInterrupt):
         store.get_or_run(INPUTS, compute)
-    assert read_run(store.partial_path_of(INPUTS)).steps == 12
+    assert read_run(store.place_of(INPUTS).partial).steps == 12
+
+
+def test_a_new_run_has_its_key_and_hash_taken_once_and_its_file_not_read_back(
+    tmp_path: Path, make_run: MakeRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = collections.Counter[str]()
+    for place, name in ((folder, "run_key"), (runs, "content_hash"), (runs, "opened"), (RunStore, "place_of")):
+        monkeypatch.setattr(place, name, _counted(calls, name, getattr(place, name)))
+    store = RunStore(tmp_path)
+    store.get_or_run(INPUTS, Counter(make_run()))
+    assert calls == {"run_key": 1, "place_of": 1, "content_hash": 1}
+    store.get_or_run(INPUTS, Counter(make_run()))  # reads: opened once, judged once
+    assert calls == {"run_key": 2, "place_of": 2, "content_hash": 2, "opened": 1}
+    assert len(store.entries()) == 1 and calls["opened"] == 1
+
+
+def _counted(calls: collections.Counter[str], name: str, function: Any) -> Any:
+    def call(*arguments: Any, **options: Any) -> Any:
+        calls[name] += 1
+        return function(*arguments, **options)
+
+    return call
 
 
 def test_checkpoints_wait_for_their_time(tmp_path: Path, make_run: MakeRun) -> None:
