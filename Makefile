@@ -53,8 +53,9 @@ portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm 
 		$(if $(SETTINGS),--settings $(SETTINGS))
 
 .PHONY: fuzz
-fuzz: setup ## 100,000 wrong inputs: each must be read or refused by name; what breaks something is kept in out/fuzz
-	@$(BIN)/python -m reports.fuzz --cases $(or $(CASES),100000)
+fuzz: setup ## faults done to the store, and 100,000 wrong inputs: each is read or refused by name; out/fuzz keeps the rest
+	@$(BIN)/python -m tests.robustness.faults
+	@$(BIN)/python -m tests.robustness.fuzz --cases $(or $(CASES),100000)
 
 .PHONY: mutants
 mutants: setup ## sampled small faults in the physics: the share that the tests notice; N=100 SEED=0

@@ -8,6 +8,8 @@ from pathlib import Path
 from reports.provenance import package_version
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared"  # files of others, where somebody has put them
+# The last fuzzing and fault injection (`make fuzz`); absent where only the package is installed.
+LAST_RESULT = Path(__file__).resolve().parents[2] / "tests" / "robustness" / "last_result.json"
 ABSENT = "absent"
 
 # stage -> folders beside the project that it reads where they exist
@@ -31,6 +33,9 @@ PACKAGES: dict[str, tuple[str, ...]] = {
 def depends_of(stage: str) -> dict[str, str]:
     """Return everything that a stage depends on by name: hashes of folders, or ABSENT, and versions of packages."""
     folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
+    if stage == "survival":
+        kept = LAST_RESULT.read_bytes() if LAST_RESULT.is_file() else b""
+        folders[LAST_RESULT.name] = hashlib.sha256(kept).hexdigest() if kept else ABSENT
     return folders | {name: package_version(name) for name in PACKAGES.get(stage, ())}
 
 

@@ -1,16 +1,16 @@
-"""Topic: what crashes, full disks, damaged files and wrong input do; and runs that come out the same."""
+"""Topic: runs that come out the same; the last result of what crashes, full disks, damaged files and wrong input do."""
 
 from __future__ import annotations
 
-import tempfile
+import json
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
+from reports.evidence.depends import LAST_RESULT
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures.figure import Numbers
-from reports.pages.records import Finding, Topic, with_failures
+from reports.pages.records import NOT_COMPUTED, Finding, Topic, with_failures
 from reports.runner import Runner
 from verification.finding import REFUTED, REPRODUCED, Failure, of_each
 
@@ -19,27 +19,21 @@ LEAD = (
     "store of runs; a fault is survived if every run that was finished is there and whole, and what is not whole says "
     "so."
 )
-TIMES = {"quick": 12, "full": 120}
-INPUTS = {"quick": 60, "full": 2000}  # wrong inputs of each kind
-_SAID = 160  # characters of a message that a table shows
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
-    """Do every fault, and simulate the runs of the figures again from their files."""
-    from reports.faults import try_faults
-    from reports.fuzz import fuzz
-    from reports.fuzz.kinds import kinds
-
+    """Simulate the runs of the figures again from their files; read the last results of the laboratory."""
     failures: list[Failure] = []
-    with tempfile.TemporaryDirectory() as folder:
-        faults = try_faults(Path(folder), TIMES[depth], progress, failures)
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
-    inputs = tuple(of_each(kinds(), lambda kind: [fuzz(kind, range(INPUTS[depth]))], failures))
-    tables = {"faults": _fault_table(faults), "simulated again": _repeated_table(repeated),
-              "wrong input": _input_table(inputs)}  # fmt: skip
-    findings = (_faults(faults), _repetitions(repeated), _inputs(inputs))
+    tables, findings = {"simulated again": _repeated_table(repeated)}, [_repetitions(repeated)]
+    for part, finding in (("faults", _faults), ("wrong input", _inputs)):
+        if last := _last(part):
+            tables[part] = last[0]
+            findings.append(finding(*last))
+        else:
+            findings.append(Finding(f"No result of {part} is kept here: `make fuzz` makes one.", NOT_COMPUTED))
     verdict = " ".join(finding.sentence for finding in findings)
-    return with_failures(Topic("survival", "Runs that survive", LEAD, findings, tables, verdict), failures)
+    return with_failures(Topic("survival", "Runs that survive", LEAD, tuple(findings), tables, verdict), failures)
 
 
 def _repeated(runner: Runner, name: str) -> Any:
@@ -52,36 +46,40 @@ def _repeated(runner: Runner, name: str) -> Any:
     yield name, repeat_run(path)
 
 
-def _inputs(records: Any) -> Finding:
-    tried, broken = sum(record.tried for record in records), sum(len(record.broken) for record in records)
+def _last(part: str) -> tuple[Numbers, str] | None:
+    """Table of the last fuzzing or fault injection, and when and how it was made; None where it is not kept."""
+    kept = json.loads(LAST_RESULT.read_text(encoding="utf-8")) if LAST_RESULT.is_file() else {}
+    if part not in kept:
+        return None
+    found = kept[part]
+    table = Numbers(tuple(found["columns"]), tuple(tuple(row) for row in found["rows"]))
+    return table, f"{found['command']}, {found['date']}, commit {found['commit']}"
+
+
+def _of_table(table: Numbers, column: str) -> int:
+    """Sum of a column."""
+    return sum(row[table.columns.index(column)] for row in table.rows)
+
+
+def _inputs(table: Numbers, made: str) -> Finding:
+    tried, broken = _of_table(table, "tried"), _of_table(table, "traceback or hang")
     came = f"{broken} gave a traceback or hung" if broken else "none gave a traceback or hung"
-    return Finding(f"Of {tried} wrong inputs of {len(records)} kinds {came}: "
-                   f"{sum(record.refused for record in records)} were refused by name, the others taken as valid.",
+    return Finding(f"Of {tried} wrong inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
+                   f"were refused by name, the others taken as valid ({made}).",
                    REFUTED if broken else REPRODUCED)  # fmt: skip
 
 
-def _input_table(records: Any) -> Numbers:
-    rows = tuple((r.kind, r.tried, r.refused, r.read, len(r.broken), " ".join(r.said.split())[:_SAID]) for r in records)
-    columns = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
-    return Numbers(columns, rows)
-
-
-def _faults(faults: Any) -> Finding:
-    tried, survived, lost = (sum(getattr(fault, name) for fault in faults) for name in ("tried", "survived", "lost"))
+def _faults(table: Numbers, made: str) -> Finding:
+    tried, survived, lost = (_of_table(table, column) for column in ("tried", "survived", "lost"))
     return Finding(
-        f"Of {tried} faults of {len(faults)} kinds, {survived} were survived; {lost} finished results were lost.",
-        REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
+        f"Of {tried} faults of {len(table.rows)} kinds, {survived} were survived; {lost} finished results were lost "
+        f"({made}).", REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
 
 
 def _repetitions(repeated: Any) -> Finding:
     same = sum(repetition.same for _, repetition in repeated)
     return Finding(f"{same} of {len(repeated)} runs of the figures, simulated again from nothing but their own files, "
                    "came out the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
-
-
-def _fault_table(faults: Any) -> Numbers:
-    rows = tuple((fault.fault, fault.tried, fault.survived, fault.lost, fault.said) for fault in faults)
-    return Numbers(("fault", "tried", "survived", "lost", "what one reads"), rows)
 
 
 def _repeated_table(repeated: Any) -> Numbers:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
 
-from reports.faults import FAULTS, try_faults
-from reports.faults.killed import killed_writer
+import tests.robustness.faults as faults
+from iapb.errors import RunFileError
+from reports.store.runs import read_run
+from tests.robustness.faults import FAULTS, inputs_of, killed_writer, open_store, try_faults
 
 
 def test_nothing_finished_is_lost(tmp_path: Path) -> None:
@@ -19,11 +22,6 @@ def test_nothing_finished_is_lost(tmp_path: Path) -> None:
 
 def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The planted fault: straight into the target, unsynced and unsealed, said to be finished beforehand."""
-    import time
-
-    import reports.faults.killed as killed
-    from reports.faults.sample import inputs_of, open_store
-
     def careless(folder: Path) -> None:
         store = open_store(folder)
         with store.path_of(inputs_of(0), "sample").open("wb") as file:
@@ -33,16 +31,13 @@ def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: py
                 file.flush()
                 time.sleep(1e-3)
 
-    monkeypatch.setattr(killed, "_write_for_ever", careless)
-    monkeypatch.setattr(killed, "whole", lambda store, number: _readable(store.path_of(inputs_of(number))))
+    monkeypatch.setattr(faults, "_write_for_ever", careless)
+    monkeypatch.setattr(faults, "whole", lambda store, number: _readable(store.path_of(inputs_of(number))))
     tried, survived, lost, _ = killed_writer(tmp_path, 3)
     assert (tried, survived) == (3, 0) or lost > 0
 
 
 def _readable(path: Path) -> bool:
-    from iapb.errors import RunFileError
-    from reports.store.runs import read_run
-
     try:
         read_run(path)
     except RunFileError:

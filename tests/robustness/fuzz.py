@@ -1,0 +1,280 @@
+"""Wrong input on purpose: valid files and command lines, damaged at random, given to the readers.
+
+Whatever comes in must be read, or be refused by one of iapb's own errors; never a traceback, a hang, or memory without
+end. `inputs` says what is damaged and who reads it, `damage` how.
+
+    python -m tests.robustness.fuzz --cases 100000      (part of make fuzz)
+
+Cases are tried in processes of their own: a reader that takes its process down (a fault inside a library) is found,
+too, and the next process goes on behind it. What breaks something is kept in out/fuzz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import signal
+import sys
+import tempfile
+import threading
+import time
+import traceback
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import IapbError
+from tests.robustness.inputs import KINDS, prepare
+from tests.robustness.last_result import remember
+
+READ, REFUSED, BROKEN = "read", "refused", "broken"
+LONGEST = 20.0  # [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
+_MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
+
+
+class TooLong(BaseException):
+    """A case took longer than LONGEST. Not an Exception: no reader may catch it."""
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A case that neither was read nor refused: which one, and what came instead.
+
+    file : where it was kept, or empty
+    """
+
+    kind: str
+    number: int
+    seed: int
+    how: str
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class FuzzRecord:
+    """What came of the cases of one kind.
+
+    read : taken as valid; refused : refused by one of iapb's errors; broken : anything else
+    said : the shortest message of a refusal
+    """
+
+    kind: str
+    tried: int
+    read: int
+    refused: int
+    broken: tuple[Broken, ...]
+    said: str
+
+
+def case(kind: Any, seed: int, number: int) -> tuple[str, bytes]:
+    """Return name and content of a case; the same for the same seed and number, whatever else is tried."""
+    rng = np.random.default_rng([seed, zlib.crc32(kind.name.encode()), number])
+    samples = kind.samples()
+    names = sorted(samples)
+    name, other = (names[int(rng.integers(len(names)))] for _ in range(2))
+    return name, kind.damaged(samples[name], samples[other], rng)
+
+
+def fuzz(
+    kind: str, numbers: Sequence[int], seed: int = 0, keep: Path | None = None,
+    begin: Callable[[int], None] = lambda number: None,
+) -> FuzzRecord:
+    """Try the cases of one kind with these numbers.
+
+    Parameters
+    ----------
+    kind : one of `KINDS`
+    numbers : which cases
+    seed : of all cases
+    keep : folder for the cases that broke something, and how; None: not kept
+    begin : called with the number of each case before it is tried
+
+    Returns
+    -------
+    FuzzRecord
+    """
+    chosen, counts, said, broken = KINDS[kind], {READ: 0, REFUSED: 0}, "", []
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder))
+        with bounded_memory():
+            for number in numbers:
+                begin(number)
+                name, content = case(chosen, seed, number)
+                outcome, words = judge(chosen, Path(folder) / name, content)
+                if outcome == BROKEN:
+                    broken.append(Broken(kind, number, seed, words, kept(keep, kind, number, name, content, words)))
+                else:
+                    counts[outcome] += 1
+                said = min((said, words), key=lambda text: (not text, len(text)))
+    return FuzzRecord(kind, len(numbers), counts[READ], counts[REFUSED], tuple(broken), said)
+
+
+def judge(kind: Any, path: Path, content: bytes) -> tuple[str, str]:
+    """Write a case and let it be read; return the outcome and what was said."""
+    path.write_bytes(content)
+    try:
+        with bounded_time():
+            kind.read(path)
+    except IapbError as error:
+        return REFUSED, str(error).replace(f"{path.parent}/", "")
+    except TooLong:
+        return BROKEN, f"not done after {LONGEST:g} s\n{traceback.format_exc()}"
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # whatever comes is the finding
+        return BROKEN, traceback.format_exc()
+    return READ, ""
+
+
+def kept(folder: Path | None, kind: str, number: int, name: str, content: bytes, how: str) -> str:
+    """Keep a case that broke something, and how; return its file."""
+    if folder is None:
+        return ""
+    place = folder / kind.replace(" ", "_")
+    place.mkdir(parents=True, exist_ok=True)
+    path = place / f"{number:09d}-{name}"
+    path.write_bytes(content)
+    record = {"kind": kind, "number": number, "how": how}
+    path.with_name(f"{path.name}.how.json").write_text(json.dumps(record, indent=1))
+    return str(path)
+
+
+@contextmanager
+def bounded_time() -> Iterator[None]:
+    """Stop what runs longer than LONGEST, counted in this process's own time: a busy machine is no hang.
+
+    Signals reach the main thread only; elsewhere nothing is stopped.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(*_: object) -> None:
+        raise TooLong
+
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+@contextmanager
+def bounded_memory() -> Iterator[None]:
+    """Let memory grow by _MEMORY at most, where the system can say how much there is."""
+    statm = Path("/proc/self/statm")
+    if not statm.exists() or sys.platform != "linux":
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = int(statm.read_text().split()[0]) * resource.getpagesize() + _MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+_BATCH = 500  # cases that one process tries
+_SHOWN = 5
+_SAID = 160  # characters of a message that the report shows
+_COLUMNS = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Try the cases and keep the result; return 0 if none broke anything, else 1."""
+    options = _options(arguments)
+    chosen = [options.kind] if options.kind else list(KINDS)
+    share = -(-options.cases // len(chosen))
+    broken: list[Broken] = []
+    rows, start = [], time.monotonic()
+    for kind in chosen:
+        found = list(_records(kind, range(options.first, options.first + share), options.seed, options.keep))
+        read, refused = sum(record.read for record in found), sum(record.refused for record in found)
+        bad = sum(len(record.broken) for record in found)
+        broken += [one for record in found for one in record.broken]
+        said = min((record.said for record in found), key=lambda text: (not text, len(text)))
+        rows.append((kind, share, refused, read, bad, " ".join(said.split())[:_SAID]))
+        print(f"{kind:<22} {share:>7} tried, {read:>6} read, {refused:>6} refused by name, {bad} broken", flush=True)
+    tried = share * len(chosen)
+    print(f"{tried} cases of {len(chosen)} kinds in {time.monotonic() - start:.0f} s; {len(broken)} broken.")
+    for each in broken[:_SHOWN]:
+        print(f"{each.file}\n{each.how}")
+    if len(chosen) == len(KINDS):
+        remember("wrong input", f"python -m tests.robustness.fuzz --cases {options.cases} --seed {options.seed} "
+                                f"--first {options.first}", _COLUMNS, rows)  # fmt: skip
+    return 1 if broken else 0
+
+
+def _options(arguments: list[str] | None) -> Any:
+    parser = argparse.ArgumentParser(prog="python -m tests.robustness.fuzz", description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=100_000, help="in all, shared out evenly among the kinds")
+    parser.add_argument("--kind", choices=list(KINDS), help="only this one")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case of each kind")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--keep", type=Path, default=Path("out/fuzz"), help="folder for what broke something")
+    return parser.parse_args(arguments)
+
+
+def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzRecord]:
+    """Yield a record per batch; where a process died, one for that case, and the rest of its batch is tried again."""
+    KINDS[kind].samples()  # made once, here
+    batches = [numbers[at : at + _BATCH] for at in range(0, len(numbers), _BATCH)]
+    while batches:
+        batch = batches.pop(0)
+        record, last, status = _in_child(kind, batch, seed, keep)
+        if record is None:
+            at = batch.index(last)
+            batches[:0] = [part for part in (batch[:at], batch[at + 1 :]) if part]
+            record = _died(kind, last, seed, keep, status)
+        yield record
+
+
+def _in_child(kind: str, batch: range, seed: int, keep: Path) -> tuple[FuzzRecord | None, int, int | None]:
+    """Try a batch in a process; return its record (None: it died), the last case that it began, and how it ended."""
+    context = get_context("fork")
+    at = context.Value("q", batch[0])
+    receiver, sender = context.Pipe(duplex=False)
+    child = context.Process(target=_try, args=(kind, batch, seed, keep, sender, at))
+    child.start()
+    sender.close()
+    record = _received(receiver)
+    child.join()
+    return record, at.value, child.exitcode
+
+
+def _try(kind: str, batch: range, seed: int, keep: Path, sender: Any, at: Any) -> None:
+    def begin(number: int) -> None:
+        at.value = number
+
+    sender.send(fuzz(kind, batch, seed, keep, begin=begin))
+    sender.close()
+
+
+def _received(receiver: Any) -> FuzzRecord | None:
+    try:
+        found: FuzzRecord = receiver.recv()
+    except EOFError:
+        return None
+    return found
+
+
+def _died(kind: str, number: int, seed: int, keep: Path, status: int | None) -> FuzzRecord:
+    name, content = case(KINDS[kind], seed, number)
+    how = f"the process ended with {status}"
+    broken = Broken(kind, number, seed, how, kept(keep, kind, number, name, content, how))
+    return FuzzRecord(kind, 1, 0, 0, (broken,), how)
+
+
+
+if __name__ == "__main__":
+    sys.exit(main())
