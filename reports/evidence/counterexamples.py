@@ -42,7 +42,7 @@ def printed_formula() -> Counterexample:
     sentence = (
         f"The formula as printed gains {gain:.2g} of the kinetic energy, in exact rationals, on {case.contacts} rows "
         f"of {case.coordinates} coordinates with e = {case.restitution:g}. The kit found and shrank it by itself; of "
-        f"{report.impacts} random impacts {verdict.failures} gained energy, the largest {verdict.largest:.2g}."
+        f"{verdict.checked} impacts {verdict.failures} gained energy, the largest {verdict.largest:.2g}."
     )
     given = (*_arrays(case), ("v⁺ as computed", _text(answer)), ("v⁺ exact, rounded", _text(exact)))
     return Counterexample("gram_pinv", verdict.statement, sentence, given, report.counterexample_test)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,9 @@ _NEAR = ("nearly dependent",) * 3
 ROW_KINDS = ("generic", "kinetic", "dependent", "scaled", "copies", "zeros", "none", "cradle", *_NEAR)
 VELOCITY_KINDS = ("normal", "kinetic normal", "light direction", "grazing", "unseen")
 RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
+# W = J M⁻¹ Jᵀ of rows this close has singular values down to closeness²: an inverse of W errs by ε / closeness², 1e-6
+# to 1e-3, and numpy's cutoff of 1e-15 keeps them. Half of the errors are gains, whichever BLAS rounds.
+ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
 
 
 def draw_case(rng: np.random.Generator, largest_condition: float = 1e8, largest_size: int = 10) -> ImpactCase:
@@ -30,6 +34,19 @@ def draw_case(rng: np.random.Generator, largest_condition: float = 1e8, largest_
     translations = np.ones((1, d)) if rows_kind == "cradle" else None
     name = f"{mass_kind} mass, {rows_kind} rows{closeness}, {velocity_kind} velocity"
     return ImpactCase(mass, rows, v, e, name, translations)
+
+
+def adverse_cases(rng: np.random.Generator) -> Iterator[ImpactCase]:
+    """Yield the elastic impacts that break a formula through the inverse of W under every BLAS.
+
+    Nothing here passes through BLAS: a seed gives the same bits on every processor.
+    """
+    for k in range(ADVERSE):
+        d = 2 + k % 3
+        closeness = 10.0 ** -rng.uniform(*ADVERSE_CLOSENESS)
+        rows = rng.normal(size=d) + closeness * rng.normal(size=(d, d))
+        mass = np.diag(rng.uniform(0.1, 1.0, size=d))
+        yield ImpactCase(mass, rows, rng.normal(size=d), 1.0, f"diagonal mass, {d} rows within {closeness:.0e}")
 
 
 def _one_of(rng: np.random.Generator, kinds: tuple[str, ...]) -> str:

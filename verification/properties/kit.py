@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,7 +12,7 @@ import numpy as np
 from reference.one_thread import one_thread
 from verification.properties.bounds import KIT, Bounds
 from verification.properties.case import ImpactCase, Resolver
-from verification.properties.families import draw_case, with_unequal_restitution
+from verification.properties.families import ADVERSE, adverse_cases, draw_case, with_unequal_restitution
 from verification.properties.laws import LAWS, UNEQUAL_LAWS
 from verification.properties.passivity_report import LawVerdict, PassivityReport
 from verification.properties.pasteable import name_of
@@ -44,7 +44,7 @@ def check_passivity(
     resolver : called as resolver(mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution) with
         float64 arrays (copies; c = 0 included) and one e in [−1, 1] for all rows, each an equality; returns v⁺
         as an array or as an object with `.velocity`.
-    impacts : random impacts drawn by numpy.
+    impacts : random impacts drawn by numpy. `families.ADVERSE` more come first: elastic ones on nearly equal rows.
     seed : of the draw; the same seed gives the same impacts.
     search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
     bounds : tolerances; `verification.properties.bounds`.
@@ -88,33 +88,39 @@ class _Draw:
 
 def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
-    """Put every impact to every law; return how many there was time for."""
-    rng, other = np.random.default_rng(draw.seed), np.random.default_rng([draw.seed, 1])
-    unequal = any(name in UNEQUAL_LAWS for name in tallies)
-    for done in range(draw.impacts):
-        case = draw_case(rng, draw.largest_condition)
-        mixed = with_unequal_restitution(other, case) if unequal else case
+    """Put every impact to every law; return for how many random ones there was time."""
+    for done, (case, mixed) in enumerate(_drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)), 1 - ADVERSE):
         for name, tally in tallies.items():
             if time.monotonic() > ends:
-                return done
+                return max(0, done - 1)
             tally.add(mixed if name in UNEQUAL_LAWS else case, resolver, bounds)
-        if progress is not None:
-            progress(done + 1, draw.impacts)
+        if progress is not None and done > 0:
+            progress(done, draw.impacts)
     return draw.impacts
+
+
+def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[ImpactCase, ImpactCase]]:
+    """Yield the adverse impacts, then the random ones: each with one e, and with unequal ones if that is asked for."""
+    rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
+    for case in adverse_cases(adverse):
+        yield case, with_unequal_restitution(adverse, case) if unequal else case
+    for _ in range(draw.impacts):
+        case = draw_case(rng, draw.largest_condition)
+        yield case, with_unequal_restitution(other, case) if unequal else case
 
 
 def _counterexample(
     broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float
 ) -> ImpactCase | None:
-    """The smallest one found: by hypothesis, else the worst one drawn, shrunk as far as there is time."""
+    """The smallest one found: by hypothesis, else the largest failure drawn, shrunk as far as there is time."""
     unequal = broken.law in UNEQUAL_LAWS
     for least in (NOTABLE, 0.0):
         fails = partial(_fails, broken.law, resolver, bounds, least, ends)
         found = search_counterexample(fails, search, seed, unequal) if search and time.monotonic() < ends else None
+        if found is None and broken.largest_case is not None and fails(broken.largest_case):
+            found = broken.largest_case
         if found is not None:
-            return found
-        if broken.worst is not None and broken.worst_case is not None and not broken.worst.value < least:
-            return shrink(broken.worst_case, fails)
+            return shrink(found, fails)
     return None
 
 

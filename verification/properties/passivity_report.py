@@ -19,6 +19,7 @@ class LawVerdict:
     checked, failures : impacts the law applied to, and those that broke it.
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
+    largest_case : the impact that breaks the law with the largest residual; None if none does.
     fault : first complaint where the resolver raised or returned nothing usable.
     """
 
@@ -29,6 +30,7 @@ class LawVerdict:
     worst: LawResidual | None
     worst_case: ImpactCase | None
     largest: float
+    largest_case: ImpactCase | None = None
     fault: str = ""
 
     @property
@@ -49,7 +51,7 @@ class PassivityReport:
 
     Attributes
     ----------
-    impacts : impacts that every law was tried on.
+    impacts : random impacts that every law was tried on, after `families.ADVERSE` adverse ones.
     unfinished : why these are fewer than were asked for; empty if they are not.
     counterexample, counterexample_law : the smallest one found, of the first broken law; None if there is none.
     tested : the resolver, for the import line of the pasted test.

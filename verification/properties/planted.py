@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
+from reference.exact import exact_impact
 from verification.properties.case import Floats, Resolver
 from verification.properties.sound import RANK_CUT, back, projecting, row_space, sound_resolver, whitened
+
+TOO_MUCH = Fraction(10001, 10000)  # of the impulse that e asks for
 
 
 def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -124,6 +129,13 @@ def absolute_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 def nearly_elastic(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Loses 1e-4 of what it should return."""
     return projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))
+
+
+def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Returns 1e-4 more than it should; the outcome of exact rationals, rounded once: the same under every BLAS."""
+    before = [Fraction(x) for x in v.tolist()]
+    exact = exact_impact(M, J, v, e).velocity
+    return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
 
 
 def one_gradient_step(M: Floats, J: Floats, v: Floats, e: float) -> Floats:

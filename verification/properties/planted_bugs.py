@@ -52,4 +52,5 @@ PLANTED_BUGS: dict[str, PlantedBug] = {
     "writes_on_its_arguments": _plain(planted.writes_on_its_arguments, "arguments"),
     "gives_up": _plain(planted.gives_up, "kinetic_energy"),
     "stale_jacobian": PlantedBug(planted.makes_stale_jacobian, "restitution"),
+    "returns_too_much": _plain(planted.returns_too_much, "kinetic_energy"),
 }

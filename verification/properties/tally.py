@@ -25,6 +25,8 @@ class Tally:
     largest: float = -np.inf
     worst: LawResidual | None = None
     worst_case: ImpactCase | None = field(default=None, repr=False)
+    largest_failure: float = -np.inf
+    largest_case: ImpactCase | None = field(default=None, repr=False)
 
     def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
         """Try one impact."""
@@ -37,11 +39,13 @@ class Tally:
         self.largest = max(self.largest, residual.value)
         if self.worst is None or residual.ratio > self.worst.ratio:
             self.worst, self.worst_case = residual, case
+        if not residual.passed and (self.largest_case is None or residual.value > self.largest_failure):
+            self.largest_failure, self.largest_case = residual.value, case
 
     def verdict(self) -> LawVerdict:
         """What became of it."""
         return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.fault)
+                          self.largest, self.largest_case, self.fault)
 
 
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from verification.properties import bulk_impacts
+from iapb import resolve_impact
+from reference.exact import relative_energy_gain
+from verification.properties import ImpactCase, bulk_impacts
+from verification.properties.bounds import FACTORED
 
 DEPTH = 2000
 
@@ -21,13 +24,23 @@ def test_the_gain_stays_below_ten_d_eps_root_kappa() -> None:
 
 def test_without_the_clamp_only_the_bound_of_cholesky_is_reached() -> None:
     study = bulk_impacts(DEPTH, seed=0, clamp=False)
-    assert study.above_bound > 0
     assert (study.gain <= np.maximum(study.bound, study.cholesky_bound)).all()
 
 
-def test_the_printed_formula_is_far_above_the_bound() -> None:
-    study = bulk_impacts(150, seed=2, method="gram_pinv")
-    assert study.gain.max() > 1e-6 and study.worst_ratio > 1e3
+def test_the_clamp_is_what_keeps_the_bound() -> None:
+    """An impact of written numbers and a resolver without BLAS: the same gain on every processor."""
+    T, D = np.array([[1.0, 0.0, 0.0], [-2.0, 1.0, 0.0], [-2.0, 1.0, 1.0]]), np.array([1e-3, 1e-11, 1e-11])
+    M = np.sum(T[:, None, :] * D * T[None, :, :], axis=2)
+    J, v = np.array([[1.0, 0.0, 3.0]]), np.array([0.0, -2.0, 2.0])
+    bound = FACTORED.energy_gain(ImpactCase(M, J, v, 1.0))
+    gains = [relative_energy_gain(M, v, resolve_impact(M, J, v, 1.0, clamp=clamp).velocity) for clamp in (False, True)]
+    assert gains[0] > 10.0 * bound and gains[1] <= bound
+
+
+def test_the_printed_formula_exceeds_the_bound() -> None:
+    """By how much is up to the BLAS; in some two of a hundred impacts by more than the gain's own error."""
+    study = bulk_impacts(1500, seed=2, method="gram_pinv")
+    assert np.sum(study.gain - study.gain_error > study.bound) > 5
 
 
 def test_the_tables_add_up() -> None:
