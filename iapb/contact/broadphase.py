@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +69,7 @@ def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
     if kind in (CIRCLE, POLYGON):
         corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
         middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        reach = float(np.linalg.norm(corners - middle, axis=1).max())
+        reach = max(math.hypot(x, y) for x, y in (corners - middle).tolist())
         return np.array([*middle, 0.0]), reach + float(shapes.radius[i])
-    extent = float(shapes.radius[i]) if kind == SPHERE else float(np.linalg.norm(shapes.half_size[i]))
+    extent = float(shapes.radius[i]) if kind == SPHERE else math.hypot(*shapes.half_size[i].tolist())
     return shapes.center[i].copy(), extent

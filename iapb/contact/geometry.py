@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.dense import product
+from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
@@ -110,8 +112,8 @@ def box(size: ArrayLike, center: ArrayLike = (0.0, 0.0), angle: float = 0.0, bod
     if not (width > 0.0 and height > 0.0):
         raise ArgumentError("size", size, "two side lengths > 0")
     corners = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
-    cos, sin = math.cos(angle), math.sin(angle)
-    return Polygon(corners @ np.array([[cos, sin], [-sin, cos]]) + _plane_vector("center", center), body)
+    sin, cos = sine_cosine(float(angle))
+    return Polygon(product(corners, [[cos, sin], [-sin, cos]]) + _plane_vector("center", center), body)
 
 
 def make_shapes(descriptions: Sequence[Shape]) -> Shapes:

@@ -24,7 +24,7 @@ from iapb.contact.impact_methods import (
     svd,
 )
 from iapb.contact.impact_problem import ImpactInput, check_input
-from iapb.contact.kernels.compensated import kinetic_energies
+from iapb.double_double import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
 from iapb.names import one_of
 

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.contact.impact_laws_input import FrictionInput, check_friction
-from iapb.contact.kernels.compensated import kinetic_energies
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction, make_friction_work
 from iapb.contact.kernels.unilateral import make_push_work
+from iapb.double_double import kinetic_energies
 from iapb.errors import RangeError
 
 Floats = NDArray[np.float64]

@@ -22,6 +22,7 @@ from iapb.contact.kernels.impact_unequal import poisson_impact
 from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
 from iapb.contact.kernels.projector import unit_columns
 from iapb.contact.kernels.unilateral import make_push_work
+from iapb.dense import product, solve
 from iapb.errors import ArgumentError, SolverError
 
 Floats = NDArray[np.float64]
@@ -87,7 +88,7 @@ def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
     impulses = size * _least_norm_of(work, work.length[:c] * size, rank, work.change)
     if (size == 1.0).all():
         return impulses
-    left = work.change - (work.rows[:, :c] * work.length[:c]) @ impulses
+    left = work.change - product(work.rows[:, :c] * work.length[:c], impulses)
     return impulses + _least_norm_of(work, work.length[:c], rank, left)
 
 
@@ -112,19 +113,22 @@ def _from_impulses(problem: ImpactInput, impulses: NDArray[np.floating], rank: i
     work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
     v_plus, momentum = np.empty(d), np.empty(d)
-    work.change[:] = (rows * work.length[: problem.contacts, None]).T @ impulses
+    work.change[:] = product((rows * work.length[: problem.contacts, None]).T, impulses)
     clamp = apply_change(problem.mass_matrix, problem.lower, problem.velocity, clamped, work, v_plus, momentum)
     return Whitened(v_plus, momentum, clamp * impulses, rank, clamp)
 
 
 def _delassus(problem: ImpactInput, size: float | Floats = 1.0) -> tuple[Floats, Floats]:
-    """W = J M⁻¹ Jᵀ and γ⁻ = J v⁻, of the scaled rows times `size`."""
+    """W = J M⁻¹ Jᵀ and γ⁻ = J v⁻, of the scaled rows times `size`; by LAPACK."""
     J = problem.contact_jacobian * np.reshape(size, (-1, 1))
     return J @ np.linalg.solve(problem.mass_matrix, J.T), J @ problem.velocity
 
 
 def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(20)-(21) to the letter: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size."""
+    """(20)-(21) to the letter: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size.
+
+    A comparison: LAPACK's last bits, which W's condition number amplifies, depend on the processor.
+    """
     if problem.contacts == 0:
         return factored(problem, 0, clamped, tolerance)
     size = _row_size(problem)
@@ -137,7 +141,10 @@ def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float
 
 
 def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(19): p = −(1 + e) W⁻¹ J v⁻ by Cholesky, for independent rows."""
+    """(19): p = −(1 + e) W⁻¹ J v⁻ by Cholesky, for independent rows.
+
+    A comparison: by LAPACK, whose last bits depend on the processor.
+    """
     if problem.contacts == 0:
         return factored(problem, 0, clamped, tolerance)
     W, gamma = _delassus(problem)
@@ -157,15 +164,20 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
     """p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps some of its approach, none gains energy."""
     if problem.contacts == 0:
         return factored(problem, 0, clamped, tolerance)
-    W, gamma = _delassus(problem)
+    work = _prepared(problem)
+    rows = _whitened_rows(problem, work) * work.length[: problem.contacts, None]
+    W, gamma = product(rows, rows.T), product(problem.contact_jacobian, problem.velocity)
     share = DAMPING if tolerance is None else tolerance
     regular = W + share * max(float(np.max(np.diag(W))), float(np.finfo(float).tiny)) * np.eye(len(W))
-    impulses = -(1.0 + problem.restitution) * np.linalg.solve(regular, gamma)
+    impulses = -(1.0 + problem.restitution) * solve(regular, gamma)
     return _from_impulses(problem, impulses, problem.contacts, clamped)
 
 
 def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(21) with the projector from the truncated singular value decomposition of unit-scaled A."""
+    """(21) with the projector from the truncated singular value decomposition of unit-scaled A.
+
+    A comparison: by LAPACK, whose last bits depend on the processor.
+    """
     work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
     v_plus, momentum = np.empty(d), np.empty(d)

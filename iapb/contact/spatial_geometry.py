@@ -99,9 +99,9 @@ def frame_along(name: str, normal: Floats) -> Floats:
     if largest == 0.0:
         raise ArgumentError(name, normal.tolist(), "a vector longer than 0")
     z = normal / largest
-    z = z / math.sqrt(float(z @ z))
+    z = z / math.sqrt(sum(x * x for x in z.tolist()))
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x = x / math.sqrt(float(x @ x))
+    x = x / math.sqrt(sum(y * y for y in x.tolist()))
     return np.column_stack([x, np.cross(z, x), z])
 
 

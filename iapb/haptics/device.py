@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.contact.contacts import finite_vector
+from iapb.contact.kernels.cholesky import cholesky, solve_mass
 from iapb.errors import ArgumentError
 
 Floats = NDArray[np.float64]
@@ -84,7 +85,7 @@ class SimulatedDevice:
         self.q = finite_vector("q", q, size).copy()
         self.v = np.zeros(size) if v is None else finite_vector("v", v, size).copy()
         self.hand_force = np.zeros(size)
-        self._inverse_mass = _inverse(mass)
+        self._lower = _cholesky(mass)
         if not (np.isfinite(dt) and dt > 0.0):
             raise ArgumentError("dt", dt, "a step length > 0")
         if delay < 0:
@@ -106,7 +107,9 @@ class SimulatedDevice:
         self._forces.append(np.clip(commanded, -self._limit, self._limit))
         total = self.hand_force + self._forces.popleft() - self._damping * self.v
         before = self._sensed()
-        self.v = self.v + self._dt * (self._inverse_mass @ total)
+        acceleration = np.empty_like(total)
+        solve_mass(self._lower, total, acceleration)
+        self.v = self.v + self._dt * acceleration
         self.q = self.q + self._dt * self.v
         sensed = self._sensed()
         velocity = np.where(self._resolution > 0.0, (sensed - before) / self._dt, self.v)
@@ -117,17 +120,16 @@ class SimulatedDevice:
         return np.where(step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q)
 
 
-def _inverse(mass_matrix: Floats) -> Floats:
-    """Inverse of a mass matrix, or an error that names it."""
+def _cholesky(mass_matrix: Floats) -> Floats:
+    """Lower factor of a mass matrix, or an error that names it."""
     expected = "a finite symmetric positive definite matrix (d, d)"
     square = mass_matrix.ndim == 2 and mass_matrix.shape[0] == mass_matrix.shape[1]
     if not square or not np.all(np.isfinite(mass_matrix)) or not np.array_equal(mass_matrix, mass_matrix.T):
         raise ArgumentError("mass_matrix", mass_matrix, expected)
-    try:
-        np.linalg.cholesky(mass_matrix)
-    except np.linalg.LinAlgError:
-        raise ArgumentError("mass_matrix", mass_matrix, expected) from None
-    return np.asarray(np.linalg.inv(mass_matrix), np.float64)
+    lower = np.zeros_like(mass_matrix)
+    if cholesky(mass_matrix, lower) != 0:
+        raise ArgumentError("mass_matrix", mass_matrix, expected)
+    return lower
 
 
 def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: float) -> Floats:

@@ -6,12 +6,15 @@ device as the forces w_j p/T in the n steps after it. So each carries exactly th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.elementary import sine
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 
@@ -37,7 +40,7 @@ MATERIALS = {
 }
 
 PULSE_SECONDS = 0.008  # of the braking pulse: about the fastest that a hand feels as one blow
-_FADED = 1e-3  # a sinusoid ends where its envelope has fallen to this share
+_FADED = 6.907755278982137  # -ln 0.001: a sinusoid ends where its envelope has fallen to a thousandth
 
 
 def step_weights(dt: float) -> Floats:
@@ -48,7 +51,7 @@ def step_weights(dt: float) -> Floats:
 def brake_weights(dt: float) -> Floats:
     """A braking pulse: half a sine over PULSE_SECONDS, as a damper that is very hard and soon gone."""
     count = max(1, round(PULSE_SECONDS / dt))
-    return _summing_to_one(np.sin(np.pi * (np.arange(count) + 0.5) / count))
+    return _summing_to_one(_sines(np.pi * (np.arange(count) + 0.5) / count))
 
 
 def ring_weights(material: str) -> Callable[[float], Floats]:
@@ -60,13 +63,13 @@ def ring_weights(material: str) -> Callable[[float], Floats]:
     attack, decay, frequency = MATERIALS[material]
 
     def weights(dt: float) -> Floats:
-        time = dt * np.arange(1, max(2, round(-np.log(_FADED) / decay / dt)))
+        time = dt * np.arange(1, max(2, round(_FADED / decay / dt)))
         if 2.0 * frequency * dt > 1.0:
             raise ArgumentError("waveform", f"ring-{material}", f"a material below half the rate: {frequency:g} Hz "
                                                                f"cannot be rendered at {1.0 / dt:g} Hz")
-        envelope = np.exp(-decay * time)
-        ringing = envelope * np.sin(2.0 * np.pi * frequency * time)
-        ringing -= envelope * (ringing.sum() / envelope.sum())  # no momentum of its own
+        envelope = np.array([float(Decimal(x).exp()) for x in (-decay * time).tolist()])  # integer arithmetic: no libm
+        ringing = envelope * _sines(2.0 * np.pi * frequency * time)
+        ringing -= envelope * (math.fsum(ringing) / math.fsum(envelope))  # no momentum of its own
         return _summing_to_one(np.concatenate([[1.0], attack * dt * ringing]))
 
     return weights
@@ -92,5 +95,9 @@ def waveform_weights(name: str, dt: float) -> Floats:
     return WAVEFORMS[name](dt)
 
 
+def _sines(angles: NDArray[np.floating]) -> Floats:
+    return np.array([sine(angle) for angle in angles.tolist()])
+
+
 def _summing_to_one(weights: Floats) -> Floats:
-    return weights / weights.sum()
+    return weights / math.fsum(weights)

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import finite_array, float_rows
-from iapb.mechanics.kernels.energy import displacements_along, energies_along
+from iapb.mechanics.kernels.energy import displacements_along, energies_along, impact_loss
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 
@@ -70,12 +70,11 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
 
     -(v . P + P . M^-1 P / 2), which is exact whatever part of the impulse the clamp or a limit removed.
     """
-    losses = np.zeros(len(impulse))
+    losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
     mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
     for k in np.flatnonzero(np.any(impulse, axis=1)):
         matrix = mechanism.mass_matrix(q[k]) if mass_matrix is None else mass_matrix
-        change = np.linalg.solve(matrix, impulse[k])
-        losses[k] = -impulse[k] @ (v[k] + 0.5 * change)
+        losses[k] = impact_loss(matrix, lower, v[k], impulse[k], change)
     return losses
 
 

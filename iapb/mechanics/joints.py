@@ -8,6 +8,7 @@ planar body has a constant mass matrix.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,4 +134,4 @@ class Joint:
         """The axis with length one; scaled first, so that tiny and huge axes neither vanish nor overflow."""
         axis = np.asarray(self.axis, dtype=np.float64)
         axis = axis / np.abs(axis).max()
-        return axis / np.sqrt(axis @ axis)
+        return axis / math.sqrt(sum(x * x for x in axis.tolist()))

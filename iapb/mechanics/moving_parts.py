@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.dense import product
 from iapb.mechanics.kernels.arrays import MechanismArrays
 
 Floats = NDArray[np.float64]
@@ -58,26 +59,35 @@ def _placement(m: MechanismArrays, b: int, rotation: Floats, position: Floats) -
     parent = int(m.parent[b])
     if parent < 0 or m.v_count[parent] > 0:
         return m.placement_rotation[b], m.placement_position[b]
-    place = position[parent] + rotation[parent] @ m.placement_position[b]
-    return rotation[parent] @ m.placement_rotation[b], place
+    place = position[parent] + product(rotation[parent], m.placement_position[b])
+    return product(rotation[parent], m.placement_rotation[b]), place
+
+
+def turned_inertia(rotation: Floats, inertia: Floats) -> Floats:
+    """R I Rᵀ: the inertia in the axes that R turns to."""
+    return product(product(rotation, inertia), rotation.T)
+
+
+def point_inertia(place: Floats) -> Floats:
+    """|r|² 1 − r rᵀ: the inertia about the origin of a unit mass at r."""
+    return product(place[None], place) * np.eye(3) - np.outer(place, place)
 
 
 def _mass_properties(
     m: MechanismArrays, body: int, members: NDArray[np.int64], rotation: Floats, position: Floats
 ) -> tuple[float, Floats, Floats]:
     """Mass, centre of mass and inertia about it of a part, in its first body's frame: sums of positive terms."""
-    mass = float(m.mass[members].sum())
+    mass = sum(m.mass[members].tolist())
     if len(members) == 1 or mass == 0.0:
-        turned = [rotation[b] @ m.inertia[b] @ rotation[b].T for b in members]
+        turned = [turned_inertia(rotation[b], m.inertia[b]) for b in members]
         return (
             mass,
             m.center_of_mass[body],
             m.inertia[body] if len(members) == 1 else sum(turned, np.zeros((3, 3))),
         )
-    centers = np.array([position[b] + rotation[b] @ m.center_of_mass[b] for b in members])
-    center = m.mass[members] @ centers / mass
+    centers = np.array([position[b] + product(rotation[b], m.center_of_mass[b]) for b in members])
+    center = product(centers.T, m.mass[members]) / mass
     inertia = np.zeros((3, 3))
     for b, place in zip(members, centers - center, strict=True):
-        spread = place @ place * np.eye(3) - np.outer(place, place)
-        inertia += rotation[b] @ m.inertia[b] @ rotation[b].T + m.mass[b] * spread
+        inertia += turned_inertia(rotation[b], m.inertia[b]) + m.mass[b] * point_inertia(place)
     return mass, center, inertia

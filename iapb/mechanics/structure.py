@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from iapb.dense import product
 from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2, SPHERICAL, MechanismArrays
+from iapb.mechanics.moving_parts import point_inertia, turned_inertia
 
 
 def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
@@ -29,12 +31,11 @@ def _mass_properties(m: MechanismArrays, part: list[int]) -> tuple[np.ndarray, n
     for b in part:
         if b != part[0]:
             parent = int(m.parent[b])
-            rotation[b] = rotation[parent] @ m.placement_rotation[b]
-            position[b] = position[parent] + rotation[parent] @ m.placement_position[b]
-        center = position[b] + rotation[b] @ m.center_of_mass[b]
+            rotation[b] = product(rotation[parent], m.placement_rotation[b])
+            position[b] = position[parent] + product(rotation[parent], m.placement_position[b])
+        center = position[b] + product(rotation[b], m.center_of_mass[b])
         moment += m.mass[b] * center
-        spread = center @ center * np.eye(3) - np.outer(center, center)
-        inertia += rotation[b] @ m.inertia[b] @ rotation[b].T + m.mass[b] * spread
+        inertia += turned_inertia(rotation[b], m.inertia[b]) + m.mass[b] * point_inertia(center)
     return moment, inertia
 
 

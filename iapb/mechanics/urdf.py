@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
+from iapb.mechanics.moving_parts import turned_inertia
 from iapb.mechanics.urdf_elements import elements_by_name, numbers_in, origin_of, parse_robot, where_of
 from iapb.names import one_of
 
@@ -100,7 +101,7 @@ def _inertial(link: ElementTree.Element) -> _Inertial:
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     }
     matrix = np.array([[entries["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
-    turned = rotation @ matrix @ rotation.T
+    turned = turned_inertia(rotation, matrix)
     value = float(numbers_in(f"{where} mass", mass.get("value"), 1)[0])
     if value < 0.0:
         raise ArgumentError(f"{where} mass", value, "at least 0 kg")

@@ -6,7 +6,6 @@ processor.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from iapb.contact import geometry, spatial_geometry
 from iapb.contact.geometry import Shapes, candidate_pairs
+from iapb.dense import product
+from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
@@ -107,7 +108,7 @@ def _turn(placed: Any) -> Floats:
     """Return the rotation of something with a placement: (3, 3) in space, (2, 2) in the plane."""
     if hasattr(placed, "rpy"):
         return rotation_of(placed.rpy)
-    cos, sin = math.cos(placed.angle), math.sin(placed.angle)
+    sin, cos = sine_cosine(float(placed.angle))
     return np.array([[cos, -sin], [sin, cos]])
 
 
@@ -144,7 +145,7 @@ def _frames(scene: Scene) -> list[_Frame]:
         rotation, shift, link = np.eye(n), np.zeros(n), owner
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
-            rotation, shift = _product(turn, rotation), _product(turn, shift) + scene.bodies[link].origin
+            rotation, shift = product(turn, rotation), product(turn, shift) + scene.bodies[link].origin
             link = parents[link]
         frames.append(_Frame(-1, rotation, shift) if link < 0 else _Frame(owner, np.eye(n), np.zeros(n)))
     return [*frames, _Frame(-1, np.eye(n), np.zeros(n))]
@@ -156,29 +157,20 @@ def _described(shape: Any, frame: _Frame) -> Any:
         return geometry.HalfPlane(shape.point, shape.normal)
     if shape.kind == "half_space":
         return spatial_geometry.HalfSpace(shape.point, shape.normal)
-    center = _product(frame.rotation, np.array(shape.center)) + frame.shift
+    center = product(frame.rotation, shape.center) + frame.shift
     if shape.kind == "circle":
         return geometry.Circle(shape.radius, center, frame.body)
     if shape.kind == "sphere":
         return spatial_geometry.Sphere(shape.radius, center, frame.body)
-    turn = _product(frame.rotation, _turn(shape))
+    turn = product(frame.rotation, _turn(shape))
     if len(turn) == 3:
         return spatial_geometry.SpatialBox(shape.size, center, turn, frame.body)
     corners = _box_corners(*shape.size) if shape.kind == "box" else np.array(shape.vertices)
-    return geometry.Polygon(_product(corners, turn.T) + center, frame.body)
+    return geometry.Polygon(product(corners, turn.T) + center, frame.body)
 
 
 def _box_corners(width: float, height: float) -> Floats:
     return 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
-
-
-def _product(a: Floats, b: Floats) -> Floats:
-    """Return the product of a matrix with a matrix or vector, terms added from first to last, without BLAS."""
-    columns = b.reshape(len(b), -1)
-    total = a[:, :1] * columns[0]
-    for k in range(1, len(b)):
-        total = total + a[:, k : k + 1] * columns[k]
-    return total.reshape(len(a), *b.shape[1:])
 
 
 def restitution_by_shape(scene: Scene) -> Floats:

@@ -110,10 +110,12 @@ def urdf_path(text: str, folder: Path) -> Path:
 
 
 def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[str, Any]:
+    from iapb.dense import product  # brings numba along
+
     rotation, origin = link.placement
     if link.parent is None:
         turn = rotation_of(robot.rpy)
-        rotation, origin = turn @ rotation, turn @ origin + np.array(robot.origin)
+        rotation, origin = product(turn, rotation), product(turn, origin) + np.array(robot.origin)
     body = {
         "name": body_name(robot.name, link.name),
         "parent": "world" if link.parent is None else body_name(robot.name, link.parent),
@@ -139,7 +141,9 @@ def body_name(robot: str, link: str) -> str:
 
 def rotation_of(rpy: Any) -> np.ndarray:
     """Return the rotation (3, 3) by roll, pitch, yaw about fixed x, y, z: R_z R_y R_x."""
-    (cr, cp, cy), (sr, sp, sy) = (tuple(f(angle) for angle in rpy) for f in (math.cos, math.sin))
+    from iapb.elementary import sine_cosine  # brings numba along
+
+    (sr, cr), (sp, cp), (sy, cy) = (sine_cosine(float(angle)) for angle in rpy)
     return np.array([
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
@@ -149,11 +153,13 @@ def rotation_of(rpy: Any) -> np.ndarray:
 
 def angles_of(rotation: np.ndarray) -> tuple[float, float, float]:
     """Return roll, pitch, yaw [rad] of a rotation; at pitch ±90° the roll is taken as zero."""
+    from iapb.elementary import arc_tangent  # brings numba along
+
     across = math.hypot(rotation[0, 0], rotation[1, 0])
-    pitch = math.atan2(-rotation[2, 0], across)
+    pitch = arc_tangent(-rotation[2, 0], across)
     if across < 1e-9:  # x points up or down: only the sum of roll and yaw is determined
-        return 0.0, pitch, math.atan2(-rotation[0, 1], rotation[1, 1])
-    return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
+        return 0.0, pitch, arc_tangent(-rotation[0, 1], rotation[1, 1])
+    return arc_tangent(rotation[2, 1], rotation[2, 2]), pitch, arc_tangent(rotation[1, 0], rotation[0, 0])
 
 
 def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, int]]) -> tuple[Any, list[Mistake]]:

@@ -14,6 +14,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.friction import along, friction_sweeps
 from iapb.contact.kernels.minimum_norm import add_minimum_norm, minimum_norm_factors, subtract_pushed
 from iapb.contact.kernels.unilateral import push_only
+from iapb.elementary import hypotenuse
 
 # What has not settled by then swings or grows without end (no solution), or no non-negative impulses exist. Where the
 # limits settle it takes 3 to 30 rounds, as a rule.
@@ -72,7 +73,7 @@ def _inertia(free, first, size):
         return xx
     y = free[first + 1]
     yy, xy = along(y, y), along(x, y)
-    return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
+    return 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
 
 
 @kernel

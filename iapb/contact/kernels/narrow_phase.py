@@ -22,6 +22,7 @@ from iapb.contact.kernels.shape_frames import (
     world_point,
 )
 from iapb.contact.kernels.spatial_pairs import spatial_pair
+from iapb.elementary import hypotenuse
 
 
 @kernel
@@ -89,7 +90,7 @@ def circles(shapes, a, b, R, p, margin, buffer, count):
     reach = radius_a + radius_b + margin
     if abs(dx) > reach or abs(dy) > reach:
         return count
-    distance = math.hypot(dx, dy)
+    distance = hypotenuse(dx, dy)
     gap = distance - (radius_a + radius_b)
     if gap > margin:
         return count
@@ -137,7 +138,7 @@ def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
         j = i + 1 if i + 1 < count else 0
         ux, uy = shapes.vertices[first + i, 0], shapes.vertices[first + i, 1]
         ex, ey = shapes.vertices[first + j, 0] - ux, shapes.vertices[first + j, 1] - uy
-        length = math.hypot(ex, ey)
+        length = hypotenuse(ex, ey)
         distance = ((x - ux) * ey - (y - uy) * ex) / length
         if distance > best:
             best, edge, nx, ny = distance, i, ey / length, -ex / length
@@ -161,5 +162,5 @@ def _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny):
         corner, dx, dy = following, x - wx, y - wy
     else:
         return nx, ny, best, vertex_feature(1, 0, edge)
-    distance = math.hypot(dx, dy)
+    distance = hypotenuse(dx, dy)
     return dx / distance, dy / distance, distance, vertex_feature(2, corner, 0)

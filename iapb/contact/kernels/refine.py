@@ -6,7 +6,7 @@ import math
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.cholesky import from_whitened
-from iapb.contact.kernels.compensated import add_product
+from iapb.double_double import add_product
 
 # The factor's error |E| below this share is left to the energy clamp: it moves energy and restitution by as little.
 _FELT = 1e-12

@@ -5,9 +5,10 @@ unit circle or sphere; velocities in body axes (free flyer, planar_se2) follow t
 as Pinocchio does.
 """
 
-from math import atan2, cos, sin, sqrt
+from math import sqrt
 
 from iapb.compiled import kernel
+from iapb.elementary import arc_tangent, sine, sine_cosine
 from iapb.mechanics.kernels.arrays import CONTINUOUS, FIXED, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.vectors import add, cross, dot, scale
 
@@ -22,8 +23,8 @@ def screw_coefficients(angle):
     square = angle * angle
     if angle < SMALL_ANGLE:
         return 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    half = sin(0.5 * angle)
-    return 2.0 * half * half / square, (angle - sin(angle)) / (square * angle)
+    half = sine(0.5 * angle)
+    return 2.0 * half * half / square, (angle - sine(angle)) / (square * angle)
 
 
 @kernel
@@ -37,8 +38,9 @@ def turn_vector(x, y, z, s, a):
 @kernel
 def turn_pair(q, i, angle, out):
     """(cos, sin) at i <- turned by the angle, length restored to one."""
-    c = q[i] * cos(angle) - q[i + 1] * sin(angle)
-    s = q[i + 1] * cos(angle) + q[i] * sin(angle)
+    sin, cos = sine_cosine(angle)
+    c = q[i] * cos - q[i + 1] * sin
+    s = q[i + 1] * cos + q[i] * sin
     length = sqrt(c * c + s * s)
     out[i], out[i + 1] = c / length, s / length
 
@@ -47,8 +49,9 @@ def turn_pair(q, i, angle, out):
 def turn_quaternion(q, i, phi, out):
     """Quaternion at i <- q * exp(phi / 2), phi [rad] a rotation vector in body axes."""
     angle = sqrt(dot(phi, phi))
-    factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin(0.5 * angle) / angle
-    b, t = scale(factor, phi), cos(0.5 * angle)
+    sin, t = sine_cosine(0.5 * angle)
+    factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin / angle
+    b = scale(factor, phi)
     a, s = (q[i], q[i + 1], q[i + 2]), q[i + 3]
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
     scalar = s * t - dot(a, b)
@@ -114,8 +117,8 @@ def quaternion_difference(q0, q1, i):
     scalar = s * t - dot(a, b)
     if scalar < 0.0:  # q and -q are the same rotation: take the shorter way
         vector, scalar = scale(-1.0, vector), -scalar
-    sine = sqrt(dot(vector, vector))
-    factor = 2.0 if sine == 0.0 else 2.0 * atan2(sine, scalar) / sine
+    length = sqrt(dot(vector, vector))
+    factor = 2.0 if length == 0.0 else 2.0 * arc_tangent(length, scalar) / length
     return scale(factor, vector)
 
 
@@ -127,7 +130,8 @@ def inverse_screw(path, phi):
     if angle < SMALL_ANGLE:
         factor = 1.0 / 12.0 + square / 720.0
     else:
-        factor = (1.0 - 0.5 * angle * cos(0.5 * angle) / sin(0.5 * angle)) / square
+        sin, cos = sine_cosine(0.5 * angle)
+        factor = (1.0 - 0.5 * angle * cos / sin) / square
     turned = cross(phi, path)
     return add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
 
@@ -140,7 +144,7 @@ def difference(m, q0, q1, out):
         if kind == FIXED:
             continue
         elif kind == CONTINUOUS:
-            out[k] = atan2(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
+            out[k] = arc_tangent(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
         elif kind == SPHERICAL:
             out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
         elif kind == FREE_FLYER:
@@ -151,7 +155,7 @@ def difference(m, q0, q1, out):
             out[k + 3], out[k + 4], out[k + 5] = phi
         elif kind == PLANAR_SE2:
             c, s, x, y = q0[i + 2], q0[i + 3], q1[i] - q0[i], q1[i + 1] - q0[i + 1]
-            turn = atan2(c * q1[i + 3] - s * q1[i + 2], c * q1[i + 2] + s * q1[i + 3])
+            turn = arc_tangent(c * q1[i + 3] - s * q1[i + 2], c * q1[i + 2] + s * q1[i + 3])
             u = inverse_screw((c * x + s * y, c * y - s * x, 0.0), (0.0, 0.0, turn))
             out[k], out[k + 1], out[k + 2] = u[0], u[1], turn
         else:

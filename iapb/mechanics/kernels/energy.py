@@ -1,6 +1,7 @@
 """Energies and momentum as sums over bodies: no cancellation between large entries of M."""
 
 from iapb.compiled import kernel
+from iapb.contact.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference
 from iapb.mechanics.kernels.dynamics import body_velocities, turned_inertia
 from iapb.mechanics.kernels.kinematics import forward_kinematics
@@ -61,6 +62,17 @@ def energies_along(m, w, q, v, g, kinetic, potential):
         forward_kinematics(m, q[k], w)
         kinetic[k] = kinetic_energy(m, w, v[k])
         potential[k] = potential_energy(m, w, g)
+
+
+@kernel
+def impact_loss(mass_matrix, lower, v, impulse, change):
+    """Return -(v . P + P . M^-1 P / 2) [J], the kinetic energy that the impulse P takes; lower, change: scratch."""
+    cholesky(mass_matrix, lower)
+    solve_mass(lower, impulse, change)
+    total = 0.0
+    for k in range(v.shape[0]):
+        total -= impulse[k] * (v[k] + 0.5 * change[k])
+    return total
 
 
 @kernel

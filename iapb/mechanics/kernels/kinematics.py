@@ -1,8 +1,7 @@
 """Where every body is, and the world axis of every degree of freedom."""
 
-from math import cos, sin
-
 from iapb.compiled import kernel
+from iapb.elementary import sine_cosine
 from iapb.mechanics.kernels.arrays import (
     CONTINUOUS,
     FIXED,
@@ -78,13 +77,15 @@ def move_joint(m, q, w, b):
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
         shift = transform(w.rotation, b, (q[i], q[i + 1], 0.0))
-        turn_about_axis(w, b, (0.0, 0.0, 1.0), cos(q[i + 2]), sin(q[i + 2]))
+        s, c = sine_cosine(q[i + 2])
+        turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
         store(w.position, b, add(load(w.position, b), shift))
     elif kind in (REVOLUTE, CONTINUOUS):
         a = load(m.joint_axis, b)
         store(w.axis, k, transform(w.rotation, b, a))
         if kind == REVOLUTE:
-            turn_about_axis(w, b, a, cos(q[i]), sin(q[i]))
+            s, c = sine_cosine(q[i])
+            turn_about_axis(w, b, a, c, s)
         else:
             turn_about_axis(w, b, a, q[i], q[i + 1])
     elif kind == PRISMATIC:

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.contact.kernels.compensated import (
+from iapb.double_double import (
     add_product,
     kinetic_energies,
     quadratic_forms,
