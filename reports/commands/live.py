@@ -41,9 +41,8 @@ def live(
     from reference.worlds import find_world
     from reports.commands.progress import to_log
     from reports.compiling import compiling_told
-    from reports.live.files import write_live
-    from reports.live.measure import summary
-    from reports.live.setup import live_simulation
+    from reports.live.measure import live_simulation, summary
+    from reports.live.replay import write_live
     from reports.uses import parsed
 
     if not 0.0 < rate < float("inf"):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.planar import body_outlines, half_plane, outline
+from reports.figures.geometry import body_outlines, half_plane, outline
 from reports.figures.style import FORCE, INK, MUTED, PEG, WALL
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from iapb.run import Run
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, is_turned, make_canvas, note
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
-from reports.figures.planar import body_outlines, body_poses, bounds
+from reports.figures.geometry import body_outlines, body_placements, bounds
 from reports.figures.style import BLUE, FORCE, INK, PANEL, styled
 from reports.figures.svg import to_svg
 
@@ -76,7 +76,7 @@ def _picture(run: Run, step: int, values: np.ndarray, key: str) -> str:
 def _hand_arrow(axes: Any, scene: Mapping[str, Any], q: np.ndarray, length: float) -> None:
     hand = scene["hand"]
     force = np.asarray(hand["force"][:2], dtype=float)
-    point = body_poses(scene, q)[hand["body"]].of(hand["point"])
+    point = body_placements(scene, q)[hand["body"]].of(hand["point"])
     arrow(axes, point, length * force / np.hypot(*force))
     note(axes, point, "hand", (-2, -19), color=FORCE)
 

@@ -10,7 +10,7 @@ import numpy as np
 from reports.figures.canvas import arrow, make_canvas, note
 from reports.figures.fig03_energy_loss import CONTACTS, LENGTH
 from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.planar import Pose, body_poses
+from reports.figures.geometry import Placement, body_placements
 from reports.figures.style import BLUE, INK, LINK, MUTED, PAPER, PEG, VERMILION, styled
 from reports.figures.svg import to_svg
 
@@ -34,14 +34,15 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
 
 
 def _picture(scene: Mapping[str, Any]) -> str:
-    poses = list(body_poses(scene).values())[:2]
+    poses = list(body_placements(scene).values())[:2]
     ends = [frame.of((LENGTH, 0.0)) for frame in poses]
-    points = np.vstack([poses[0].origin, *ends])
+    pivot = poses[0].origin[:2]
+    points = np.vstack([pivot, *ends])
     low, high = points.min(axis=0) - (1.25, 0.22), points.max(axis=0) + (1.25, 0.12)
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE)
         axes = make_canvas(drawing, low, high, turned=False)
-        _ground(axes, poses[0].origin)
+        _ground(axes, pivot)
         for number, (frame, end) in enumerate(zip(poses, ends, strict=True), start=1):
             _link(axes, frame, end, number)
         for name, distance in CONTACTS.items():
@@ -55,19 +56,20 @@ def _ground(axes: Any, point: Any) -> None:
     axes.plot([point[0], point[0]], [point[1] - 0.08, point[1]], color=INK, linewidth=2)
 
 
-def _link(axes: Any, frame: Pose, end: Any, number: int) -> None:
+def _link(axes: Any, frame: Placement, end: Any, number: int) -> None:
     """Draw a link as a rounded bar with its joint, its name and its joint velocity."""
-    line = np.vstack([frame.origin, end])
+    start = frame.origin[:2]
+    line = np.vstack([start, end])
     axes.plot(*line.T, color=LINK, linewidth=10, solid_capstyle="round", zorder=2)
     axes.plot(*line.T, color=PEG, linewidth=8, solid_capstyle="round", zorder=2)
-    axes.plot(*frame.origin, "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
+    axes.plot(*start, "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
     note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
-    note(axes, frame.origin, f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
+    note(axes, start, f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
 
 
-def _blow(axes: Any, frame: Pose, name: str, distance: float) -> None:
+def _blow(axes: Any, frame: Placement, name: str, distance: float) -> None:
     """Draw the blow at `distance` along the link, against the motion."""
-    point, normal = frame.of((distance, 0.0)), frame.rotation @ np.array([0.0, -1.0])
+    point, normal = frame.of((distance, 0.0)), -frame.rotation[:2, 1]
     arrow(axes, point - 0.42 * normal, 0.36 * normal, color=_COLORS[name])
     note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=_COLORS[name], ha="right")
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note, scale_bar
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.geometry import body_outlines, bounds
 from reports.figures.numbers import MINUS
-from reports.figures.planar import body_outlines, bounds
 from reports.figures.style import MUTED, PANEL, styled
 from reports.figures.svg import to_svg
 

@@ -2,23 +2,38 @@
 
 Positions and marks are whole numbers of 16 bits, in base64. A picture is SIZE units large, y down. The moments are even
 in time, and those just before and after an impact are among them; no impulse between two moments is left out.
+
+What is seen of a scene: rings and balls that bodies carry, standing walls, lines between joints. They are told in the
+view's frame, right-handed: x across the picture, y up, z towards the reader [m]. A planar scene is seen from above.
 """
 
 from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
-from reports.figures.canvas import widened
-from reports.figures.film_parts import Parts, frames, is_spatial, parts
-from reports.figures.scenes_space import Sight
-from reports.figures.spatial import Floats, Placement
+from reports.figures.canvas import is_turned, widened
+from reports.figures.geometry import (
+    WORLD,
+    Floats,
+    Placement,
+    View,
+    body_outlines,
+    body_placements,
+    cuboid_faces,
+    cuboid_of_inertia,
+    half_plane,
+    is_spatial,
+    outline,
+    placement,
+)
+from reports.figures.scenes_space import Sight, pieces
 
 SIZE = (400, 300)
 LARGEST = 60_000  # bytes of one film in the page
@@ -29,6 +44,109 @@ _MARGIN = 0.08  # of the picture
 _WHOLE = 32_000  # largest whole number written
 # steps of a mark per unit, per radian and per root of the strongest
 _PLACE_STEPS, _ANGLE_STEPS, _STRENGTH_STEPS = 40, 10_000, 1000
+_REACH = 50.0  # the side of a standing half-plane that is drawn, in sizes of the bodies
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Corners (n, 3) [m] in the frame of a body (its number); -1 = the world. `flat`: seen from both sides."""
+
+    body: int
+    corners: Floats
+    flat: bool = False
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball or disc about a center (3,) [m]; `spoke`: a line from its center shows how it turns."""
+
+    body: int
+    center: Floats
+    radius: float
+    spoke: bool
+
+
+@dataclass(frozen=True)
+class Link:
+    """A line from a point of one body to a point of another."""
+
+    first: int
+    start: Floats
+    second: int
+    end: Floats
+
+
+@dataclass(frozen=True)
+class Parts:
+    """All that is drawn of a scene."""
+
+    seen: View
+    rings: tuple[Ring, ...]
+    balls: tuple[Ball, ...]
+    links: tuple[Link, ...]
+    walls: tuple[Floats, ...]  # rings (n, 2) in the picture
+
+
+def plan(scene: Mapping[str, Any]) -> View:
+    """Return the view on a scene in the plane, turned as its drawing in the paper is."""
+    sign = -1.0 if is_turned(scene) else 1.0
+    return View(np.array([sign, 0.0, 0.0]), np.array([0.0, sign, 0.0]), np.array([0.0, 0.0, 1.0]))
+
+
+def frames(scene: Mapping[str, Any], seen: View, q: Floats) -> tuple[Placement, ...]:
+    """Return where the bodies are at q (nq,), in the view's frame."""
+    turn = Placement(np.array([seen.across, seen.up, seen.towards]), np.zeros(3))
+    return tuple(turn @ place for place in body_placements(scene, q).values())
+
+
+def parts(scene: Mapping[str, Any], sight: Sight | None) -> Parts:
+    """Return what is drawn; a scene in space needs the `sight` from which it is looked at."""
+    number = {body["name"]: k for k, body in enumerate(scene["bodies"])} | {WORLD: -1}
+    seen = sight.seen if sight else plan(scene)
+    shapes = [shape for k, body in enumerate(scene["bodies"]) for shape in _shapes(k, body)]
+    rings = tuple(shape for shape in shapes if isinstance(shape, Ring))
+    balls = tuple(shape for shape in shapes if isinstance(shape, Ball))
+    return Parts(seen, rings, balls, tuple(_links(scene, number)) if sight else (), tuple(_walls(scene, seen, sight)))
+
+
+def _shapes(number: int, body: Mapping[str, Any]) -> Iterator[Ring | Ball]:
+    for shape in body["shapes"] or _of_inertia(body):
+        if shape["kind"] in ("circle", "sphere"):
+            center = np.resize(np.append(shape["center"], 0.0), 3)
+            yield Ball(number, center, shape["radius"], spoke=shape["kind"] == "circle")
+        elif "rpy" in shape:
+            own = placement(shape["center"], shape["rpy"])
+            yield from (Ring(number, face) for face in cuboid_faces(own, shape["size"]))
+        else:
+            corners = outline(shape)
+            yield Ring(number, np.column_stack([corners, np.zeros(len(corners))]), flat=True)
+
+
+def _of_inertia(body: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Return the even box of a free body's mass and inertia, which stands for a body without shape."""
+    if body["joint"] != "free_flyer":
+        return ()
+    return ({"kind": "box", "size": cuboid_of_inertia(body), "center": body["center_of_mass"], "rpy": (0, 0, 0)},)
+
+
+def _links(scene: Mapping[str, Any], number: Mapping[str, int]) -> Iterator[Link]:
+    """Yield lines from joint to joint, and on to the shapes."""
+    for body in scene["bodies"]:
+        if body["parent"] != WORLD:
+            own = number[body["name"]]
+            yield Link(number[body["parent"]], np.zeros(3), own, np.zeros(3))
+            yield from (Link(own, np.zeros(3), own, np.asarray(s["center"], dtype=float)) for s in body["shapes"])
+
+
+def _walls(scene: Mapping[str, Any], seen: View, sight: Sight | None) -> Iterator[Floats]:
+    if sight:
+        yield from (seen.flat(piece.points) for piece in pieces(sight, {**scene, "bodies": ()}, np.zeros(0)))
+        return
+    corners = [corners for _, corners in body_outlines(scene)]
+    reach = _REACH * float(max(np.ptp(np.vstack(corners), axis=0)))
+    for wall in scene["walls"]:
+        ring = half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall)
+        yield ring @ np.array([seen.across[:2], seen.up[:2]]).T
 
 
 @dataclass(frozen=True)
@@ -111,23 +229,15 @@ def _plain(made: Film) -> dict[str, Any]:
 
 def _poses(made: Film) -> tuple[Floats, Floats]:
     """Return quaternions (moments, bodies, 4) and origins (moments, bodies, 3) in units, y up from the lower left."""
+    from scipy.spatial.transform import Rotation
+
     corner = np.append(made.corner, 0.0)
     each = [frames(made.run.scene_resolved, made.parts.seen, made.run.q[step]) for step in made.steps]
     origins = np.array([[made.scale * (place.origin - corner) for place in places] for places in each])
-    turns = np.array([[_quaternion(place) for place in places] for places in each])
+    turns = np.array([Rotation.from_matrix([place.rotation for place in places]).as_quat() for places in each])
     for k in range(1, len(turns)):  # the nearer of ±, so that the player may go straight from one to the next
         turns[k] *= np.where(np.sum(turns[k] * turns[k - 1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     return turns, origins
-
-
-def _quaternion(place: Placement) -> Floats:
-    """Return x, y, z, w of a rotation: the eigenvector of its largest eigenvalue in Bar-Itzhack's matrix."""
-    (a, b, c), (d, e, f), (g, h, i) = place.rotation
-    matrix = np.array([
-        [a - e - i, 0, 0, 0], [d + b, e - a - i, 0, 0], [g + c, h + f, i - a - e, 0], [h - f, c - g, d - b, a + e + i],
-    ])
-    vector: Floats = np.linalg.eigh(matrix)[1][:, -1]
-    return vector
 
 
 def _marks(made: Film) -> Floats:

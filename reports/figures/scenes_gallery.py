@@ -9,7 +9,7 @@ import numpy as np
 
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, is_turned, make_canvas, note
 from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.planar import body_outlines, body_poses, bounds
+from reports.figures.geometry import body_outlines, body_placements, bounds
 from reports.figures.style import FORCE, PANEL, styled
 from reports.figures.svg import to_svg
 
@@ -51,7 +51,7 @@ def _hand(axes: Any, scene: Mapping[str, Any], length: float) -> None:
     force = np.asarray(hand["force"][:2], dtype=float)
     if not force.any():
         return
-    start = body_poses(scene)[hand["body"]].of(hand["point"])
+    start = body_placements(scene)[hand["body"]].of(hand["point"])
     arrow(axes, start, length * force / np.hypot(*force))
     note(axes, start, "hand", (0, 9), color=FORCE)
 

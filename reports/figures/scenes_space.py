@@ -11,7 +11,7 @@ import numpy as np
 from iapb.run import Run
 from reports.figures.canvas import arrow, note, widened
 from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.spatial import (
+from reports.figures.geometry import (
     Floats,
     View,
     body_placements,

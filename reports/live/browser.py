@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.figures.canvas import is_turned
-from reports.live.picture import extent, held_point, is_planar, pieces, placements
+from reports.figures.geometry import is_spatial
+from reports.live.picture import extent, held_point, pieces, placements
 from reports.live.window import Window
 
 Floats = NDArray[np.float64]
@@ -25,7 +26,7 @@ FRAMES_PER_SECOND = 30.0
 
 _POLITENESS = 10  # niceness: the loop comes first
 _BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (170, 170, 165)
-_DISTANCE = {True: 2.2, False: 1.4}  # of the camera, in sizes of a scene that is planar or not
+_DISTANCE = {False: 2.2, True: 1.4}  # of the camera, in sizes of a scene in the plane or in space
 _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
 
 
@@ -79,12 +80,12 @@ def _look(server: Any, scene: Mapping[str, Any]) -> None:
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     up = np.array([0.0, -1.0, 0.0] if is_turned(scene) else [0.0, 1.0, 0.0])
     towards = np.array([0.0, 0.0, 1.0])
-    if not is_planar(scene):
+    if is_spatial(scene):
         gravity = np.asarray(scene.get("gravity") or (0.0, 0.0, -1.0), dtype=float)
         up = -gravity / max(float(np.linalg.norm(gravity)), np.finfo(float).tiny)
         towards = np.array([0.62, -0.72, 0.31])
     camera = server.initial_camera
-    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE[is_planar(scene)] * size * towards
+    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE[is_spatial(scene)] * size * towards
     camera.near = 0.01 * size
     server.scene.set_up_direction(up)
 
@@ -100,7 +101,7 @@ class _Mouse:
         low, high = extent(scene)
         size = _HANDLE_SIZE * float(np.linalg.norm(high - low))
         self._handle = server.scene.add_transform_controls(
-            "/hand", scale=size, disable_rotations=True, active_axes=(True, True, not is_planar(scene)),
+            "/hand", scale=size, disable_rotations=True, active_axes=(True, True, is_spatial(scene)),
             depth_test=False)
         self._handle.on_update(self._moved)
         server.on_client_disconnect(self._gone)

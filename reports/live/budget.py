@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iapb.contact.impact import resolve_impact
 from iapb.simulation import Simulation
 
 _RESERVE = 0.1  # share of the period that is kept back: for the clock, and for what other programs take
@@ -66,8 +67,6 @@ def calibrated(simulation: Simulation, period: float) -> RowBudget:
 
 def _seconds_per_row(dofs: int, count: int) -> float:
     """Slope of the time of one impact over the rows that it may use, by the fastest of some repetitions."""
-    from iapb.contact.impact import resolve_impact
-
     random = np.random.default_rng(0)
     rows, velocity = random.normal(size=(count, dofs)), random.normal(size=dofs)
     budgets = np.unique([1, min(dofs, count)])

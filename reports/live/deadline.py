@@ -4,11 +4,14 @@ A tick that ends after the next one was due has missed its deadline. Then the ne
 ones are due that much later: simulated time never jumps and never hurries, so that no step is left out and no two are
 crammed into the time of one, which the hand would feel as a blow. It falls behind the clock instead, and this is
 recorded: `Timetable.behind`.
+
+The clock is asleep until shortly before an instant, and then watches for it.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import time
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,3 +93,35 @@ class Deadlines:
 def percentiles(seconds: Floats) -> Floats:
     """Return the times [s] at `PERCENTILES`; the last is the worst."""
     return np.asarray(np.percentile(seconds, PERCENTILES), np.float64)
+
+
+# Linux wakes a sleeper some 50 µs late, so the last stretch is spent awake; more would only heat the processor.
+SPIN_SECONDS = 1e-4
+
+
+class Clock(Protocol):
+    """Anything that tells the time and waits; tests bring one of their own."""
+
+    def now(self) -> float:
+        """Return the time [s]; it never goes back."""
+        ...
+
+    def wait_until(self, instant: float) -> None:
+        """Return at `instant` [s] or, where that has passed, at once."""
+        ...
+
+
+class MonotonicClock:
+    """CLOCK_MONOTONIC: the same in all processes of this machine, and nobody can set it."""
+
+    def now(self) -> float:
+        """Return the time [s] since some fixed instant."""
+        return time.monotonic()
+
+    def wait_until(self, instant: float) -> None:
+        """Sleep to `SPIN_SECONDS` before the instant, then spin."""
+        asleep = instant - time.monotonic() - SPIN_SECONDS
+        if asleep > 0.0:
+            time.sleep(asleep)
+        while time.monotonic() < instant:
+            pass

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from reports.figures import planar, spatial
+from reports.figures import geometry
 
 Floats = NDArray[np.float64]
 
@@ -31,28 +32,18 @@ class Piece(NamedTuple):
     faces: NDArray[np.int64]  # (m, 3) counter-clockwise from outside
 
 
-def is_planar(scene: Mapping[str, Any]) -> bool:
-    """Whether a resolved scene is planar."""
-    return scene.get("dimensions") != 3
-
-
 def pieces(scene: Mapping[str, Any]) -> list[Piece]:
     """Return every shape of a resolved scene."""
     low, high = extent(scene)
     size = float(np.linalg.norm(high - low))
-    made = _planar_pieces if is_planar(scene) else _spatial_pieces
-    return list(made(scene, size))
+    return list(_pieces(scene, size))
 
 
 def placements(scene: Mapping[str, Any], q: Floats) -> dict[str, tuple[Floats, Floats]]:
     """Return (quaternion, position) of every body at a configuration (nq,)."""
-    if is_planar(scene):
-        return {
-            name: (_quaternion(_raised(pose.rotation)), np.array([*pose.origin, 0.0]))
-            for name, pose in planar.body_poses(scene, q).items()
-        }
-    found = spatial.body_placements(scene, q)
-    return {name: (_quaternion(place.rotation), place.origin) for name, place in found.items()}
+    places = geometry.body_placements(scene, q)
+    return {name: (Rotation.from_matrix(place.rotation).as_quat(scalar_first=True), place.origin)
+            for name, place in places.items()}  # fmt: skip
 
 
 def held_point(scene: Mapping[str, Any], q: Floats) -> Floats | None:
@@ -60,30 +51,33 @@ def held_point(scene: Mapping[str, Any], q: Floats) -> Floats | None:
     hand = scene.get("hand")
     if hand is None:
         return None
-    if is_planar(scene):
-        return np.array([*planar.body_poses(scene, q)[hand["body"]].of(hand["point"]), 0.0])
-    return spatial.body_placements(scene, q)[hand["body"]].of(hand["point"])
+    return geometry.body_placements(scene, q)[hand["body"]].of(np.resize([*hand["point"], 0.0], 3))
 
 
 def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return the lower and upper corner (3,) of everything that has an end, at the start."""
     start = np.array([x for body in scene["bodies"] for x in body["position"]], dtype=float)
-    made = _planar_pieces if is_planar(scene) else _spatial_pieces
-    places = {"": (np.array([1.0, 0, 0, 0]), np.zeros(3))} | placements(scene, start)
-    points = [origin[None] for name, (_, origin) in places.items() if name]
-    for piece in made({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0):
-        quaternion, origin = places[piece.body]
-        points.append(origin + piece.vertices @ _matrix(quaternion).T)
+    places = geometry.body_placements(scene, start)
+    points = [place.origin[None] for place in places.values()]
+    for piece in _pieces({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0):
+        points.append(places[piece.body].of(piece.vertices) if piece.body else piece.vertices)
     every = np.vstack(points)
     return every.min(axis=0), every.max(axis=0)
 
 
-def _planar_pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
+def _pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
     owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
     for name, shape in owned + [("", wall) for wall in scene["walls"]]:
-        endless = shape["kind"] == "half_plane"
-        corners = planar.half_plane(shape, _REACH * size) if endless else planar.outline(shape)
-        yield _extruded(name, corners, _THICKNESS * size * (0.9 if endless else 1.0))
+        if shape["kind"] == "half_plane":
+            yield _extruded(name, geometry.half_plane(shape, _REACH * size), 0.9 * _THICKNESS * size)
+        elif shape["kind"] == "half_space":
+            yield _slab(shape, _REACH * size)
+        elif shape["kind"] == "sphere":
+            yield _ball(name, np.asarray(shape["center"], dtype=float), shape["radius"])
+        elif geometry.is_spatial(scene):
+            yield Piece(name, geometry.placement_of(shape).of(_corners(shape["size"])), _CUBE)
+        else:
+            yield _extruded(name, geometry.outline(shape), _THICKNESS * size)
 
 
 def _extruded(name: str, corners: Floats, thickness: float) -> Piece:
@@ -100,18 +94,6 @@ def _extruded(name: str, corners: Floats, thickness: float) -> Piece:
     return Piece(name, vertices, np.array(faces))
 
 
-def _spatial_pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
-    owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
-    for name, shape in owned + [("", wall) for wall in scene["walls"]]:
-        if shape["kind"] == "half_space":
-            yield _slab(shape, _REACH * size)
-        elif shape["kind"] == "sphere":
-            yield _ball(name, np.asarray(shape["center"], dtype=float), shape["radius"])
-        else:
-            frame = spatial.placement(shape["center"], shape["rpy"])
-            yield Piece(name, frame.of(_corners(shape["size"])), _CUBE)
-
-
 def _corners(size: Any) -> Floats:
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     return 0.5 * signs * np.asarray(size, dtype=float)
@@ -123,7 +105,7 @@ def _slab(wall: Mapping[str, Any], reach: float) -> Piece:
     normal = normal / np.linalg.norm(normal)
     along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     along = along / np.linalg.norm(along)
-    frame = spatial.Placement(np.column_stack([along, np.cross(normal, along), normal]),
+    frame = geometry.Placement(np.column_stack([along, np.cross(normal, along), normal]),
                               np.asarray(wall["point"], dtype=float))
     depth = 0.02 * reach
     return Piece("", frame.of(_corners((reach, reach, depth)) - [0.0, 0.0, 0.5 * depth]), _CUBE)
@@ -140,36 +122,3 @@ def _ball(name: str, center: Floats, radius: float) -> Piece:
             a, b = i * columns + j, i * columns + (j + 1) % columns
             faces += [[a, a + columns, b + columns], [a, b + columns, b]]
     return Piece(name, vertices, np.array(faces))
-
-
-def _raised(rotation: Floats) -> Floats:
-    raised = np.eye(3)
-    raised[:2, :2] = rotation
-    return raised
-
-
-def _quaternion(rotation: Floats) -> Floats:
-    """Quaternion w, x, y, z of a rotation matrix, by the largest of its four squares."""
-    m = rotation
-    squares = np.array([
-        1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2],
-        1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2],
-    ])  # fmt: skip
-    table = np.array([
-        [squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-        [m[2, 1] - m[1, 2], squares[1], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-        [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], squares[2], m[1, 2] + m[2, 1]],
-        [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[3]],
-    ])  # fmt: skip
-    row = table[int(np.argmax(squares))]
-    found: Floats = row / np.linalg.norm(row)
-    return found
-
-
-def _matrix(quaternion: Floats) -> Floats:
-    w, x, y, z = quaternion
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip

@@ -2,6 +2,8 @@
 
 The loop only writes configurations into a shared page and reads where the mouse wants the hand (`reports.live.window`).
 The viewer's process starts Python anew, so that it shares nothing else with the loop, and runs at lower priority.
+
+The mouse is the hand: a spring from the held point to where the mouse is, with a limited force.
 """
 
 from __future__ import annotations
@@ -12,14 +14,75 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import IapbError
+from iapb.errors import ArgumentError, IapbError
 from iapb.simulation import Simulation
 from reports.live.browser import HOST, show_in_browser
-from reports.live.hand import SpringHand
 from reports.live.window import Window
 from reports.workers import starting_a_process
 
 Floats = NDArray[np.float64]
+
+_FREQUENCY = 2.0 * np.pi * 2.0  # [rad/s] of the tool on the spring: about as fast as an arm follows a target
+_ACCELERATION = 1.0  # [m/s²] that the largest force gives the tool, on top of holding it against gravity
+
+
+class SpringHand:
+    """Pulls the held point towards a target: F = k (target − x) − b ẋ, with |F| limited and b critical.
+
+    k, b and the limit follow from the smallest effective mass at the held point, 1 / λ_max(J M⁻¹ Jᵀ): so the spring
+    is slow beside the step in any direction.
+
+    Parameters
+    ----------
+    simulation : whose scene has a hand.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        if simulation.system.tool_tree < 0:
+            raise ArgumentError("scene", simulation.scene.name, "a scene with a hand")
+        self._simulation, self._dt = simulation, simulation.system.dt
+        self._own = simulation.port.wrench.copy()
+        self._planar = len(simulation.scene.hand.point) == 2  # type: ignore[union-attr]
+        mass = _effective_mass(simulation)
+        self.stiffness, self.damping = mass * _FREQUENCY**2, 2.0 * mass * _FREQUENCY
+        self.limit = mass * (_ACCELERATION + float(np.linalg.norm(simulation.system.gravity)))
+        self._last: Floats | None = None
+
+    def point(self) -> Floats:
+        """Where the hand holds the tool (3,) [m]."""
+        return _held_point(self._simulation)
+
+    def wrench(self, target: Floats | None) -> Floats:
+        """Return the scene's own wrench (6,) and, where there is a target (3,) [m], the spring's force."""
+        wrench = self._own.copy()
+        if target is None:
+            self._last = None
+            return wrench
+        point = self.point()
+        velocity = 0.0 if self._last is None else (point - self._last) / self._dt
+        self._last = point
+        force = self.stiffness * (target - point) - self.damping * velocity
+        if self._planar:
+            force[2] = 0.0
+        size = float(np.linalg.norm(force))
+        wrench[:3] += force * min(1.0, self.limit / size) if size > 0.0 else 0.0
+        return wrench
+
+
+def _held_point(simulation: Simulation) -> Floats:
+    held, arm = simulation.port.hand_body, simulation.port.hand_point
+    rotation, position = simulation.system.mechanism.placements(simulation.state.q)
+    found: Floats = position[held] + rotation[held] @ arm
+    return found
+
+
+def _effective_mass(simulation: Simulation) -> float:
+    """Smallest mass that the held point shows in any direction [kg]."""
+    mechanism, q, port = simulation.system.mechanism, simulation.state.q, simulation.port
+    jacobian = mechanism.point_jacobian(q, port.hand_body, _held_point(simulation))
+    mobility = jacobian @ np.linalg.solve(mechanism.mass_matrix(q), jacobian.T)
+    return 1.0 / float(np.linalg.eigvalsh(mobility)[-1])
+
 
 _START_SECONDS = 60.0  # that a browser's server may take to start, on a machine that is busy otherwise
 _END_SECONDS = 3.0

@@ -92,7 +92,7 @@ def test_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
     """The second is the scene whose step is the unit of time."""
     names = ("peg_corner", "two_discs", "tumbling_body")
-    monkeypatch.setattr("iapb.scene_files.scene_names", lambda: names)
+    monkeypatch.setattr("iapb.scene.scene_names", lambda: names)
     monkeypatch.setattr(scenes, "shipped_scene", broken(lambda scene: load_scene(find_scene(scene)), name.__eq__))
     monkeypatch.setattr(scenes, "TIMED_AGAIN", 0)
     topic = scenes.compute(Runner(tmp_path), "quick", nothing)

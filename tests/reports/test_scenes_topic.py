@@ -17,7 +17,7 @@ from iapb.simulation import simulate
 from reports.evidence import scenes
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes_ledger, scenes_space
-from reports.figures.spatial import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
+from reports.figures.geometry import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
 from reports.pages.records import Topic
 from verification.finding import LIMITED, REFUTED, REPRODUCED
 from verification.studies.open_books import OpenBooks

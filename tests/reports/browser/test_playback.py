@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from reports.figures.film import LARGEST, film
-from reports.figures.film_parts import frames
-from reports.figures.films import SIGHT
-from reports.figures.filmstrip import bodies_markup
+from reports.figures.film import LARGEST, film, frames
+from reports.figures.films import SIGHT, bodies_markup
 from reports.figures.worlds import UNLIMITED
 from reports.pages.records import Evidence
 

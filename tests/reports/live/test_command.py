@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from reports import cli
-from reports.live.files import read_live
-from reports.live.replay import replay
+from reports.live.replay import read_live, replay
 from reports.store.keys import content_hash
 
 

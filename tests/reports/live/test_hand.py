@@ -8,7 +8,7 @@ import pytest
 from iapb.errors import ArgumentError
 from iapb.scene import find_scene
 from iapb.simulation import Simulation
-from reports.live.hand import SpringHand
+from reports.live.viewer import SpringHand
 
 FREE = {"bodies.peg.velocity": [0, 0, 0], "bodies.peg.position": [0.4, -0.4, 0.0], "hand.force": [0, 0, 0]}
 TARGET = np.array([0.38, -0.43, 0.5])  # planar: its height does not count

@@ -12,9 +12,8 @@ from iapb.errors import IapbError
 from reference.worlds import run_world
 from reports.live.budget import RowBudget, RowCost, calibrated
 from reports.live.loop import Loop
-from reports.live.measure import rows_left_out, summary
+from reports.live.measure import made_device, rows_left_out, summary
 from reports.live.replay import replay
-from reports.live.setup import made_device
 from reports.store.keys import content_hash
 
 PERIOD = 1e-3

@@ -10,10 +10,9 @@ import urllib.request
 import numpy as np
 import pytest
 
-from reports.live.hand import SpringHand
 from reports.live.loop import Loop
 from reports.live.replay import replay
-from reports.live.viewer import Viewer
+from reports.live.viewer import SpringHand, Viewer
 from reports.live.window import SILENCE_SECONDS, Window
 from reports.store.keys import content_hash
 
@@ -24,7 +23,7 @@ TICKS = 60
 def module_peg():
     from iapb.scene import find_scene, load_scene
     from reference.worlds import find_world
-    from reports.live.setup import live_simulation
+    from reports.live.measure import live_simulation
 
     return lambda: live_simulation(load_scene(find_scene("peg_corner")), find_world("IAPB"), 1000.0)
 

@@ -1,12 +1,13 @@
-"""Where the outlines of a scene in space are, from its resolved file alone, and how they look from aside.
+"""Where the outlines of a scene are, from its resolved file alone (no engine, no mechanism), and how they look.
 
-Axes are the world's, z up where there is gravity. The view is axonometric: parallel lines stay parallel and nothing
-shrinks with distance. Quaternions are x, y, z, w; rpy turns about the fixed x, y and z axes in this order.
+A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners, those of a scene in space (n, 3) [m].
+The view is axonometric: parallel lines stay parallel and nothing shrinks with distance. Quaternions are x, y, z, w; rpy
+turns about the fixed x, y and z axes in this order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +16,15 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 WORLD = "world"
-_CIRCLE_CORNERS = 48
+_CIRCLE_CORNERS, _BALL_CORNERS = 72, 48
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float) / 2.0
 # corners in a ring, counter-clockwise from outside
 _FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+def is_spatial(scene: Mapping[str, Any]) -> bool:
+    """Tell whether a resolved scene is one in space."""
+    return scene.get("dimensions") == 3
 
 
 @dataclass(frozen=True)
@@ -32,17 +38,22 @@ class Placement:
         return Placement(self.rotation @ inner.rotation, self.origin + self.rotation @ inner.origin)
 
     def of(self, points: Any) -> Floats:
-        """Return points of this frame (..., 3) in world axes."""
-        return self.origin + np.asarray(points, dtype=float) @ self.rotation.T
+        """Return points of this frame (..., 2 or 3) in world axes, as many numbers each."""
+        points = np.asarray(points, dtype=float)
+        n = points.shape[-1]
+        return self.origin[:n] + points @ self.rotation[:n, :n].T
 
 
 def placement(origin: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0)) -> Placement:
-    """Return the frame at `origin`, turned by roll, pitch and yaw."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return Placement(yaw @ pitch @ roll, np.asarray(origin, dtype=float))
+    """Return the frame at `origin` (2 or 3 numbers), turned by roll, pitch and yaw."""
+    from scipy.spatial.transform import Rotation
+
+    return Placement(Rotation.from_euler("xyz", rpy).as_matrix(), np.resize(np.append(origin, 0.0), 3))
+
+
+def placement_of(placed: Mapping[str, Any], origin: str = "center") -> Placement:
+    """Return the frame of a shape or joint of a resolved scene: its `angle` in the plane, its `rpy` in space."""
+    return placement(placed.get(origin, (0.0, 0.0)), placed.get("rpy", (0.0, 0.0, placed.get("angle", 0.0))))
 
 
 def body_placements(scene: Mapping[str, Any], coordinates: Any = None) -> dict[str, Placement]:
@@ -52,7 +63,7 @@ def body_placements(scene: Mapping[str, Any], coordinates: Any = None) -> dict[s
         count = len(body["position"])
         q = body["position"] if coordinates is None else coordinates[used : used + count]
         used += count
-        joint = placement(body["origin"], body["rpy"])
+        joint = placement_of(body, "origin")
         places[body["name"]] = places[body["parent"]] @ joint @ _moved(body, np.asarray(q, dtype=float))
     del places[WORLD]
     return places
@@ -60,33 +71,64 @@ def body_placements(scene: Mapping[str, Any], coordinates: Any = None) -> dict[s
 
 def _moved(body: Mapping[str, Any], q: Floats) -> Placement:
     """Return what the joint does to the body frame."""
-    nowhere, joint = np.zeros(3), body["joint"]
+    from scipy.spatial.transform import Rotation
+
+    joint = body["joint"]
     if joint == "fixed":
         return placement()
-    if joint == "free_flyer":
-        return Placement(_of_quaternion(q[3:]), q[:3])
-    if joint == "spherical":
-        return Placement(_of_quaternion(q), nowhere)
-    axis = np.asarray(body["axis"], dtype=float) / np.linalg.norm(body["axis"])
+    if joint == "planar":
+        return placement(q[:2], (0.0, 0.0, q[2]))
+    if joint in ("free_flyer", "spherical"):
+        shift = q[:3] if joint == "free_flyer" else np.zeros(3)
+        return Placement(Rotation.from_quat(q[-4:]).as_matrix(), shift)
+    axis = np.resize(np.append(body["axis"] or (0.0, 0.0, 1.0), 0.0), 3)
+    axis = axis / np.linalg.norm(axis)
     if joint == "prismatic":
-        return Placement(np.eye(3), q[0] * axis)
-    cosine, sine = q if joint == "continuous" else (np.cos(q[0]), np.sin(q[0]))
-    return Placement(_about(axis, cosine, sine), nowhere)
+        return placement(q[0] * axis)
+    angle = np.arctan2(q[1], q[0]) if joint == "continuous" else q[0]
+    return Placement(Rotation.from_rotvec(angle * axis).as_matrix(), np.zeros(3))
 
 
-def _about(axis: Floats, cosine: float, sine: float) -> Floats:
-    """Rodrigues' formula."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turned: Floats = cosine * np.eye(3) + sine * cross + (1.0 - cosine) * np.outer(axis, axis)
-    return turned
+# In the plane
 
 
-def _of_quaternion(quaternion: Floats) -> Floats:
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    sine = float(np.linalg.norm((x, y, z)))
-    axis = np.array([x, y, z]) / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0])
-    return _about(axis, w * w - sine * sine, 2.0 * w * sine)
+def outline(shape: Mapping[str, Any]) -> Floats:
+    """Return the corners of a box, circle or polygon in the frame that carries it."""
+    frame = placement_of(shape)
+    if shape["kind"] == "circle":
+        turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
+        return frame.of(shape["radius"] * np.column_stack([np.cos(turn), np.sin(turn)]))
+    if shape["kind"] == "box":
+        half = np.asarray(shape["size"], dtype=float) / 2.0
+        return frame.of(half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]))
+    return frame.of(shape["vertices"])
+
+
+def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
+    """Return a rectangle of size `reach` that stands for everything behind the wall's line."""
+    normal = np.asarray(wall["normal"], dtype=float)
+    normal = normal / np.hypot(*normal)
+    along = np.array([-normal[1], normal[0]])
+    point = np.asarray(wall["point"], dtype=float)
+    return point + reach * np.array([along, along - 2 * normal, -along - 2 * normal, -along])
+
+
+def body_outlines(scene: Mapping[str, Any], coordinates: Any = None) -> Iterator[tuple[str, Floats]]:
+    """Yield (body, corners in world axes) for every shape of every body."""
+    places = body_placements(scene, coordinates)
+    for body in scene["bodies"]:
+        for shape in body["shapes"]:
+            yield body["name"], places[body["name"]].of(outline(shape))
+
+
+def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
+    """Return the lower and upper corner of the box around all points, widened by a share of its longer side."""
+    every = np.vstack(points)
+    low, high = every.min(axis=0), every.max(axis=0)
+    return low - margin * max(high - low), high + margin * max(high - low)
+
+
+# In space
 
 
 def cuboid_faces(frame: Placement, size: Any) -> tuple[Floats, ...]:
@@ -125,7 +167,7 @@ class View:
 
     def disc(self, center: Floats, radius: float) -> Floats:
         """Return the outline (n, 3) of a ball: a circle across the line of sight."""
-        turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
+        turn = np.linspace(0.0, 2.0 * np.pi, _BALL_CORNERS, endpoint=False)
         return center + radius * (np.outer(np.cos(turn), self.across) + np.outer(np.sin(turn), self.up))
 
 
