@@ -1,32 +1,28 @@
 """Two reports compared number by number: what agrees exactly, what within a tolerance, what differs.
 
-Measured times are never judged: they belong to a machine and an hour. Each table says itself which of its columns hold
-them (`Numbers.timed`).
+Measured times are never judged: they belong to a machine and an hour. Nor are sentences: their numbers stand in tables,
+and are compared there. Each table says itself which of its columns hold them (`Numbers.timed`, `Numbers.prose`).
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import Any
 
 from reports.figures.figure import Numbers
 from reports.numbers_file import ReportNumbers
 
-EXACT, CLOSE, DIFFERS, TIMING, ONLY_OLD, ONLY_NEW = "exact", "close", "differs", "timing", "only old", "only new"
+EXACT, CLOSE, DIFFERS = "exact", "close", "differs"
+TIMING, PROSE, ONLY_OLD, ONLY_NEW = "timing", "prose", "only old", "only new"
 # Another processor rounds and orders sums differently: some 1e-16 a step, grown by a thousand steps of a simulation.
 TOLERANCE = 1e-9
 # A difference below this is rounding: errors of 1e-16 need not repeat to any digit, nor a solver's 1e-11 to three.
 ROUNDING = 1e-12
 # What a cell says of something that was not tried because something smaller took too long (reference.complementarity).
 LEFT_OUT = "left out"
-
-_PART_END = re.compile("[/,]")
-_NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,8 @@ class Difference:
         """Number of cells in each state, by part of the report: what stands before the first / or comma of a table."""
         found: dict[str, Counter[str]] = {}
         for cell in self.cells:
-            found.setdefault(_PART_END.split(cell.table)[0], Counter())[cell.state] += 1
+            part = cell.table.partition("/")[0].partition(",")[0]
+            found.setdefault(part, Counter())[cell.state] += 1
         return found
 
 
@@ -91,7 +88,8 @@ def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...
 
 def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
     old_rows, new_rows = _rows(old, new)
-    timed, timed_rows = {*old.timed, *new.timed}, old.timed_rows or new.timed_rows
+    timed, prose = {*old.timed, *new.timed}, {*old.prose, *new.prose}
+    timed_rows = old.timed_rows or new.timed_rows
     for row in dict.fromkeys((*old_rows, *new_rows)):
         first, second = old_rows.get(row, {}), new_rows.get(row, {})
         for column in dict.fromkeys((*first, *second)):
@@ -101,7 +99,8 @@ def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator
             else:
                 state, gap = compare_values(first[column], second[column], tolerance)
                 by_time = column in timed or LEFT_OUT in (first[column], second[column])
-            yield Cell(table, column, row, first.get(column), second.get(column), TIMING if by_time else state, gap)
+            state = TIMING if by_time else PROSE if column in prose and state == DIFFERS else state
+            yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
 
 
 def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
@@ -142,17 +141,13 @@ def _named(names: Sequence[str], table: Numbers) -> dict[str, dict[str, Any]]:
 
 
 def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
-    """Return how two cells compare, and their gap. In a text the numbers are compared, and the words must agree."""
+    """Return how two cells compare, and their gap; texts must be equal."""
     if _same(old, new):
         return EXACT, 0.0
     if old is None or new is None:
         return (ONLY_NEW if old is None else ONLY_OLD), 0.0
     if _is_number(old) and _is_number(new):
         gap = _gap(float(old), float(new))
-        return (CLOSE if gap <= tolerance else DIFFERS), gap
-    if isinstance(old, str) and isinstance(new, str) and _NUMBER.sub("#", old) == _NUMBER.sub("#", new):
-        pairs = zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
-        gap = max((_printed_gap(a, b) for a, b in pairs), default=0.0)
         return (CLOSE if gap <= tolerance else DIFFERS), gap
     return DIFFERS, math.inf
 
@@ -174,14 +169,3 @@ def _gap(old: float, new: float) -> float:
     if not math.isfinite(largest):
         return math.inf
     return 0.0 if abs(old - new) <= ROUNDING else abs(old - new) / largest
-
-
-def _printed_gap(old: str, new: str) -> float:
-    """Relative difference of two printed numbers; none where they part by one in the last digit of a fraction.
-
-    What was rounded for print can fall to either side. Counts have no fraction and must agree.
-    """
-    a, b = (Decimal(text.replace("−", "-")) for text in (old, new))
-    unit = Decimal(1).scaleb(max(int(x.as_tuple().exponent) for x in (a, b)))
-    rounded = all("." in text or "e" in text for text in (old, new))
-    return 0.0 if rounded and abs(a - b) <= unit else _gap(float(a), float(b))

@@ -6,12 +6,24 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, ROUNDING, TIMING, Cell, Difference
+from reports.difference import (
+    CLOSE,
+    DIFFERS,
+    EXACT,
+    ONLY_NEW,
+    ONLY_OLD,
+    PROSE,
+    ROUNDING,
+    TIMING,
+    Cell,
+    Difference,
+)
 from reports.provenance import PEERS
 
 # Columns of the table by part of the report, each with the states that it counts.
 PARTS = (("the same", (EXACT,)), ("within the tolerance", (CLOSE,)), ("differ", (DIFFERS,)),
-         ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)))  # fmt: skip
+         ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)),
+         ("other sentences", (PROSE,)))  # fmt: skip
 SHOWN = 20  # lines; the rest is counted
 _WIDEST = 34  # letters of a cell
 # What must be equal for all to come out the same to the last bit. The lock fixes the BLAS, the processor its kernels;
@@ -26,6 +38,8 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
     yield (f"Of {judged} numbers and words in both reports, {exact} are exactly the same, {close} agree within "
            f"{tolerance:.0e} or {ROUNDING:.0e}, whichever is more, and {differs} differ.")  # fmt: skip
     yield f"{found.count(TIMING)} measured times, and what is made from them, are not judged."
+    if found.count(PROSE):
+        yield f"{found.count(PROSE)} sentences differ; they are not judged: their numbers stand in tables."
     old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
     if old or new or found.tables_old or found.tables_new:
         yield (f"{old} are only in the old report and {new} only in the new one, besides {len(found.tables_old)} and "

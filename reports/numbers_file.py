@@ -56,7 +56,8 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
     yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Numbers))
     for scene, effects in evidence.effects.items():
         rows = tuple((one.name, one.active, one.change, one.cost) for one in effects)
-        yield f"effects/{scene}", Numbers(("effect", "active", "change", "cost"), rows, timed=("cost",))
+        columns = ("effect", "active", "change", "cost")
+        yield f"effects/{scene}", Numbers(columns, rows, timed=("cost",), prose=("change",))
     for topic in evidence.topics:
         found = enumerate(topic.findings, 1)
         yield from _outcomes(topic.id, ((number, one.outcome, one.sentence, one.timed) for number, one in found))
@@ -68,9 +69,11 @@ def _checks(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
                             tuple((one.name, one.holds, len(one.twins)) for one in evidence.proofs))
     yield "properties", Numbers(
         ("law", "cases", "worst", "bound", "holds", "fault caught"),
-        tuple((one.law, one.cases, one.worst, one.bound, one.holds, one.fault_caught) for one in evidence.properties))
+        tuple((one.law, one.cases, one.worst, one.bound, one.holds, one.fault_caught) for one in evidence.properties),
+        prose=("worst",))  # fmt: skip
     yield "counterexamples", Numbers(("who and law", "what happens"),
-                                     tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples))
+                                     tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples),
+                                     prose=("what happens",))  # fmt: skip
     yield "cross-checks", Numbers(
         ("quantity", "against", "cases", "worst", "tolerance", "agrees"),
         tuple((one.quantity, one.against, one.cases, one.worst, one.tolerance, one.agrees)
@@ -80,7 +83,7 @@ def _checks(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
 def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Numbers]]:
     """Outcomes with their sentences, as one table; those that rest on measured times as another."""
     columns, kept = ("what", "outcome", "sentence"), tuple(found)
-    yield name, Numbers(columns, tuple(tuple(row) for *row, timed in kept if not timed))
+    yield name, Numbers(columns, tuple(tuple(row) for *row, timed in kept if not timed), prose=("sentence",))
     if any(timed for *_, timed in kept):
         yield f"{name}, from times", Numbers(columns, tuple(tuple(row) for *row, timed in kept if timed),
                                              timed=("outcome", "sentence"), timed_rows=True)  # fmt: skip
@@ -89,6 +92,7 @@ def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterato
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
     """Write the numbers as JSON, to the last bit; what JSON has no number for is {"number": "nan"}, "inf" or "-inf"."""
     tables = {name: {"columns": list(table.columns), "timed": list(table.timed), "timed_rows": table.timed_rows,
+                     "prose": list(table.prose),
                      "rows": [[_cell(value) for value in row] for row in table.rows]}
               for name, table in numbers.tables.items()}  # fmt: skip
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "depth": numbers.depth,
@@ -137,8 +141,8 @@ def _checked(content: Any) -> ReportNumbers:
 
 
 def _table(table: Any) -> Numbers:
-    columns, timed = (tuple(str(column) for column in table[part]) for part in ("columns", "timed"))
+    columns, timed, prose = (tuple(str(name) for name in table.get(part, ())) for part in ("columns", "timed", "prose"))
     rows = tuple(tuple(_NOT_FINITE[v["number"]] if isinstance(v, dict) else v for v in row) for row in table["rows"])
     if any(len(row) != len(columns) for row in rows):
         raise ValueError("a row without a cell for each column")
-    return Numbers(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]))
+    return Numbers(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]), prose=prose)

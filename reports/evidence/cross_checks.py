@@ -72,11 +72,11 @@ def _impulse_dynamics(_name: str) -> Iterator[CrossCheck]:
             continue
         ours, theirs = resolve_impact(M, J, v, e).velocity, impulse_dynamics(M, J, v, e)
         error = float(np.linalg.norm(L.T @ (ours - theirs)) / np.linalg.norm(L.T @ v))
-        ratio.append(error / (100.0 * _EPS * condition**2))
+        ratio.append(error / (100.0 * d * _EPS * condition**2))
         if condition <= 10.0:
             easy.append(error)
-    yield _check("v⁺ of independent rows, as a share of 100 ε κ(A)²", "Pinocchio impulseDynamics", ratio, 1.0,
-                 "it forms the Delassus matrix, whose condition is κ(A)²")
+    yield _check("v⁺ of independent rows, as a share of 100 d ε κ(A)²", "Pinocchio impulseDynamics", ratio, 1.0,
+                 "a hundred roundings per coordinate, times κ(A)², the condition of the Delassus matrix that it forms")
     yield _check("v⁺ where κ(A) ≤ 10, kinetic metric", "Pinocchio impulseDynamics", easy, 1e-12, "plain rounding")
 
 

@@ -19,7 +19,8 @@ class Numbers:
 
     A number is printed with `digits` significant digits; None is printed as a dash: "does not apply". `timed` names the
     columns that hold measured times, or what is made from them: nobody can ask that they repeat. `timed_rows`: which
-    rows there are depends on times too, as where larger sizes are tried until one is too slow.
+    rows there are depends on times too, as where larger sizes are tried until one is too slow. `prose` names the
+    columns of sentences: their numbers stand in other tables, where they are compared.
     """
 
     columns: tuple[str, ...]
@@ -28,11 +29,13 @@ class Numbers:
     note: str = ""
     timed: tuple[str, ...] = ()
     timed_rows: bool = False
+    prose: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.timed if name not in self.columns]
-        if unknown:
-            raise ValueError(f"timed columns {unknown}: expected some of {self.columns}")
+        for kind, names in (("timed", self.timed), ("prose", self.prose)):
+            unknown = [name for name in names if name not in self.columns]
+            if unknown:
+                raise ValueError(f"{kind} columns {unknown}: expected some of {self.columns}")
 
 
 @dataclass(frozen=True)
