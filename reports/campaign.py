@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from verification.properties.campaign import Batch, BatchOutcome, Subject
     from verification.properties.tally import LawCount
 
+ENGINE = "iapb:resolve_impact"
 _TABLE = "laws"
 _COMMAND = "iapb verify --full"
 # Files of one law: each is a run of about 150 kB. A resolver that breaks a law more often is not understood by more.

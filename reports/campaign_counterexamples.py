@@ -50,7 +50,7 @@ def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
 
 
 def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> BrokenImpact:
-    from reports.commands.verify import ENGINE
+    from reports.campaign import ENGINE
     from reports.store_impact import BrokenImpact
     from verification.properties.engine_laws import ENGINE_LAWS
     from verification.properties.laws import LAWS, UNEQUAL_LAWS

@@ -1,4 +1,4 @@
-"""The command `iapb`: every command is one file in reports/commands and one line here."""
+"""The command `iapb`: every command is one file in reports/commands and one entry here."""
 
 from __future__ import annotations
 
@@ -13,16 +13,26 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError
 
-# command -> module of reports.commands that holds a function of the same name
-COMMANDS = ("run", "live", "effects", "inspect", "schema", "prove", "verify", "compare", "bench", "sweep", "store",
-            "reproduce", "report")
-
-app = typer.Typer(
-    name="iapb", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
-    help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove and "
-         "test passivity, compare with complementarity, regenerate the paper's figures.",
-    epilog="Start with: iapb run peg_corner",
-)  # fmt: skip
+# command -> its line in `iapb --help`. Its module in reports.commands holds a function of the same name and is imported
+# where the command is the one that was given; `iapb --help` imports none.
+COMMANDS = {
+    "run": "Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.",
+    "live": "Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable.",
+    "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
+    "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
+    "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
+    "prove": "Check every machine-checked statement, or print the proof of one.",
+    "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
+              "counterexample.",
+    "compare": "Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem "
+               "files.",
+    "bench": "Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula.",
+    "sweep": "Simulate every point of STUDY that is not there yet, one run file each, and write a table of them all.",
+    "store": "Look after the run and table files below a folder.",
+    "reproduce": "Regenerate the report; what was computed before is read from its files.",
+    "report": "Say which numbers of two reports agree exactly, within a tolerance, or not; end with 1 where some "
+              "differ.",
+}  # fmt: skip
 
 
 class _Options:
@@ -31,15 +41,28 @@ class _Options:
     debug = False
 
 
-@app.callback()
 def _before(debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error.")) -> None:
     _Options.debug = debug
 
 
-def _register(name: str) -> None:
-    module = import_module(f"reports.commands.{name}")
-    command: Callable[..., Any] = getattr(module, name)
-    app.command(name)(_abortable(command))
+def _app(given: list[str]) -> typer.Typer:
+    """The command line with all commands, of which only the given one can be called."""
+    app = typer.Typer(
+        name="iapb", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+        help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove "
+             "and test passivity, compare with complementarity, regenerate the paper's figures.",
+        epilog="Start with: iapb run peg_corner",
+    )  # fmt: skip
+    app.callback()(_before)
+    wanted = next((word for word in given if not word.startswith("-")), "")
+    for name, words in COMMANDS.items():
+        command = getattr(import_module(f"reports.commands.{name}"), name) if name == wanted else _not_given
+        app.command(name, help=None if name == wanted else words)(_abortable(command))
+    return app
+
+
+def _not_given() -> None:
+    """Stand for a command that is only listed."""
 
 
 def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -62,10 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, _end_politely)
     try:
         _refuse_empty(given)
-        for name in COMMANDS:
-            if name not in {command.name for command in app.registered_commands}:
-                _register(name)
-        status = app(args=given, standalone_mode=False)
+        status = _app(given)(args=given, standalone_mode=False)
     except KeyboardInterrupt:
         print("iapb: stopped; what was finished is kept.", file=sys.stderr)
         status = 130

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+import statistics
+from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from reports.figures.figure import Numbers
+from reports.commands.progress import stage_progress
+from reports.evidence import accuracy
+from reports.evidence.haptic_rate import topic_of
+from reports.figures.figure import Numbers
+from reports.figures.numbers import format_cell
+from verification.accuracy_time.study import haptic_study
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
 
@@ -19,14 +25,6 @@ def bench(
     tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
 ) -> None:
     """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
-    from rich.console import Console
-
-    from reports.commands.progress import stage_progress
-    from reports.evidence import accuracy
-    from reports.evidence.haptic_rate import topic_of
-    from verification.accuracy_time.study import haptic_study
-    from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
-
     with stage_progress() as progress:
         topic = topic_of(haptic_study("full" if full else "quick", progress))
         methods = accuracy.compute(lambda done, total: progress("methods on problems", done, total))
@@ -45,10 +43,6 @@ def bench(
 
 
 def _print(console: Console, title: str, numbers: Numbers) -> None:
-    from rich.table import Table
-
-    from reports.figures.numbers import format_cell
-
     table = Table(title=title, caption=numbers.note)
     for heading in numbers.columns:
         table.add_column(heading, overflow="fold")
@@ -59,8 +53,6 @@ def _print(console: Console, title: str, numbers: Numbers) -> None:
 
 def _methods(numbers: Numbers) -> str:
     """One line per method: worst error, worst residual and median time over the problems, failures counted."""
-    import statistics
-
     rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
     lines = ["Impact methods over all problems: worst relative error, median time, failures"]
     for method in dict.fromkeys(row["method"] for row in rows):

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
+from rich.console import Console
+from rich.table import Table
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from verification.comparison.problem_study import ProblemStudy
-    from verification.comparison.step_cost import CostRow
-    from verification.comparison.study import ComparisonStudy
+from iapb.errors import ArgumentError
+from reference.datasets import problem_files
+from reference.fclib import write_fclib
+from reports.commands.progress import stage_progress
+from verification.comparison import sentences
+from verification.comparison.own_problems import own_problems
+from verification.comparison.problem_study import FACTORS, ProblemStudy, study_problems
+from verification.comparison.step_cost import CostRow
+from verification.comparison.study import ComparisonStudy
+from verification.comparison.study import compare as study_all
 
 
 def compare(
@@ -25,13 +33,6 @@ def compare(
         help="Write our own problems to this folder as FCLIB files, and stop.")] = None,
 ) -> None:
     """Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem files."""
-    from rich.console import Console
-
-    from reports.commands.progress import stage_progress
-    from verification.comparison import sentences
-    from verification.comparison.problem_study import study_problems
-    from verification.comparison.study import compare as study_all
-
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
     for folder in problems or ():
@@ -59,9 +60,6 @@ def compare(
 
 
 def _require_problems(folder: Path) -> None:
-    from iapb.errors import ArgumentError
-    from reference.datasets import problem_files
-
     if not problem_files(folder):
         kinds = ".lcp, .lcp.gz, .dat, .txt, .hdf5, .h5"
         raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
@@ -69,11 +67,6 @@ def _require_problems(folder: Path) -> None:
 
 def _export(folder: Path) -> int:
     """Write the problems that the study always has, one file each."""
-    import re
-
-    from reference.fclib import write_fclib
-    from verification.comparison.own_problems import own_problems
-
     problems = [stored.problem for stored in own_problems()]
     for problem in problems:
         title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII
@@ -88,8 +81,6 @@ def _tables(study: ComparisonStudy) -> list[Table]:
 
 
 def _table(title: str, *headings: str) -> Table:
-    from rich.table import Table
-
     table = Table(title=title)
     for i, heading in enumerate(headings):
         table.add_column(heading, justify="left" if i == 0 else "right", overflow="fold")
@@ -158,10 +149,6 @@ def _problem_tables(study: ProblemStudy) -> list[Table]:
 
 
 def _profile_table(study: ProblemStudy) -> Table:
-    import numpy as np
-
-    from verification.comparison.problem_study import FACTORS
-
     shown = [1.0, 3.0, 10.0, 100.0, 1e5]
     title = "Performance profile (Dolan and Moré): share solved within a factor of the fastest"
     table = _table(title, "kind", "solver", *(f"{factor:g}" for factor in shown))  # fmt: skip

@@ -5,6 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.table import Table
+
+from iapb import decide_effects, find_scene, load_scene
+from iapb.errors import ArgumentError
+from reference.worlds import find_world
+from reports.commands.progress import stage_progress
+from reports.evidence.effects import effects_of, summary
 
 
 def effects(
@@ -18,8 +26,6 @@ def effects(
         "and what changes without it. Takes seconds.")] = False,
 ) -> None:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
-    from iapb import decide_effects, find_scene, load_scene
-
     source = load_scene(find_scene(scene))
     if measure:
         _measure(source, world or "IAPB")
@@ -27,8 +33,6 @@ def effects(
     if world is None:
         found = decide_effects(source)
     else:
-        from reference.worlds import find_world
-
         chosen = find_world(world, rendering)
         found = decide_effects(source, chosen.law.name, chosen.coupling_in(source).name, rendering)
     on = [effect for effect in found if effect.active]
@@ -44,13 +48,6 @@ def effects(
 
 def _measure(source: Any, world: str) -> None:
     """A table of what each effect costs and changes, and which ones give least error for the time they save."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from iapb.errors import ArgumentError
-    from reports.commands.progress import stage_progress
-    from reports.evidence.effects import effects_of, summary
-
     if world not in ("IAPB", "PB"):
         raise ArgumentError("world", world, "IAPB or PB with --measure: the worlds of the compiled engine")
     with stage_progress() as progress:

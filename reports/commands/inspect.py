@@ -5,7 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
+from rich.console import Console
+from rich.table import Table
+
+from reports.commands.run import describe
+from reports.store.runs import read_provenance, read_stored
+from reports.store_impact import BrokenImpact, read_broken_impact
 
 
 def inspect(
@@ -13,11 +20,6 @@ def inspect(
     impacts: Annotated[int, typer.Option(min=0, help="How many impacts to list.")] = 10,
 ) -> None:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
-    from reports.commands.inspect_impact import describe_impact
-    from reports.commands.run import describe
-    from reports.store.runs import read_provenance, read_stored
-    from reports.store_impact import read_broken_impact
-
     run, entry = read_stored(file)
     broken = read_broken_impact(file)
     if broken is None:
@@ -43,9 +45,6 @@ def inspect(
 
 
 def _list_impacts(run: object, count: int) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     table = run.impacts  # type: ignore[attr-defined]
     shown = Table(title=f"The first {min(count, len(table.step))} of {len(table.step)} impacts")
     for heading in ("time [s]", "rows", "rank", "energy lost [J]", "device scale", "clamp", "closing"):
@@ -55,3 +54,22 @@ def _list_impacts(run: object, count: int) -> None:
                       f"{table.energy_lost[i]:.4e}", f"{table.scale[i]:.4f}", f"{table.clamp[i]:.6f}",
                       str(table.approaching[i]))
     Console().print(shown)
+
+
+def describe_impact(broken: BrokenImpact, file: Path) -> None:
+    """Say which law was broken, by what, how it was found, and give the test to paste."""
+    case = broken.struck.case
+    print(f"An impact of {broken.resolver} that breaks a law, {broken.law}: {broken.statement}.")
+    print(f"Residual {broken.value:.6g}, allowed {broken.tolerance:.6g}.")
+    if broken.struck.complaint:
+        print(f"The resolver: {broken.struck.complaint}.")
+    print(f"{case.contacts} rows on {case.coordinates} coordinates ({case.family or 'no family'}), in bare numbers.")
+    origin = broken.found
+    print(f"Found as case {origin['index']} of the part {origin['part']!r}, seed {origin['request']['seed']}. "
+          f"Judged again by: iapb verify --recheck {file}")
+    given = {"mass matrix M": case.mass_matrix, "contact Jacobian J": case.contact_jacobian,
+             "velocity before": case.velocity, "restitution": case.given_restitution(),
+             "velocity after": broken.struck.velocity_after}  # fmt: skip
+    for name, values in given.items():
+        print(f"\n{name}:\n{np.array2string(np.asarray(values), precision=6, prefix='  ', max_line_width=110)}")
+    print(f"\nAs a test, every digit:\n\n{broken.test}\n")

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-LONGEST = 1e8  # ticks: what is recorded is held in memory until the end
+from iapb import find_scene, load_scene
+from iapb.errors import ArgumentError
+from iapb.simulation import INTERRUPTED, Simulation
+from reference.worlds import find_world
+from reports.commands.progress import to_log
+from reports.commands.run import counted, duration
+from reports.compiling import compiling_told
+from reports.live.budget import calibrated
+from reports.live.loop import LiveRun, Loop
+from reports.live.measure import Pace, live_simulation, summary
+from reports.live.replay import write_live
+from reports.live.viewer import Viewer
+from reports.uses import parsed
 
-if TYPE_CHECKING:
-    from iapb.simulation import Simulation
-    from reports.live.loop import LiveRun
-    from reports.live.measure import Pace
+LONGEST = 1e8  # ticks: what is recorded is held in memory until the end
 
 
 def live(
@@ -33,18 +43,6 @@ def live(
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
 ) -> None:
     """Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable."""
-    from datetime import UTC, datetime
-
-    from iapb import find_scene, load_scene
-    from iapb.errors import ArgumentError
-    from iapb.simulation import INTERRUPTED
-    from reference.worlds import find_world
-    from reports.commands.progress import to_log
-    from reports.compiling import compiling_told
-    from reports.live.measure import live_simulation, summary
-    from reports.live.replay import write_live
-    from reports.uses import parsed
-
     if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:
@@ -66,10 +64,6 @@ def live(
 
 def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: int | None) -> LiveRun:
     """Do the ticks, with a viewer where there is a port for it."""
-    from reports.live.budget import calibrated
-    from reports.live.loop import Loop
-    from reports.live.viewer import Viewer
-
     rows = calibrated(simulation, simulation.system.dt) if budget else None
     length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
     if port is None:
@@ -87,8 +81,6 @@ def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: in
 
 def describe(pace: Pace, live: LiveRun) -> None:
     """Say in sentences how the loop kept to the clock."""
-    from reports.commands.run import duration
-
     print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
     for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
         half, ninety, hundredth, thousandth, worst = map(duration, times)
@@ -99,8 +91,6 @@ def describe(pace: Pace, live: LiveRun) -> None:
 
 
 def _misses(pace: Pace) -> str:
-    from reports.commands.run import counted, duration
-
     if not pace.missed:
         return "No deadline was missed: simulated time is the clock's."
     share = 100.0 * pace.missed / pace.ticks
@@ -110,8 +100,6 @@ def _misses(pace: Pace) -> str:
 
 
 def _rows(pace: Pace, live: LiveRun) -> str:
-    from reports.commands.run import counted
-
     if not pace.collisions:
         return "No collision was resolved by an impulse."
     least = int(live.timetable.budget[live.run.impacts.step].min())

@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from reports.compiling import compiling_told
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
 
 SILENCE = 30.0  # [s] between two lines of a log
 
@@ -34,8 +34,6 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
 @contextmanager
 def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Show stages; one that has `begun` before its first report is shown at once on a terminal."""
-    from rich.console import Console
-
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:
         with compiling_told(to_log), _reminded(StageLog(to_log, begun)) as log:
@@ -53,8 +51,6 @@ def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, 
 
 
 def _bars(console: Any, transient: bool) -> Progress:
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
     number = TextColumn("{task.completed}/{task.total}")
     # Only what goes to the same terminal is moved above the bars: a redirected stdout must not end up on stderr.
@@ -70,7 +66,6 @@ class StageLog:
     write : takes a line
     begun : a stage that has been told of already
     """
-
     def __init__(self, write: Callable[[str], None], begun: str = "") -> None:
         self._write, self._stages, self._start = write, {begun}, time.monotonic()
         self._now, self._reminded = ("", 0, 0), ""

@@ -6,14 +6,15 @@ from typing import Annotated
 
 import typer
 
+from verification.proofs import all_proofs, check, load
+from verification.proofs.second_tool import CERTIFIED, second_opinion
+
 
 def prove(
     name: Annotated[str | None, typer.Argument(help="A statement; without it all are checked and listed.")] = None,
     second_tool: Annotated[bool, typer.Option("--second-tool", help="Let Coq check the certificates, too.")] = False,
 ) -> None:
     """Check every machine-checked statement, or print the proof of one."""
-    from verification.proofs import all_proofs, check
-
     if name is not None:
         print(check(name).as_text())
         _ask_second_tool((name,) if second_tool else ())
@@ -28,8 +29,6 @@ def prove(
     print(f"{len(all_proofs()) - len(failed)} of {len(all_proofs())} statements proved in {seconds:.1f} s; each wrong "
           "twin is refuted by an exact counterexample.")
     if second_tool:
-        from verification.proofs.second_tool import CERTIFIED
-
         _ask_second_tool(CERTIFIED)
     if failed:
         raise typer.Exit(1)
@@ -37,9 +36,6 @@ def prove(
 
 def _ask_second_tool(names: tuple[str, ...]) -> None:
     """Print what Coq says of each statement; end with 1 if it refuses one."""
-    from verification.proofs import load
-    from verification.proofs.second_tool import second_opinion
-
     opinions = []
     for name in names:
         opinions.append(opinion := second_opinion(load(name)))

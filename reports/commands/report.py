@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
-if TYPE_CHECKING:
-    from reports.difference import Difference
+from iapb.errors import ArgumentError
+from reports.difference import DIFFERS, Difference, compare_reports
+from reports.difference_text import PARTS, SHOWN, lines, parts, sentences, unlike
+from reports.numbers_file import read_numbers
 
 
 class Action(StrEnum):
     """What to do."""
-
     diff = "diff"
 
 
@@ -25,13 +29,6 @@ def report(
     tolerance: Annotated[float, typer.Option(min=0.0, help="Relative difference up to which numbers agree.")] = 1e-9,
 ) -> None:
     """Say which numbers of two reports agree exactly, within a tolerance, or not; end with 1 where some differ."""
-    import math
-
-    from iapb.errors import ArgumentError
-    from reports.difference import DIFFERS, compare_reports
-    from reports.difference_text import unlike
-    from reports.numbers_file import read_numbers
-
     if not math.isfinite(tolerance):
         raise ArgumentError("--tolerance", tolerance, "a finite number, 0 or more")
     first, second = read_numbers(old), read_numbers(new)
@@ -47,12 +44,6 @@ def report(
 
 def print_difference(found: Difference, tolerance: float) -> None:
     """Print a table by part of the report, what differs most, and the sentences."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from reports.difference import DIFFERS
-    from reports.difference_text import PARTS, SHOWN, lines, parts, sentences
-
     by_part = Table("part", *(name for name, _ in PARTS), title="Numbers and words by part of the report")
     by_part.columns[0].no_wrap, by_part.columns[0].min_width = True, 15
     for row in parts(found):

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from reports.pages.records import FailedCases
+from iapb.errors import ArgumentError
+from iapb.names import one_of
+from reports.commands.progress import stage_progress
+from reports.commands.report import print_difference
+from reports.companions import REPORT_NAME, remembering, write_companions
+from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports
+from reports.difference_text import unlike
+from reports.evidence.gather import gather
+from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+from reports.figures import RECIPES
+from reports.figures.figure import Figure, draw
+from reports.figures.standalone import standalone
+from reports.numbers_file import read_numbers
+from reports.pages.builder import figure_inputs
+from reports.pages.records import FailedCases
+from reports.report import build_report, write_report
+from reports.runner import Runner
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
 
@@ -26,8 +44,6 @@ def reproduce(
     """Regenerate the report; what was computed before is read from its files."""
     depth, folder = "full" if full else "quick", out or Path("out")
     if check is not None:
-        from reports.commands.reproduce_check import check_report
-
         check_report(check, out)
     elif figure is not None:
         _write_figure(figure, folder, depth)
@@ -37,14 +53,6 @@ def reproduce(
 
 def make_report(out: Path, depth: str) -> None:
     """Compute all evidence, or read what is there; write the report and what goes beside it; say the verdicts."""
-    import time
-
-    from reports.commands.progress import stage_progress
-    from reports.companions import REPORT_NAME, remembering, write_companions
-    from reports.evidence.gather import gather
-    from reports.figures import RECIPES
-    from reports.report import build_report, write_report
-
     started = time.perf_counter()
     took: dict[str, float] = {}
     with stage_progress() as progress:
@@ -78,8 +86,6 @@ def _say_what_failed(failed: Sequence[FailedCases]) -> None:
 
 def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) -> Callable[[str, int, int], None]:
     """Progress that adds up in `took` how long each stage is at work: stages come one after the other."""
-    import time
-
     last = time.perf_counter()
 
     def timed(stage: str, done: int, total: int) -> None:
@@ -91,14 +97,33 @@ def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) ->
     return timed
 
 
+def check_report(report: Path, out: Path | None) -> None:
+    """Compute everything again, at the report's depth, into `out` or a temporary folder, and compare.
+
+    Runs must be the same to the last bit where code, packages and processor are; elsewhere numbers must agree within
+    the tolerance. Ends with 1 where they do not, or where the report has numbers that were not made again.
+    """
+    given = read_numbers(report)
+    if out is not None and out.exists() and any(out.iterdir()):
+        raise ArgumentError("--out", str(out), "an empty folder: what is there would be read, not computed again")
+    with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as folder:
+        make_report(Path(folder), given.depth)
+        made = read_numbers(folder)
+    found = compare_reports(given, made)
+    reasons = unlike(given.provenance, made.provenance)
+    print()
+    print(f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
+          if reasons else "Same code, packages and processor: runs must agree to the last bit.")  # fmt: skip
+    print_difference(found, TOLERANCE)
+    lost = found.count(ONLY_OLD) + len(found.tables_old)
+    failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
+    print(f"{report}: " + ("every number was made again." if not failed else "not every number was made again."))
+    if failed:
+        raise typer.Exit(1)
+
+
 def _write_figure(key: str, out: Path, depth: str) -> None:
     """Write a figure's panels, and all of them with their legend in one file; compute only what it needs."""
-    from iapb.errors import ArgumentError
-    from iapb.names import one_of
-    from reports.figures import RECIPES
-    from reports.figures.figure import Figure, draw
-    from reports.figures.standalone import standalone
-
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         raise ArgumentError("--figure", key, one_of(key, recipes))
@@ -114,12 +139,6 @@ def _write_figure(key: str, out: Path, depth: str) -> None:
 
 def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
     """What a figure asks for: a few runs and scenes, or else all evidence."""
-    from reports.commands.progress import stage_progress
-    from reports.evidence.gather import gather
-    from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-    from reports.pages.builder import figure_inputs
-    from reports.runner import Runner
-
     if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
         with stage_progress() as progress:
             return figure_inputs(gather(out, depth, progress))

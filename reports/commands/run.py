@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
 
-if TYPE_CHECKING:
-    from iapb.run import Run
+from iapb import find_scene, load_scene
+from iapb.run import Run
+from iapb.simulation import INTERRUPTED
+from reports.commands.progress import step_progress
+from reports.runner import Runner
+from reports.uses import parsed
 
 
 def run(
@@ -22,12 +27,6 @@ def run(
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
 ) -> None:
     """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again."""
-    from iapb import find_scene, load_scene
-    from iapb.simulation import INTERRUPTED
-    from reports.commands.progress import step_progress
-    from reports.runner import Runner
-    from reports.uses import parsed
-
     source = load_scene(find_scene(scene)).with_values(parsed(set_)) if set_ else load_scene(find_scene(scene))
     runner = Runner(out)
     with step_progress(f"{source.name} in {world}") as runner.progress:
@@ -46,8 +45,6 @@ SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
 
 def describe(run: Run, existed: bool) -> None:
     """Say in sentences what happened."""
-    import numpy as np
-
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}.")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
+from iapb.scene import scene_schema
+
 
 def schema() -> None:
     """Print the JSON Schema of scene files (for completion and checks in an editor)."""
-    import json
-
-    from iapb.scene import scene_schema
-
     print(json.dumps(scene_schema(), indent=2))

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from reports.store.care import FileState
+from iapb.errors import ArgumentError, IapbError
+from reports.commands.progress import stage_progress
+from reports.provenance import linear_algebra
+from reports.resimulate import repeat_run
+from reports.store.care import (
+    DAMAGED,
+    WHOLE,
+    FileState,
+    check_store,
+    collect_garbage,
+    garbage,
+    is_run,
+    repair_store,
+)
+from reports.store.runs import read_provenance
 
 
 class Action(StrEnum):
     """What to do with a folder of results."""
-
     check = "check"
     repair = "repair"
     gc = "gc"
@@ -32,8 +45,6 @@ def store(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="gc: only say what would be removed.")] = False,
 ) -> None:
     """Look after the run and table files below a folder."""
-    from iapb.errors import ArgumentError
-
     if not where.exists():
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
     if where.is_file() and action in (Action.repair, Action.gc):
@@ -42,9 +53,6 @@ def store(
 
 
 def _check(where: Path, _: bool) -> None:
-    from reports.commands.progress import stage_progress
-    from reports.store.care import DAMAGED, check_store
-
     with stage_progress() as progress:
         states = check_store(where, lambda done, total: progress("files read whole", done, total))
     _tell(states)
@@ -54,9 +62,6 @@ def _check(where: Path, _: bool) -> None:
 
 
 def _repair(where: Path, _: bool) -> None:
-    from reports.commands.progress import stage_progress
-    from reports.store.care import DAMAGED, repair_store
-
     with stage_progress() as progress:
         states = repair_store(where, lambda done, total: progress("files read whole", done, total))
     _tell(states)
@@ -65,10 +70,6 @@ def _repair(where: Path, _: bool) -> None:
 
 
 def _tell(states: Sequence[FileState]) -> None:
-    from collections import Counter
-
-    from reports.store.care import WHOLE
-
     for state in states:
         if state.state != WHOLE:
             print(f"{state.path}: {state.state}: {state.why}")
@@ -78,8 +79,6 @@ def _tell(states: Sequence[FileState]) -> None:
 
 
 def _gc(where: Path, dry_run: bool) -> None:
-    from reports.store.care import collect_garbage, garbage
-
     found = garbage(where)
     size = sum(state.size for state in found) / 1e6
     for state in found:
@@ -91,9 +90,6 @@ def _gc(where: Path, dry_run: bool) -> None:
 
 
 def _again(where: Path, _: bool) -> None:
-    from reports.commands.progress import stage_progress
-    from reports.store.care import is_run
-
     files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
     same = 0
     with stage_progress() as progress:
@@ -107,11 +103,6 @@ def _again(where: Path, _: bool) -> None:
 
 def _tell_again(path: Path) -> bool:
     """Simulate one run again, and say what differs and by how much; whether nothing does."""
-    from iapb.errors import IapbError
-    from reports.provenance import linear_algebra
-    from reports.resimulate import repeat_run
-    from reports.store.runs import read_provenance
-
     try:
         found = repeat_run(path)
     except IapbError as error:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import os
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from reports.commands.progress import stage_progress
+from reports.sweeps.files import find_study, scene_of
+from reports.sweeps.schedule import cluster, processes
+from reports.sweeps.study import load_study
+from reports.sweeps.sweep import SUMMARY, run_sweep
 
 
 def sweep(
@@ -18,15 +26,6 @@ def sweep(
 
     Stop it whenever you like; the same command goes on where it stopped.
     """
-    import os
-    from collections import Counter
-
-    from reports.commands.progress import stage_progress
-    from reports.sweeps.files import find_study, scene_of
-    from reports.sweeps.schedule import cluster, processes
-    from reports.sweeps.study import load_study
-    from reports.sweeps.sweep import SUMMARY, run_sweep
-
     path = find_study(study)
     chosen = load_study(path)
     who = cluster(scheduler) if scheduler else processes(workers or os.cpu_count() or 1)

@@ -1,13 +1,28 @@
-"""`iapb verify`: the passivity kit on anybody's impact resolver; `--full`: every law at length, resumable."""
+"""`iapb verify`: the passivity kit on an impact resolver; `--full`: every law at length; `--simulator`: an engine."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-ENGINE = "iapb:resolve_impact"
+from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
+from reports.by_name import function_named
+from reports.campaign import ENGINE, KEPT_PER_LAW, Campaign, CampaignRequest
+from reports.campaign_counterexamples import recheck
+from reports.commands.progress import stage_progress, to_log
+from reports.compiling import compiling_told
+from verification import check_passivity
+from verification.engines import SETTINGS, compare_engines, sentence, verdict
+from verification.engines.record import EngineRecord
+from verification.properties.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
+from verification.properties.kit import IMPACTS as KIT_IMPACTS
+from verification.properties.tally import LawCount
+
+ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
+_SHOWN = 20  # counterexamples listed; all are in their folder
 
 
 def verify(
@@ -33,17 +48,11 @@ def verify(
     if scene and not simulator:
         raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
     if simulator:
-        from reports.commands.verify_simulator import verify_simulators
-
         verify_simulators(simulator, scene or ())
         return
     if recheck is not None:
-        from reports.commands.verify_full import print_recheck
-
         passed = print_recheck(recheck)
     elif full:
-        from reports.commands.verify_full import verify_full
-
         passed = verify_full(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
     else:
         passed = _kit(resolver, impacts, seed, unequal)
@@ -52,14 +61,118 @@ def verify(
 
 
 def _kit(resolver: str, impacts: int | None, seed: int, unequal: bool) -> bool:
-    from reports.by_name import function_named
-    from reports.commands.progress import stage_progress
-    from verification import check_passivity
-    from verification.properties.kit import IMPACTS
-
     tested = function_named("--resolver", resolver)
     with stage_progress() as progress:
-        report = check_passivity(tested, impacts=impacts or IMPACTS, seed=seed, unequal_restitution=unequal,
+        report = check_passivity(tested, impacts=impacts or KIT_IMPACTS, seed=seed, unequal_restitution=unequal,
                                  progress=lambda done, total: progress("impacts", done, total))
     print(report)
     return report.passed
+
+
+def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path) -> bool:
+    """Do what is missing, print a line per law; return whether all are kept. Another's resolver: impacts only."""
+    ours = resolver == ENGINE
+    bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
+    request = CampaignRequest(resolver, bounds, condition, impacts, trajectories, seed, workers)
+    request.subject()  # a name that cannot be imported is told here, not by a worker
+    batches, campaign = plan(impacts, trajectories, PARTS if ours else (IMPACTS,)), Campaign(out, request)
+    there = sum(campaign.path_of(batch).is_file() for batch in batches)
+    print(f"{len(batches)} batches in {campaign.folder}, {there} of them done before.", flush=True)
+    try:
+        with stage_progress() as progress:
+            campaign.run(batches, progress)
+    except KeyboardInterrupt:
+        print("Stopped; the same command goes on from here. So far:")
+        _print_counts(campaign, batches)
+        raise
+    kept = _print_counts(campaign, batches)
+    print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
+    found = campaign.counterexamples()
+    if found:
+        print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law. Impacts and "
+              "trajectories are runs, for iapb inspect FILE. Judged again by:")
+    for path in found[:_SHOWN]:
+        print(f"  iapb verify --recheck {path}")
+    return kept
+
+
+def _print_counts(campaign: Campaign, batches: tuple[object, ...]) -> bool:
+    kept = True
+    for part, laws in campaign.counts(batches).items():  # type: ignore[arg-type]
+        print(f"{part}:")
+        for count in laws.values():
+            print(f"  {'BROKEN' if count.failures else 'kept  '} {count_in_words(count)}")
+            kept = kept and not count.failures
+    print(f"Of the laws of impacts, {', '.join(OF_ONE_CALL)} are put to every one; each other to one in {ONE_IN}.")
+    return kept
+
+
+def count_in_words(count: LawCount) -> str:
+    """Return how many broke a law, of how many, and the worst as a share of its tolerance."""
+    worst = count.worst
+    nearest = "" if worst is None else f", worst {worst.value:.2e} of {worst.tolerance:.2e} ({worst.ratio:.3f} of it)"
+    return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
+
+
+def print_recheck(path: Path) -> bool:
+    """Print every residual of a stored counterexample; return whether all laws are kept now."""
+    kept = True
+    with compiling_told(to_log):
+        judged = tuple(recheck(path))
+    for law, residual in judged:
+        print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")
+        kept = kept and residual.passed
+    return kept
+
+
+def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
+    """Run the scenes and print what came of them; `all` names every engine.
+
+    Raises
+    ------
+    MissingDependencyError
+        An engine that was asked for by name is not installed.
+    """
+    names = list(SIMULATORS) if "all" in simulators else list(dict.fromkeys(simulators))
+    chosen = list(dict.fromkeys(scenes)) or list(FIXED_SCENES)
+    for scene in chosen:
+        fixed_scene(scene)  # a wrong name is told before anything runs
+    for name in names:
+        simulator = find_simulator(name)
+        if "all" not in simulators:
+            simulator.version()
+    with stage_progress() as progress:
+        records = compare_engines(names, chosen,
+                                  progress=lambda done, total: progress("pairs of engine and scene", done, total))
+    for name in names:
+        for choice in SETTINGS:
+            of_engine = [record for record in records if record.engine == name and record.choice == choice]
+            print(sentence(of_engine))
+            if of_engine[0].missing:
+                break
+    present = [record for record in records if not record.missing]
+    if present:
+        _table(present)
+        _settings(present)
+
+
+def _table(records: Sequence[EngineRecord]) -> None:
+    print(f"\n{'engine':<11}{'scene':<24}{'settings':<9}{'law':<8}{'energy':>10}{'rise':>10}{'momentum':>10}"
+          f"{'velocity':>10}{'depth [m]':>10}{'drift [m]':>10}")  # fmt: skip
+    for record in records:
+        numbers = (record.energy_error, record.energy_gain, record.momentum_error, record.velocity_error,
+                   record.penetration, record.drift)  # fmt: skip
+        print(f"{record.engine:<11}{record.scene:<24}{record.choice:<9}{verdict(record):<8}"
+              + "".join(f"{'-' if number is None else format(number, '.1e'):>10}" for number in numbers))  # fmt: skip
+        if record.failure:
+            print(f"{'':<11}{record.failure}")
+
+
+def _settings(records: Sequence[EngineRecord]) -> None:
+    print("\nSettings:")
+    for settings in dict.fromkeys(f"{record.engine}: {record.settings}" for record in records):
+        used = [record for record in records if f"{record.engine}: {record.settings}" == settings]
+        print(f"  {settings}")
+        print(f"    in {', '.join(dict.fromkeys(f'{record.scene} ({record.choice})' for record in used))}")
+    for note in dict.fromkeys(f"{record.title}: {record.note}" for record in records if record.note):
+        print(f"  {note}.")

@@ -6,12 +6,12 @@ import json
 import subprocess
 import sys
 from contextlib import contextmanager
+from importlib import import_module
 
 import pytest
 
 from iapb.errors import SceneError
 from reports import cli
-from reports.commands import progress as progress_bars
 
 SHORT = ("--set", "duration=0.4")
 HEAVY = {"numpy", "numba", "cvxpy", "pinocchio", "sympy", "matplotlib", "h5py", "scipy", "coal", "flint", "hypothesis"}
@@ -41,9 +41,11 @@ def test_help_loads_nothing_heavy_and_lists_every_command():
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
-def test_every_command_explains_itself(command, iapb):
+def test_every_command_explains_itself_in_the_words_of_the_list(command, iapb):
     status, out, _ = iapb(command, "--help")
     assert status == 0 and "Usage" in out
+    explained = getattr(import_module(f"reports.commands.{command}"), command).__doc__
+    assert explained.partition("\n")[0] == cli.COMMANDS[command]
 
 
 @pytest.mark.parametrize("arguments", [["walk"], ["run"], ["run", "peg_corner", "--speed", "3"], ["inspect"], [],
@@ -88,7 +90,7 @@ def test_an_interrupted_run_leaves_a_readable_partial_file_and_ends_with_130(iap
 
         yield progress
 
-    monkeypatch.setattr(progress_bars, "step_progress", interrupting)
+    monkeypatch.setattr("reports.commands.run.step_progress", interrupting)
     status, out, err = iapb("run", "peg_corner", "--out", tmp_path)
     [file] = tmp_path.glob("*.partial")
     assert status == 130 and str(file) in out and "Stopped: interrupted" in out and "Traceback" not in err
@@ -225,7 +227,7 @@ def test_ctrl_c_outside_a_run_is_told_and_ends_with_130(iapb, monkeypatch):
     def stopped(**options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("iapb.scene.scene_schema", stopped)
+    monkeypatch.setattr("reports.commands.schema.scene_schema", stopped)
     status, _, err = iapb("schema")
     assert status == 130 and err == "iapb: stopped; what was finished is kept.\n"
 
@@ -234,7 +236,7 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
     def broken(**options):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("iapb.scene.scene_schema", broken)
+    monkeypatch.setattr("reports.commands.schema.scene_schema", broken)
     with pytest.raises(ZeroDivisionError):
         cli.main(["schema"])
 
