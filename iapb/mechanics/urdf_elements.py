@@ -10,9 +10,8 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.dense import product
-from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
+from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.urdf_spelling import check_spelling
 
 Floats = NDArray[np.float64]
@@ -111,14 +110,5 @@ def origin_of(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
     if "quat_xyzw" in element.attrib:
         raise ArgumentError(f"{where} origin quat_xyzw", element.get("quat_xyzw"), "the rotation as rpy")
     position = numbers_in(f"{where} origin xyz", element.get("xyz", "0 0 0"), 3)
-    roll, pitch, yaw = numbers_in(f"{where} origin rpy", element.get("rpy", "0 0 0"), 3)
-    return product(product(_turn(2, yaw), _turn(1, pitch)), _turn(0, roll)), position
-
-
-def _turn(axis: int, angle: float) -> Floats:
-    """Rotation about a coordinate axis."""
-    rotation, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
-    sin, cos = sine_cosine(angle)
-    rotation[i, i] = rotation[j, j] = cos
-    rotation[j, i], rotation[i, j] = sin, -sin
-    return rotation
+    angles = numbers_in(f"{where} origin rpy", element.get("rpy", "0 0 0"), 3)
+    return rotation_of(angles) + 0.0, position  # + 0.0: no negative zeros

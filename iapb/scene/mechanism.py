@@ -19,9 +19,9 @@ from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
-from iapb.scene.robots import rotation_of
 
 Floats = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ its folder.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -65,7 +64,7 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         The path leads out of the folder, the file is no URDF robot, a link that is named does not exist, or a
         link's <collision> is no box or sphere.
     """
-    from iapb.mechanics.urdf import read_urdf
+    from iapb.mechanics.urdf import read_urdf  # brings numba along
 
     path = urdf_path(robot.urdf, folder)
     links = read_urdf(path, robot.floating)
@@ -94,6 +93,8 @@ def _collisions_of(robot: Robot, path: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def _plain_shape(shape: Any) -> dict[str, Any]:
+    from iapb.mechanics.rotations import angles_of  # brings numba along
+
     center = shape.center.tolist()
     if shape.kind == "sphere":
         return {"kind": "sphere", "radius": float(shape.lengths[0]), "center": center}
@@ -111,6 +112,7 @@ def urdf_path(text: str, folder: Path) -> Path:
 
 def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[str, Any]:
     from iapb.dense import product  # brings numba along
+    from iapb.mechanics.rotations import angles_of, rotation_of
 
     rotation, origin = link.placement
     if link.parent is None:
@@ -137,29 +139,6 @@ def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[s
 def body_name(robot: str, link: str) -> str:
     """Return the name of a link's body: <robot>_<link>, with _ for what names of scenes do not hold (link_3.0)."""
     return re.sub(r"[^A-Za-z0-9_-]", "_", f"{robot}_{link}")
-
-
-def rotation_of(rpy: Any) -> np.ndarray:
-    """Return the rotation (3, 3) by roll, pitch, yaw about fixed x, y, z: R_z R_y R_x."""
-    from iapb.elementary import sine_cosine  # brings numba along
-
-    (sr, cr), (sp, cp), (sy, cy) = (sine_cosine(float(angle)) for angle in rpy)
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
-
-
-def angles_of(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw [rad] of a rotation; at pitch ±90° the roll is taken as zero."""
-    from iapb.elementary import arc_tangent  # brings numba along
-
-    across = math.hypot(rotation[0, 0], rotation[1, 0])
-    pitch = arc_tangent(-rotation[2, 0], across)
-    if across < 1e-9:  # x points up or down: only the sum of roll and yaw is determined
-        return 0.0, pitch, arc_tangent(-rotation[0, 1], rotation[1, 1])
-    return arc_tangent(rotation[2, 1], rotation[2, 2]), pitch, arc_tangent(rotation[1, 0], rotation[0, 0])
 
 
 def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, int]]) -> tuple[Any, list[Mistake]]:

@@ -12,9 +12,9 @@ import pytest
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, POLYGON
 from iapb.errors import SceneError
 from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.rotations import angles_of, rotation_of
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
-from iapb.scene.robots import angles_of, rotation_of
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
 CHAIN = scene_from_text("""\
