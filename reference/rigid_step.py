@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.names import one_of
-from reference.complementarity.solvers import daqp_qp, quadprog_qp
+from reference.complementarity.solvers import daqp_qp, gauss_seidel, quadprog_qp
 
 Floats = NDArray[np.float64]
 
@@ -168,8 +168,10 @@ def velocity_bounds(
 
 def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
     """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE, or rounding."""
-    said = []
-    for solver in (daqp_qp, quadprog_qp):
+    said: list[str] = []
+    for solver in (daqp_qp, quadprog_qp, gauss_seidel):  # active sets cycle on some redundant rows, projections do not
+        if solver is gauss_seidel and "infeasible" in said[0]:
+            continue
         try:
             impulse = solver.multipliers(rows, offset)
         except SolverError as error:

@@ -1,18 +1,32 @@
 """Event-driven truth for the project's scenes: smooth motion by a high-order integrator, events found by its roots.
 
-Between events M a = f − B − G + Jᵀλ with the closed contacts held (J a + J̇v = 0, λ >= 0); an event is a gap that closes
-or a λ that ends. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling the
-device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one
-on the device at the same instant. This is what the "ideal" world's steps must converge to, for scenes whose
-impacts do not accumulate within the duration asked for. Configurations with quaternions or (cos, sin) move by their
-rate dq/dt, and are brought back to length one wherever they are looked at.
+Between events M a = f − B − G + Jᵀλ with the lasting contacts held (J a + J̇v = 0); an event is a gap that closes or a
+lasting contact that lets go. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling
+the device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one on the
+device at the same instant. This is what the "ideal" world's steps must converge to. Configurations with quaternions or
+(cos, sin) move by their rate dq/dt, and are brought back to length one wherever they are looked at.
+
+What decides, so that rounding does not (`Tolerances` has the sizes):
+
+- A contact is *closed* where its gap is at most `closed`, and *strikes* where it approaches faster than `at_rest`.
+- A closed contact *lasts* where the complementary acceleration keeps it closed (a of 0 <= λ ⟂ J a + J̇v >= 0 over the
+  contacts at rest), whether it pushes or not. A redundant or unloaded contact lasts like any other: no single λ counts.
+- *Chatter and Zeno*: a contact that leaves too slowly to rise by BOUNCE before it returns lasts too: its velocity is
+  set to zero. So bounces that shrink end after finitely many.
+- A contact *lets go* where the complementary acceleration would open it by more than `released` of those at hand.
+- A contact that *grazes*, so that no velocity jumps and no contact begins or ceases to last, is no event.
+- A contact that has just opened may close again only once it was open by twice `closed`, or overlaps by `closed`.
+
+Every truth is computed three times, with tolerances three times finer and coarser and with other steps. Where the
+events differ in number, a decision hangs on a tolerance, and there is no truth: the error says so. Otherwise the
+largest differences, and what the neglected bounces would have moved, are the truth's `bound`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,26 +44,64 @@ from reference.rigid_step import nearest_velocity
 Floats = NDArray[np.float64]
 Contact = tuple[int, int, int]
 
-# Asked of the integrator: far below the steps' errors (1e-3 to 1e-6), above the rounding of its own differences.
-_ACCURACY = 1e-11
-_CLOSED = 1e-8  # gap [m] below which a contact is closed at an event: scenes place touching shapes to 1e-9
-_AT_REST = 1e-9  # normal velocity [m/s] below which a closed contact rests
-_RELEASED = 1e-8  # share of the largest force below which a contact force has ended: the event's root carries 1e-11
-_DIFFERENCE = 1e-6  # step [s] of the central difference J̇v: truncation and rounding both near 1e-10
+
+class Tolerances(NamedTuple):
+    """What a computation decides by.
+
+    accuracy : asked of the integrator, far below the steps' errors (1e-3 to 1e-6)
+    closed : gap [m] of a closed contact: scenes place touching shapes to 1e-9, a root of the integrator errs by 1e-11
+    at_rest : normal velocity [m/s] of a contact at rest: the integrator's error, a factor of a hundred kept
+    released : share of the accelerations; so little a force changes no speed by more than that share
+    steps : least number of steps in the whole duration
+    """
+
+    accuracy: float = 1e-11
+    closed: float = 1e-8
+    at_rest: float = 1e-9
+    released: float = 1e-8
+    steps: int = 20
+
+
+COMPUTATIONS = (
+    Tolerances(),
+    Tolerances(1e-11, 3e-9, 3e-10, 3e-9, 31),
+    Tolerances(1e-10, 3e-8, 3e-9, 3e-8, 23),
+)
+BOUNCE = 1e-7  # height [m] of a bounce that is none; above twice every `closed`, so that other bounces do open
+_KEPT = 0.1  # of `released`, by which a contact opens when an event decides: what has let go does not begin to last
+_DEPENDENT = 1e-9  # singular value, relative to the largest, below which held rows depend on one another
+_DIFFERENCE = 1e-4  # step [s] of the differences of fourth order for J̇v: rounding and truncation both near 1e-12
+_COMPARED = 11  # instants between two events at which computations are compared
+_AT_ONCE = 100  # impacts at one instant: Newton's law can leave contacts that approach, for the next one
+
+
+class Bound(NamedTuple):
+    """What the truth is worth: the largest differences between the computations, and the integrator's accuracy.
+
+    position : of q over time, with the widest gap that an impact took for closed and the bounces neglected [m, rad]
+    velocity : of v between events of the same number; bounces neglected by their mean over time [m/s, rad/s]
+    instant : of the events' times [s]
+    """
+
+    position: float
+    velocity: float
+    instant: float
 
 
 @dataclass(frozen=True)
 class SceneTruth:
-    """The motion: v and q by time, and the instants of its events.
+    """The motion: v and q by time, the instants of its events, and what it is worth.
 
     segments : (start, stop, solution) with solution(t) -> (q, v, device q, device v)
     coordinates, velocities : lengths of q and v
+    bound : of the errors
     """
 
     coordinates: int
     velocities: int
     segments: tuple[tuple[float, float, Callable[[float], Floats]], ...]
     events: tuple[float, ...]
+    bound: Bound = Bound(np.nan, np.nan, np.nan)
 
     @property
     def end(self) -> float:
@@ -66,15 +118,31 @@ class SceneTruth:
         return found[:, :nq], found[:, nq : nq + self.velocities]
 
 
+class _Here(NamedTuple):
+    """v (d,), M (d, d), M⁻¹f (d,), and of the contacts asked for: rows (c, d) and J̇v (c,)."""
+
+    v: Floats
+    mass: Floats
+    free: Floats
+    rows: Floats
+    drift: Floats
+
+
 @dataclass
 class _Motion:
-    """The scene's equations; `held` are the contacts that stay closed in the present segment."""
+    """The scene's equations; `held` are the contacts that last in the present segment, `leaving` have just opened."""
 
     scene: Scene
     coupled: bool
+    tolerances: Tolerances
+    duration: float
     system: System = field(init=False)
     restitution: float = field(init=False)
+    widest: float = 0.0  # gap [m] that an impact took for closed
+    bounced: float = 0.0  # path [m] of the bounces neglected
+    flight: float = np.inf  # least time [s] that a contact which has just opened stays so
     held: list[Contact] = field(default_factory=list)
+    leaving: list[Contact] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.system = System(self.scene)
@@ -129,113 +197,234 @@ class _Motion:
             raise ArgumentError("scene", self.scene.name, "a scene with couplings.four_channel")
         return np.asarray(gains.stiffness) * distance + np.asarray(gains.damping) * speed
 
-    def acceleration(self, state: Floats) -> tuple[Floats, Floats]:
-        """a (d,) with the held contacts held, and their λ (k,) [N], of either sign."""
+    def _here(self, state: Floats, names: list[Contact]) -> _Here:
+        """What contacts of these names meet in a state; J̇v by differences of fourth order along the motion."""
         q, v, _, _ = self.split(state)
-        mass = self.system.mechanism.mass_matrix(q)
-        free: Floats = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
-        if not self.held:
-            return free, np.zeros(0)
-        rows, drift = self._held_rows(q, v)
-        response = np.linalg.solve(mass, rows.T)
-        push: Floats = np.asarray(np.linalg.lstsq(rows @ response, -(rows @ free + drift))[0], np.float64)
-        return np.asarray(free + response @ push, np.float64), push
+        mechanism = self.system.mechanism
+        mass = mechanism.mass_matrix(q)
+        free = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
+        if not names:
+            return _Here(v, mass, free, np.zeros((0, self.d)), np.zeros(0))
 
-    def _held_rows(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Rows (k, d) of the held contacts and J̇v (k,), by central difference along the motion."""
-        here = self.rows(q, v)
-        ahead, behind = (self.rows(self.system.mechanism.integrate(q, v, s * _DIFFERENCE), v) for s in (1.0, -1.0))
-        rows = np.array([here[name][1] for name in self.held])
-        turn = [(ahead[n][1] - behind[n][1]) @ v / (2.0 * _DIFFERENCE) for n in self.held]
-        return rows, np.array(turn)
+        def turning(h: float) -> Floats:
+            ahead, behind = (self.rows(mechanism.integrate(q, v, s * h), v) for s in (1.0, -1.0))
+            return np.array([(ahead[n][1] - behind[n][1]) @ v / (2.0 * h) for n in names])
+
+        found = self.rows(q, v)
+        drift = (4.0 * turning(_DIFFERENCE) - turning(2.0 * _DIFFERENCE)) / 3.0
+        return _Here(v, mass, free, np.array([found[n][1] for n in names]), drift)
+
+    def acceleration(self, state: Floats) -> tuple[Floats, Floats]:
+        """a (d,) with the lasting contacts held, and their generalized force (d,), whatever its sign."""
+        here = self._here(state, self.held)
+        change = _least_change(here.mass, here.rows, -(here.rows @ here.free + here.drift))
+        return here.free + change, np.asarray(here.mass @ change, np.float64)
 
     def rate(self, _time: float, state: Floats) -> Floats:
         """Derivative of the state."""
         q, v, device_q, device_v = self.split(state)
-        acceleration, push = self.acceleration(state)
+        acceleration, contact = self.acceleration(state)
         if self.device is None:
             return np.concatenate([configuration_rate(self.system.mechanism, q, v), acceleration])
-        contact = (np.array([self.rows(q, v)[n][1] for n in self.held]).T @ push) if self.held else np.zeros(self.d)
         force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
         force -= self.drag * device_v
         moved = np.linalg.solve(self.device.mass_matrix(device_q), force)
         return np.concatenate([v, acceleration, device_v, moved])
 
-    def strike(self, state: Floats) -> Floats:
-        """The state after the impact of all closed contacts that approach, and which contacts are held from now on."""
+    def strike(self, state: Floats) -> tuple[Floats, bool]:
+        """The state after an impact of all closed contacts, and whether anything happened; sets `held`, `leaving`."""
         q, v, device_q, device_v = (part.copy() for part in self.split(state))
-        closed = {n: row for n, (gap, row) in self.rows(q, v).items() if gap <= _CLOSED or n in self.held}
-        names, rows = list(closed), np.array(list(closed.values())).reshape(len(closed), self.d)
-        mass = self.system.mechanism.mass_matrix(q)
-        if (rows @ v < -_AT_REST).any():
+        found = self._checked(q, v)
+        names = [n for n, (gap, _) in found.items() if gap <= self.tolerances.closed or n in self.held]
+        rows = np.array([found[n][1] for n in names]).reshape(len(names), self.d)
+        self.widest = max([self.widest, *(found[n][0] for n in names)])
+        mass, impacts = self.system.mechanism.mass_matrix(q), 0
+        while (rows @ v < -self.tolerances.at_rest).any():
+            impacts += 1
+            if impacts > _AT_ONCE:
+                raise SolverError(f"{self.scene.name}: no truth: more than {_AT_ONCE} impacts at one instant")
             outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.restitution))
             v = outcome.velocity
             if self.device is not None:
                 impulse = (rows.T @ outcome.impulse)[self.tool]
                 device_v += np.linalg.solve(self.device.mass_matrix(device_q), impulse)
-        after = np.concatenate([q, v, device_q, device_v])
-        self._hold(after, [n for n, speed in zip(names, rows @ v, strict=True) if abs(speed) <= _AT_REST])
-        return after
+        before, after = self.held, np.concatenate([q, v, device_q, device_v])
+        lasting = self._lasting(after, names)
+        self.held = [n for n, stays in zip(names, lasting, strict=True) if stays]
+        self.leaving = [n for n, stays in zip(names, lasting, strict=True) if not stays]
+        after[self.nq : self.nq + self.d] += _least_change(mass, rows[lasting], -rows[lasting] @ v)
+        return after, impacts > 0 or set(before) != set(self.held)
 
-    def _hold(self, state: Floats, resting: list[Contact]) -> None:
-        """Keep those resting contacts whose complementary acceleration pushes."""
-        self.held = resting
-        if not resting:
-            return
+    def _checked(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
+        """The rows; refused where a contact overlaps: an event was missed, or the scene starts so."""
+        found = self.rows(q, v)
+        deepest = min((gap for gap, _ in found.values()), default=0.0)
+        if deepest < -3.0 * self.tolerances.closed:
+            raise SolverError(f"{self.scene.name}: no truth: rigid contacts overlap by {-deepest:.1e} m")
+        return found
+
+    def _lasting(self, state: Floats, names: list[Contact]) -> NDArray[np.bool_]:
+        """Which of the closed contacts (c,) last: those that do not open, and those that fall back before they have."""
+        here = self._here(state, names)
+        speed = here.rows @ here.v
+        resting = np.abs(speed) <= self.tolerances.at_rest
+        while True:
+            away = self._away(here, resting)
+            back = ~resting & (speed > 0.0) & (speed**2 <= -2.0 * away * BOUNCE)
+            if not back.any():
+                falling = ~resting & (away < 0.0)
+                self.flight = float((speed[falling] / -away[falling]).min(initial=np.inf)) * 2.0
+                return resting & (away <= _KEPT * self._least(here))
+            heights = speed[back] ** 2 / (-2.0 * away[back])  # each bounce e² of the one before, up and down
+            shrinking = max(1.0 - self.restitution**2, np.finfo(float).tiny)
+            self.bounced += float(np.minimum(2.0 * heights / shrinking, speed[back] * self.duration).sum())
+            resting |= back
+
+    def _away(self, here: _Here, resting: NDArray[np.bool_]) -> Floats:
+        """Accelerations (c,) [m/s²] at which the contacts open where those at rest do not close."""
+        bound = np.where(resting, -here.drift, -np.inf)
+        return here.rows @ nearest_velocity(here.mass, here.free, here.rows, bound).velocity + here.drift
+
+    def _least(self, here: _Here) -> Floats:
+        """Accelerations (c,) [m/s²] that count as none: `released` of the forces' and of v over T, `at_rest` over T."""
+        root = np.linalg.cholesky(here.mass)
+        size = np.linalg.norm(root.T @ here.free) + np.linalg.norm(root.T @ here.v) / self.duration
+        reach = np.linalg.norm(np.linalg.solve(root, here.rows.T), axis=0)
+        return np.asarray(self.tolerances.released * size * reach + self.tolerances.at_rest / self.duration)
+
+    def pushing(self, state: Floats) -> float:
+        """Positive [m/s²] as long as no held contact would open if it were free to."""
+        if not self.held:
+            return 1.0
+        here = self._here(state, self.held)
+        return float((self._least(here) - self._away(here, np.ones(len(self.held), np.bool_))).min())
+
+    def closing(self, state: Floats) -> float:
+        """Least gap [m] of the contacts that may close; one that has just opened may overlap by `closed`."""
         q, v, _, _ = self.split(state)
-        rows, drift = self._held_rows(q, v)
-        mass = self.system.mechanism.mass_matrix(q)
-        free: Floats = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
-        pushed = nearest_velocity(mass, free, rows, -drift).impulse
-        least = _RELEASED * float(np.abs(self.force(state)).max(initial=0.0))
-        self.held = [n for n, p in zip(resting, pushed, strict=True) if p > least]
+        return min((gap + (self.tolerances.closed if n in self.leaving else 0.0)
+                    for n, (gap, _) in self.rows(q, v).items() if n not in self.held), default=1.0)  # fmt: skip
+
+    def opening(self, state: Floats) -> float:
+        """Largest gap [m] of the contacts that have just opened, less the one from which they are open."""
+        if not self.leaving:
+            return -1.0
+        q, v, _, _ = self.split(state)
+        found = self.rows(q, v)
+        return max(found[n][0] for n in self.leaving) - 2.0 * self.tolerances.closed
 
 
-def scene_truth(scene: Scene, duration: float, coupled: bool = False, most_events: int = 60) -> SceneTruth:
+def _least_change(mass: Floats, rows: Floats, target: Floats) -> Floats:
+    """The least change (d,) of a velocity or acceleration, in the kinetic metric, with rows @ change = target."""
+    if not len(rows):
+        return np.zeros(len(mass))
+    root = np.linalg.cholesky(mass)
+    lengths = np.linalg.norm(rows, axis=1)
+    unit = np.where(lengths > 0.0, lengths, 1.0)
+    whitened = np.linalg.solve(root, (rows / unit[:, None]).T).T
+    change = np.linalg.lstsq(whitened, target / unit, rcond=_DEPENDENT)[0]
+    return np.asarray(np.linalg.solve(root.T, change), np.float64)
+
+
+def scene_truth(
+    scene: Scene, duration: float, coupled: bool = False, most_events: int = 200,
+    start: tuple[Floats, Floats] | None = None, computations: tuple[Tolerances, ...] = COMPUTATIONS,
+) -> SceneTruth:
     """Return the event-driven motion of a scene for `duration` [s]; `coupled` with the four-channel coupling's device.
+
+    start : q and v at time zero, by default the scene's
+    computations : the first is returned, the others bound it: one alone takes no notice of what hangs on a tolerance
 
     Raises
     ------
     ArgumentError
         A coupling in a scene whose coordinates may not be added, or without the gains of the coupling.
     SolverError
-        More events than `most_events`: they accumulate, or chatter.
+        No truth can be had; the message says why: contacts that overlap at the start, more events than `most_events`,
+        or a decision that hangs on a tolerance.
     """
-    motion = _Motion(scene, coupled)
-    start = motion.system.make_state()
-    device = [start.q[motion.tool], start.v[motion.tool]] if coupled else []
-    state, now = np.concatenate([start.q, start.v, *device]), 0.0
+    motions = [_Motion(scene, coupled, tolerances, duration) for tolerances in computations]
+    first, *others = (_compute(motion, most_events, start) for motion in motions)
+    for other in others:
+        if len(other.events) != len(first.events):
+            raise SolverError(
+                f"{scene.name}: no truth: {len(first.events)} events or {len(other.events)}, by the tolerances"
+            )
+    q, v = first.state(np.linspace(0.0, duration, 10 * _COMPARED))
+    sizes = (max(1.0, float(np.abs(q).max())), max(1.0, float(np.abs(v).max())), duration)
+    floor = [computations[0].accuracy * size for size in sizes]
+    floor[0] += motions[0].widest + motions[0].bounced
+    floor[1] += motions[0].bounced / duration
+    apart = [_apart(first, other) for other in others]
+    worst = [max(sizes) for sizes in zip((0.0, 0.0, 0.0), *apart, strict=True)]
+    return replace(first, bound=Bound(*(a + b for a, b in zip(floor, worst, strict=True))))
+
+
+def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | None = None) -> SceneTruth:
+    """The motion by one set of tolerances."""
+    made = motion.system.make_state()
+    q, v = start or (made.q, made.v)
+    device = [q[motion.tool], v[motion.tool]] if motion.coupled else []
+    state, now, duration = np.concatenate([q, v, *device]), 0.0, motion.duration
     segments: list[tuple[float, float, Callable[[float], Floats]]] = []
     events: list[float] = []
     for _ in range(most_events):
-        state = motion.strike(state)
-        solution = _until_event(motion, state, now, duration)
-        segments.append((now, float(solution.t[-1]), solution.sol))
-        now, state = float(solution.t[-1]), solution.y[:, -1]
+        state, happened = motion.strike(state)
+        if happened and segments:
+            events.append(now)
+        opened = True
+        while opened and now < duration:
+            solution = _until_event(motion, state, now)
+            segments.append((now, float(solution.t[-1]), solution.sol))
+            now, state, opened = float(solution.t[-1]), solution.y[:, -1], bool(len(solution.t_events[2]))
+            if opened:
+                found = motion.rows(*motion.split(state)[:2])
+                still = 2.0 * motion.tolerances.closed * (1.0 - _KEPT)
+                motion.leaving = [n for n in motion.leaving if found[n][0] < still]
         if now >= duration:
             return SceneTruth(motion.nq, motion.d, tuple(segments), tuple(events))
-        events.append(now)
-    raise SolverError(f"{scene.name}: more than {most_events} events before {now:.4g} s: they accumulate")
+    raise SolverError(f"{motion.scene.name}: no truth: impacts accumulate, {most_events} of them before {now:.4g} s")
 
 
-def _until_event(motion: _Motion, state: Floats, now: float, duration: float) -> Any:
+def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
     """Integrate to the next event, or to the end."""
     from scipy.integrate import solve_ivp
 
-    def closing(time: float, y: Floats) -> float:
-        if time == now:  # contacts that the impact has just opened: their gap is a rounding of zero
-            return 1.0
-        q, v, _, _ = motion.split(y)
-        return min((gap for n, (gap, _) in motion.rows(q, v).items() if n not in motion.held), default=1.0)
+    def closing(_time: float, y: Floats) -> float:
+        return motion.closing(y)
 
-    def releasing(_time: float, y: Floats) -> float:
-        return float(motion.acceleration(y)[1].min(initial=1.0))
+    def pushing(_time: float, y: Floats) -> float:
+        return motion.pushing(y)
 
-    found: tuple[Any, Any] = (closing, releasing)
-    for event in found:  # scipy reads these attributes
-        event.terminal, event.direction = True, -1.0
-    return solve_ivp(
-        motion.rate, (now, duration), state, "DOP853", rtol=_ACCURACY, atol=_ACCURACY, events=found,
-        dense_output=True, max_step=duration / 20.0,
+    def opening(_time: float, y: Floats) -> float:
+        return motion.opening(y)
+
+    found: tuple[Any, ...] = (closing, pushing, opening)
+    for event, direction in zip(found, (-1.0, -1.0, 1.0), strict=True):  # scipy reads these attributes
+        event.terminal, event.direction = True, direction
+    accuracy, longest = motion.tolerances.accuracy, motion.duration / motion.tolerances.steps
+    if motion.leaving:  # no step may pass over a whole bounce: a quarter of it rises to 3/4 of its height
+        longest = min(longest, 0.25 * motion.flight)
+    solution = solve_ivp(
+        motion.rate, (now, motion.duration), state, "DOP853", rtol=accuracy, atol=accuracy, events=found,
+        dense_output=True, max_step=longest,
     )  # fmt: skip
+    if solution.status < 0:
+        raise SolverError(f"{motion.scene.name}: no truth beyond {solution.t[-1]:.4g} s: {solution.message}")
+    return solution
+
+
+def _apart(one: SceneTruth, other: SceneTruth) -> tuple[float, float, float]:
+    """Largest differences of two computations of a motion, between their events of the same number."""
+    position = velocity = instant = 0.0
+    mine, theirs = ((0.0, *truth.events, truth.end) for truth in (one, other))
+    for k in range(len(mine) - 1):
+        (q, v), (q_other, v_other) = (
+            truth.state(np.linspace(at[k], at[k + 1], _COMPARED, endpoint=k == len(mine) - 2))
+            for truth, at in ((one, mine), (other, theirs))
+        )
+        instant = max(instant, abs(mine[k] - theirs[k]))
+        position = max(position, float(np.abs(q - q_other).max()) + instant * float(np.abs(v).max()))
+        velocity = max(velocity, float(np.abs(v - v_other).max()))
+    return position, velocity, instant

@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 
 # A solve of a law's LCP whose residual is above this share of the velocity scale is an error, not an outcome.
 LAW_TOLERANCE = 1e-9
+# Asked in this order for a frictionless LCP: active sets cycle, and Lemke ends on a ray, for some redundant rows and
+# some rounding; projections (Gauss-Seidel) do not, but may be slow. Each answer is judged by its recomputed residual.
+LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
 
 
 @dataclass(frozen=True)
@@ -47,13 +50,13 @@ class Law:
     apply: Callable[..., Outcome]
 
 
-def newton_lcp(problem: ImpactProblem, solver: str = "daqp") -> Outcome:
+def newton_lcp(problem: ImpactProblem, solver: str | None = None) -> Outcome:
     """0 <= p ⟂ gamma_plus + E gamma_minus >= 0."""
     impulse, residual = _solved(problem, solver)
     return Outcome(problem.velocity_plus(impulse), impulse, residual)
 
 
-def poisson(problem: ImpactProblem, solver: str = "daqp") -> Outcome:
+def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
     """Compression 0 <= p_c ⟂ gamma_c >= 0, then expansion 0 <= p_e − E p_c ⟂ gamma_plus >= 0; p = p_c + p_e."""
     compression = replace(problem, restitution=np.zeros(problem.contacts))
     p_c, first = _solved(compression, solver)
@@ -96,11 +99,15 @@ def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
     return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
 
 
-def _solved(problem: ImpactProblem, solver: str) -> tuple[Floats, float]:
-    solution = solve(problem, solver)
-    if not solution.solved(LAW_TOLERANCE):
-        raise SolverError(f"{solver} left a residual of {solution.residuals.worst:.1e}: {solution.note}")
-    return solution.answer(), solution.residuals.worst
+def _solved(problem: ImpactProblem, solver: str | None) -> tuple[Floats, float]:
+    """p (n,) and its recomputed residual by that solver, or by the first of LADDER that reaches LAW_TOLERANCE."""
+    said = []
+    for name in LADDER if solver is None else (solver,):
+        solution = solve(problem, name)
+        if solution.solved(LAW_TOLERANCE):
+            return solution.answer(), solution.residuals.worst
+        said.append(f"{name} left a residual of {solution.residuals.worst:.1e}: {solution.note}")
+    raise SolverError("; ".join(said))
 
 
 def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:

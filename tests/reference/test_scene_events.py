@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
@@ -65,6 +65,41 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(rest
     if restitution == 0.0:
         q, v = truth.state(np.linspace(struck, 0.3, 20))
         assert q == pytest.approx(angle, abs=1e-9) and np.abs(v).max() <= 1e-9
+
+
+BOUNCING = """
+name: bouncing
+rate: 1000
+duration: 1
+gravity: [0, -9.81]
+bodies:
+  - {name: ball, joint: planar, mass: 0.5, inertia: 2e-4, shapes: [{kind: circle, radius: 0.04}],
+     position: [0, 0.09, 0], velocity: [0.3, 0, 0]}
+walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]
+contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+"""
+
+
+def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
+    """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and then slides on."""
+    truth = scene_truth(scene_from_text(BOUNCING % 0.5), 1.0)
+    rests = 3.0 * np.sqrt(2.0 * 0.05 / G)
+    falls = rests / 3.0 * (1.0 + 2.0 * (1.0 - 0.5 ** np.arange(len(truth.events))))
+    assert truth.events == pytest.approx(falls, abs=2.0 * truth.bound.instant)
+    assert truth.events[-1] == pytest.approx(rests, abs=6e-4)  # 2 v/g/(1 - e) of bounces below 1e-7 m
+    q, v = truth.state(np.linspace(rests, 1.0, 9))
+    assert q[:, 1] == pytest.approx(0.04, abs=truth.bound.position) and q[-1, 0] == pytest.approx(0.3, abs=1e-9)
+    assert np.abs(v[:, 1]).max() <= truth.bound.velocity
+
+
+def test_impacts_that_accumulate_too_slowly_are_named() -> None:
+    with pytest.raises(SolverError, match="bouncing: no truth: impacts accumulate, 20 of them before"):
+        scene_truth(scene_from_text(BOUNCING % 0.97), 6.0, most_events=20)
+
+
+def test_a_scene_that_starts_overlapping_has_no_truth_and_says_so() -> None:
+    with pytest.raises(SolverError, match="box_stack: no truth: rigid contacts overlap by"):
+        scene_truth(load_scene(find_scene("box_stack")), 0.1)
 
 
 def test_a_tumbling_body_keeps_energy_and_angular_momentum() -> None:

@@ -128,6 +128,8 @@ def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepping.daqp_qp, "multipliers", wrong)
     assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # quadprog
     monkeypatch.setattr(stepping.quadprog_qp, "multipliers", wrong)
+    assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # Gauss-Seidel
+    monkeypatch.setattr(stepping.gauss_seidel, "multipliers", wrong)
     with pytest.raises(SolverError, match="residual"):
         step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from iapb.errors import SolverError
+
 if TYPE_CHECKING:
     from iapb.scene import Scene
     from reference.scene_events import SceneTruth
@@ -22,6 +24,8 @@ _LEVELS = 4.0
 # Errors per step on the fine level up to this multiple of the coarse one's count as first order: the accident of
 # where impacts fall changes them by less than two on all scenes; errors that do not shrink at all would give four.
 BOUNDED = 2.5
+# Share of the errors on the fine level that the truth's own error may have: it then moves no order by more than 0.1.
+WORTH = 0.1
 _ROUNDING = 1e-9  # per second of step: an error of rounding alone is as good as none
 
 
@@ -73,6 +77,7 @@ class ConvergenceRow:
 
     position : sup norm over time and coordinates, per second of step [m/s, rad/s]
     velocity : L¹ over time, largest coordinate, per second of step
+    truth_error : bound of the truth's own errors of positions [m, rad] and velocities [m, rad]
     """
 
     scene: str
@@ -84,6 +89,7 @@ class ConvergenceRow:
     position_fine: float
     velocity_coarse: float
     velocity_fine: float
+    truth_error: tuple[float, float] = (np.nan, np.nan)
 
     @property
     def position_order(self) -> float:
@@ -127,17 +133,30 @@ def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> Con
     from reference.scene_events import scene_truth
     from reference.time_stepping import RigidConstraints
 
-    scene = _scene(case.scene)
+    scene = scene_of(case.scene)
     truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints(scheme=scheme)
     levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
     (position_coarse, velocity_coarse), (position_fine, velocity_fine) = levels
     return ConvergenceRow(
         case.scene, scheme, case.coupled, case.duration, len(truth.events), float(position_coarse),
         float(position_fine), float(velocity_coarse), float(velocity_fine),
+        _worth(case, truth, position_fine, velocity_fine),
     )  # fmt: skip
 
 
-def _scene(name: str) -> Scene:
+def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> tuple[float, float]:
+    """Bounds of the truth's errors, as the steps' are measured; refused where they could be taken for the steps'."""
+    bound, last = truth.bound, min(1.0 / rate for rate in FINE)
+    _, v = truth.state(np.linspace(0.0, truth.end, 101))
+    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ of velocities that jump too late
+    worth = bound.position, bound.velocity * case.duration + jumps
+    for error, measured in zip(worth, (position, velocity), strict=True):
+        if error > max(WORTH * measured, _ROUNDING) * last:
+            raise SolverError(f"{case.scene}: no truth: known to {error:.1e}, the steps err by {measured * last:.1e}")
+    return worth
+
+
+def scene_of(name: str) -> Scene:
     """A scene of `truth_scenes`, or one of the project's."""
     from iapb.scene import find_scene, load_scene, scene_from_text
     from verification.comparison.truth_scenes import TRUTH_SCENES

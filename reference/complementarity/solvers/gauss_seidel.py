@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import velocity_scale
 from reference.complementarity.solvers.answer import Answer
+
+Floats = NDArray[np.float64]
 
 _SWEEPS = 20_000
 _WORK = 1e9  # multiplications, about two seconds: fewer sweeps for larger problems, never fewer than _LEAST_SWEEPS
@@ -47,10 +50,18 @@ def solve(problem: ImpactProblem) -> Answer:
     """Return the impulse after the last sweep, converged or not: the residuals tell."""
     if (np.diag(problem.delassus) < 0.0).any():
         raise SolverError("refused: W has a negative diagonal entry")
-    p = np.zeros(problem.size)
-    still = _STILL * velocity_scale(problem)
-    sweeps = max(_LEAST_SWEEPS, min(_SWEEPS, int(_WORK / problem.size**2)))
-    done = _sweep_until_still(
-        np.ascontiguousarray(problem.delassus), problem.offset, problem.two_sided, p, sweeps, still
-    )
-    return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {sweeps} sweeps")
+    p, done = _projected(problem.delassus, problem.offset, problem.two_sided, velocity_scale(problem))
+    return Answer(p, f"still after {done} sweeps" if done >= 0 else "not still after the last sweep")
+
+
+def multipliers(rows: Floats, offset: Floats) -> Floats:
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,), as far as the sweeps lead."""
+    scale = float(np.abs(offset).max(initial=0.0)) or 1.0
+    return _projected(rows @ rows.T, offset, np.zeros(len(offset), np.bool_), scale)[0]
+
+
+def _projected(w: Floats, b: Floats, bilateral: NDArray[np.bool_], scale: float) -> tuple[Floats, int]:
+    """p (n,) after the last sweep, and how many there were: -1 where the limit came first."""
+    p = np.zeros(len(b))
+    sweeps = max(_LEAST_SWEEPS, min(_SWEEPS, int(_WORK / max(1, len(b)) ** 2)))
+    return p, _sweep_until_still(np.ascontiguousarray(w), b, bilateral, p, sweeps, _STILL * scale)
