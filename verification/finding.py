@@ -271,7 +271,7 @@ def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | 
 
 def of_each(
     cases: Iterable[Case], results: Callable[[Case], Iterable[Result]], failures: list[Failure] | None,
-    name: Callable[[Case], str] = str,
+    name: Callable[[Case], str] | None = None,
 ) -> Iterator[Result]:
     """Yield the results of each case; one that raises is a Failure of that name, and yields none."""
     for case in cases:
@@ -279,4 +279,12 @@ def of_each(
         def listed(case: Case = case) -> list[Result]:
             return list(results(case))
 
-        yield from attempt(name(case), listed, failures) or ()
+        yield from attempt(name(case) if name else _words(case), listed, failures) or ()
+
+
+def _words(case: Any) -> str:
+    """A case in words: the parts of a tuple, with their names where it has names."""
+    if not isinstance(case, tuple):
+        return str(case)
+    names = getattr(case, "_fields", ())
+    return ", ".join([f"{name} {part}" for name, part in zip(names, case, strict=True)] if names else map(_words, case))

@@ -44,6 +44,8 @@ def _impact_laws(failures: list[Failure]) -> Iterator[Property]:
         first.setdefault(bug.caught_by, (name, bug))
 
     def judged(verdict: Any) -> Iterator[Property]:
+        if verdict.error is not None:
+            raise verdict.error
         fault, caught = "", None
         if verdict.law in first:
             fault, bug = first[verdict.law]

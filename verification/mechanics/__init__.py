@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 
 from verification.finding import Failure, Table, attempt
 
@@ -38,13 +39,10 @@ def check_mechanics(
 
     `failures` receives the cases that raise, and studies that do as a whole; without it that passes through.
     """
-    from importlib import import_module
-
     found: dict[str, Table] = {}
     for done, (name, (module, function)) in enumerate(STUDIES.items(), 1):
-        study = getattr(import_module(f"{__name__}.{module}"), function)
         cases: list[Failure] | None = None if failures is None else []
-        table: Table | None = attempt(name, partial(study, depth=depth, failures=cases), failures)
+        table = attempt(name, partial(_table, module, function, depth, cases), failures)
         if failures is not None:
             failures += [replace(one, case=f"{name}, {one.case}") for one in cases or ()]
         if table is not None:
@@ -52,3 +50,8 @@ def check_mechanics(
         if progress is not None:
             progress(done, len(STUDIES))
     return found
+
+
+def _table(module: str, function: str, depth: str, failures: list[Failure] | None) -> Table:
+    study: Callable[..., Table] = getattr(import_module(f"{__name__}.{module}"), function)
+    return study(depth=depth, failures=failures)

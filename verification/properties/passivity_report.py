@@ -21,6 +21,7 @@ class LawVerdict:
     largest : largest value of the residual, whatever its tolerance.
     largest_case : the impact that breaks the law with the largest residual; None if none does.
     fault : first complaint where the resolver raised or returned nothing usable.
+    error : what the law itself raised; it was not tried any further.
     """
 
     law: str
@@ -32,11 +33,12 @@ class LawVerdict:
     largest: float
     largest_case: ImpactCase | None = None
     fault: str = ""
+    error: Exception | None = None
 
     @property
     def passed(self) -> bool:
-        """No impact broke the law."""
-        return self.failures == 0
+        """No impact broke the law, and the law could be tried."""
+        return self.failures == 0 and self.error is None
 
     def __str__(self) -> str:
         mark = "kept  " if self.passed else "BROKEN"

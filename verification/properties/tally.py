@@ -22,6 +22,7 @@ class Tally:
     checked: int = 0
     failures: int = 0
     fault: str = ""
+    error: Exception | None = None
     largest: float = -np.inf
     worst: LawResidual | None = None
     worst_case: ImpactCase | None = field(default=None, repr=False)
@@ -29,8 +30,14 @@ class Tally:
     largest_case: ImpactCase | None = field(default=None, repr=False)
 
     def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
-        """Try one impact."""
-        residual, complaint = residual_of(self.law, case, resolver, bounds)
+        """Try one impact; a law that raises is not tried again."""
+        if self.error is not None:
+            return
+        try:
+            residual, complaint = residual_of(self.law, case, resolver, bounds)
+        except Exception as error:
+            self.error, self.fault = error, f"the law itself raised {type(error).__name__}: {error}"
+            return
         if residual is None:
             return
         self.checked += 1
@@ -45,7 +52,7 @@ class Tally:
     def verdict(self) -> LawVerdict:
         """What became of it."""
         return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.largest_case, self.fault)
+                          self.largest, self.largest_case, self.fault, self.error)
 
 
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:

@@ -1,0 +1,291 @@
+"""A fault in one case of a stage costs that row only; the stage is not taken for complete; the last lines say so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import verification.claims
+import verification.hard_cases
+import verification.mechanics
+import verification.proofs
+import verification.properties
+from reports.commands import reproduce
+from reports.evidence import (
+    accuracy,
+    claims,
+    counterexamples,
+    cross_checks,
+    effects,
+    gather,
+    hard_cases,
+    mechanics,
+    proofs,
+    properties,
+    runs,
+    survival,
+)
+from reports.pages.records import Evidence, FailedCases
+from reports.runner import Runner
+from verification.accuracy_time import effect_cost, measure
+from verification.claims import c07_plastic
+from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
+from verification.hard_cases import judge
+from verification.properties import engine_laws, laws, trajectory_laws
+
+Patch = pytest.MonkeyPatch
+Found = tuple[Any, list[Failure]]
+
+
+def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
+    """`original`, which raises where `here` is true of its arguments."""
+
+    @wraps(original)
+    def call(*arguments: Any, **options: Any) -> Any:
+        if here(*arguments):
+            raise ZeroDivisionError("planted")
+        return original(*arguments, **options)
+
+    return call
+
+
+def nothing(*_: Any) -> None:
+    """No progress."""
+
+
+def of_claims(patch: Patch, folder: Path) -> list[str]:
+    """One trial of C07, and all of C01."""
+    from dataclasses import replace
+
+    chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
+    chosen["C01"] = replace(chosen["C01"], measure=broken(chosen["C01"].measure, lambda study: True))
+    patch.setattr(verification.claims, "CLAIMS", chosen)
+    patch.setattr(c07_plastic, "strike", broken(c07_plastic.strike, lambda arm, place, angle, e: (place, angle) ==
+                                                (c07_plastic.PLACES[0], c07_plastic.ANGLES[0])))  # fmt: skip
+    failures: list[Failure] = []
+    first, second = claims.compute(Runner(folder), "quick", nothing, failures)
+    assert (first.outcome, first.numbers.rows) == (NOT_COMPUTED, ())
+    trials = 2 * len(c07_plastic.PLACES) * len(c07_plastic.ANGLES) - 1
+    assert len(second.numbers.rows) == trials - 2
+    return [failure.case for failure in failures]
+
+
+def of_proofs(patch: Patch, folder: Path) -> list[str]:
+    patch.setattr(verification.proofs, "all_proofs", lambda: ("one", "two", "three"), raising=False)
+    patch.setattr(verification.proofs, "check", broken(lambda name: name, "two".__eq__), raising=False)
+    failures: list[Failure] = []
+    assert proofs.compute(nothing, failures) == ("one", "three")
+    return [failure.case for failure in failures]
+
+
+def of_properties(patch: Patch, folder: Path) -> list[str]:
+    sizes = {"KIT_IMPACTS": 3, "FAULT_IMPACTS": 1, "ENGINE_CASES": 1, "SIMULATED": 1, "FAULT_CASES": 1,
+             "TRAJECTORIES": 2, "IN_SPACE": 0, "TRAJECTORY_STEPS": 5}  # fmt: skip
+    for name, size in sizes.items():
+        patch.setattr(properties, name, size)
+    impact, engine = next(iter(laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
+    chosen = {name: engine_laws.ENGINE_LAWS[name] for name in (engine, "budget") if name in engine_laws.ENGINE_LAWS}
+    patch.setattr(engine_laws, "ENGINE_LAWS", chosen)
+    of_runs = trajectory_laws.TRAJECTORY_LAWS
+    for found, name in ((laws.LAWS, impact), (chosen, engine), (of_runs, "finite")):
+        patch.setitem(found, name, found[name]._replace(check=broken(found[name].check, lambda *_: True)))
+    failures: list[Failure] = []
+    records = properties.compute(nothing, failures)
+    every = len(laws.LAWS) + len(chosen) + len(of_runs)
+    assert len(records) == every - 3
+    assert [failure.case for failure in failures] == [impact, engine, "finite"]
+    return ["a law of each kind"]
+
+
+def of_counterexamples(patch: Patch, folder: Path) -> list[str]:
+    for name in ("printed_formula", "restitution_per_contact", "saturation"):
+        made = getattr(counterexamples, name)
+        patch.setattr(counterexamples, name, broken(wraps(made)(lambda: 1), lambda name=name: name == "saturation"))
+    failures: list[Failure] = []
+    assert counterexamples.compute(nothing, failures) == (1, 1)
+    return [failure.case for failure in failures]
+
+
+def of_bulk(patch: Patch, folder: Path) -> list[str]:
+    patch.setitem(properties.IMPACTS, "quick", 20)
+    patch.setitem(properties.COMPARED_IMPACTS, "quick", 20)
+    bulk = verification.properties.bulk_impacts
+    patch.setattr(verification.properties, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
+    failures: list[Failure] = []
+    table = properties.bulk("quick", nothing, failures)
+    assert list(dict.fromkeys(row[0] for row in table.rows)) == ["factored", "gram_pinv, as printed"]
+    return [failure.case for failure in failures]
+
+
+def of_cross_checks(patch: Patch, folder: Path) -> list[str]:
+    patch.setattr(cross_checks, "_STATES", 2)
+    patch.setattr(cross_checks, "shipped_scene", broken(cross_checks.shipped_scene, "peg_corner".__eq__))
+    patch.setattr(cross_checks, "_impulse_dynamics", lambda name: iter(()))
+    patch.setattr(cross_checks, "_complementarity", broken(lambda name: iter((name,)), "daqp".__eq__))
+    failures: list[Failure] = []
+    found = cross_checks.compute(nothing, failures)
+    assert len(found) == 4 and found[2:] == ("cvxpy_clarabel", "lemke")
+    return [failure.case for failure in failures]
+
+
+def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
+    chosen = {name: judge.HARD_CASES[name] for name in ("grazing", "one_contact")}
+    chosen["lost"] = broken(chosen["grazing"], lambda: True)
+    patch.setattr(judge, "HARD_CASES", chosen)
+    patch.setattr(verification.hard_cases, "HARD_CASES", chosen, raising=False)
+    patch.setattr(judge, "judge_hard_case", broken(judge.judge_hard_case, lambda case, method, _: (
+        method, case.name) == ("svd", chosen["grazing"]().name)))  # fmt: skip
+    failures: list[Failure] = []
+    found = hard_cases.compute(Runner(folder), nothing, failures)
+    assert [case.id for case in found] == ["grazing", "one_contact"]
+    assert "svd" not in found[0].outcomes and "svd" in found[1].outcomes
+    return [failure.case for failure in failures]
+
+
+def of_accuracy(patch: Patch, folder: Path) -> list[str]:
+    problem = measure.timed_problems()[0]
+    patch.setattr(measure, "timed_problems", lambda: (problem,))
+    patch.setattr(measure, "_ENOUGH", 0.0)
+    name = next(iter(measure.METHODS))
+    patch.setitem(measure.METHODS, name, broken(measure.METHODS[name], lambda problem: True))
+    failures: list[Failure] = []
+    table = accuracy.compute(nothing, failures)
+    assert [row[0] for row in table.rows] == list(measure.METHODS)[1:]
+    return [failure.case.removeprefix(problem.label) for failure in failures]
+
+
+def of_effects(patch: Patch, folder: Path) -> list[str]:
+    patch.setattr(effects, "SCENES", ("peg_corner", "arm_pushing"))
+    patch.setattr(effects, "shipped_scene", broken(effects.shipped_scene, "arm_pushing".__eq__))
+    made = effect_cost.EffectMeasure
+    patch.setattr(effect_cost, "_Loop", lambda *_: type("Loop", (), {"sample": lambda self: 1.0})())
+    patch.setattr(effect_cost, "_measure", broken(lambda scene, world, whole, name, pairs: made(
+        name, 1.0, 1.0, 0.0, 0.0, 0.0), lambda scene, world, whole, name, pairs: name == "impulses"))  # fmt: skip
+    failures: list[Failure] = []
+    found = effects.compute(nothing, failures)
+    assert list(found) == ["peg_corner"] and sum(bool(effect.change) for effect in found["peg_corner"]) >= 3
+    return [failure.case for failure in failures]
+
+
+def of_runs(patch: Patch, folder: Path) -> list[str]:
+    patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "hole/IAPB")})
+    patch.setattr(runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole"))
+    failures: list[Failure] = []
+    assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
+    return [failure.case for failure in failures]
+
+
+def of_survival(patch: Patch, folder: Path) -> list[str]:
+    import reports.faults
+    import reports.fuzz
+    import reports.fuzz.kinds
+    import reports.resimulate
+
+    faults = {"a damaged byte": reports.faults.FAULTS["a damaged byte"], "none": ("damage", "no_such_fault")}
+    patch.setattr(reports.faults, "FAULTS", faults)
+    patch.setitem(survival.TIMES, "quick", 1)
+    patch.setitem(survival.INPUTS, "quick", 1)
+    chosen = ("scene", "sweep")
+    tried = reports.fuzz.FuzzRecord("sweep", 1, 1, 0, (), "no")
+    patch.setattr(reports.fuzz.kinds, "kinds", lambda: dict.fromkeys(chosen))
+    patch.setattr(reports.fuzz, "fuzz", broken(lambda kind, seeds: tried, lambda kind, seeds: kind == "scene"))
+    patch.setattr(survival, "FIGURE_RUNS", {"corner/IAPB": survival.FIGURE_RUNS["corner/IAPB"]})
+    patch.setattr(reports.resimulate, "repeat_run", broken(reports.resimulate.repeat_run, lambda path: True))
+    topic = survival.compute(Runner(folder), "quick", nothing)
+    assert len(topic.tables["faults"].rows) == 1 and len(topic.tables["wrong input"].rows) == 1
+    assert [failure.case for failure in topic.failures] == ["none", "corner/IAPB", chosen[0]]
+    return ["one of each"]
+
+
+def rolled_ball(scene: Any, simulate: Any) -> Any:
+    """A ball that no false collision stops."""
+    from verification.studies.false_collisions import FalseCollisions
+
+    contact = scene.contact
+    filters = contact.cluster_distance > 0.0, contact.coherence_distance > 0.0
+    return FalseCollisions(*filters, contact.damping, 1, 0, 0, 0, 0, 0.0, 0.1, 1.0, (), ())
+
+
+def of_mechanics(patch: Patch, folder: Path) -> list[str]:
+    from verification.mechanics import robots
+    from verification.studies import false_collisions, linked_impacts, many_bodies
+
+    patch.setattr(robots, "STATES", 1)
+    patch.setattr(robots, "TREE_SIZES", (1, 2))
+    patch.setattr(robots, "_trees", broken(robots._trees, lambda joints, *_: joints == 2))
+    patch.setattr(verification.mechanics, "STUDIES", {"random trees": ("robots", "compare_trees"),
+                                                      "tumbling": ("tumbling", "no_such_study")})  # fmt: skip
+    kept, names = ("cradle of 5", "cradle of 2"), ("cradle of 2",)
+    outcomes = broken(linked_impacts.outcomes, lambda balls: balls.name in names)
+    patch.setattr(linked_impacts, "outcomes", lambda balls: outcomes(balls) if balls.name in kept else ())
+    ball = broken(rolled_ball, lambda scene, _: scene.contact.damping == 10.0 and scene.contact.cluster_distance > 0.0)
+    patch.setattr(false_collisions, "count_false", ball)
+    patch.setattr(many_bodies, "_cost", broken(lambda n: many_bodies.StepCost(n, 1e-6 * n, 1.0, 1, n, n), (20).__eq__))
+    topic = mechanics.compute(Runner(folder), "quick", nothing)
+    assert [row[2] for row in topic.tables["against Pinocchio"].rows] == ["random"]
+    assert {row[0] for row in topic.tables["linked impacts"].rows} == {"cradle of 5"}
+    assert {row[0] for row in topic.tables["many bodies"].rows} == set(many_bodies.COUNTS) - {20}
+    return [failure.case for failure in topic.failures]
+
+
+STAGES: dict[Callable[[Patch, Path], list[str]], list[str]] = {
+    of_claims: ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"],
+    of_proofs: ["two"],
+    of_properties: ["a law of each kind"],
+    of_counterexamples: ["saturation"],
+    of_bulk: ["factored, no clamp"],
+    of_cross_checks: ["peg_corner", "daqp"],
+    of_hard_cases: ["grazing, svd", "lost"],
+    of_accuracy: [", factored"],
+    of_effects: ["peg_corner, impulses", "arm_pushing"],
+    of_runs: ["hole/IAPB"],
+    of_survival: ["one of each"],
+    of_mechanics: ["random trees, trees of 2", "tumbling", "cradle of 2", "clustering alone, 10 N s/m",
+                   "both filters, 10 N s/m", "20 bodies"],
+}
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.__name__)
+def test_only_the_row_is_lost(stage: Callable[[Patch, Path], list[str]], monkeypatch: Patch, tmp_path: Path) -> None:
+    assert stage(monkeypatch, tmp_path) == STAGES[stage]
+
+
+def test_a_stage_with_failures_is_not_taken_for_complete(tmp_path: Path) -> None:
+    def compute(progress: Any, failures: list[Failure]) -> tuple[str, ...]:
+        calls.append(1)
+        if len(calls) == 1:
+            failures.append(failure_of("two", ValueError("planted")))
+        return ("one", "two")[: len(calls)]
+
+    calls: list[int] = []
+    for expected in (("one",), ("one", "two"), ("one", "two")):
+        stages = gather._Kept(tmp_path / "tables", "quick", nothing, Runner(tmp_path / "runs"))
+        assert stages.stage("proofs", tuple[str, ...], compute) == expected
+        assert [failed.stage for failed in stages.failed()] == (["proofs"] if len(expected) == 1 else [])
+        assert stages.stages[0].path.is_file()
+    assert len(calls) == 2 and not list(tmp_path.rglob("*incomplete*")) and not list(tmp_path.rglob("*failed*"))
+
+
+def test_the_last_lines_say_what_failed_and_where_the_traceback_is(
+    monkeypatch: Patch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(tmp_path / "tables" / "claims-failed.txt")
+    failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
+    monkeypatch.setattr(gather, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
+    with pytest.raises(typer.Exit) as ended:
+        reproduce.make_report(tmp_path, "quick")
+    lines = capsys.readouterr().out.splitlines()
+    assert ended.value.exit_code == 1
+    assert "Not computed: 22 cases." in lines[-23] and lines[-22] == "  claims: C01: ValueError: planted"
+    assert lines[-2:] == ["  claims: and 2 more", f"    tracebacks: {path}"]
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Not computed: 22 of claims" in page and "C22: ValueError: planted" in page
+
+
+def test_a_column_without_rows_has_no_outcome() -> None:
+    assert Table((Column("a"),)).passed is None
