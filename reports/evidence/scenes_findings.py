@@ -160,7 +160,7 @@ def _time(measures: Sequence[SceneMeasure]) -> Finding:
         return Finding(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
     sentence = (
         f"A step of {slow.scene}, the dearest, takes {slow.seconds_per_step / unit:.0f} times as long as one of "
-        f"{YARDSTICK} ({1e6 * unit:.1f} µs on this machine beside other work). Nearest to real time is {near.scene}: "
+        f"{YARDSTICK} ({1e6 * unit:.1f} µs on this machine). Nearest to real time is {near.scene}: "
         f"a step is computed {near.realtime_factor:.1f} times as fast as it lasts."
     )
     return Finding(sentence, REPRODUCED if near.realtime_factor > 1.0 else LIMITED, timed=True)

@@ -46,7 +46,7 @@ def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
          1e6 * m.seconds_per_step, unit and m.seconds_per_step / unit, m.realtime_factor, m.ending, m.book.turned_over)
         for m in measures
     )  # fmt: skip
-    note = "Time of the quickest part of each run, on a machine that did other work too: compare the ratios."
+    note = "Time of the quickest part of each run, measured on this machine: compare the ratios."
     return Numbers(columns, rows, digits=3, note=note, timed=columns[8:11])
 
 

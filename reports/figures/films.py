@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from iapb.run import Run
+from reports.figures.corner import UNLIMITED
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
 from reports.figures.film import SIZE, Film, film, frames
 from reports.figures.geometry import Floats, is_spatial
 from reports.figures.scenes_space import SIGHTS
 from reports.figures.style import FORCE, INK, LINK, MUTED, PEG, RULE, VARIABLES, WALL
-from reports.figures.worlds import UNLIMITED
 
 SIGHT = {sight.run: sight for sight in SIGHTS}
 MARKS = "Blue dots are contacts, with a line as long as the root of their force; red rays are impulses."

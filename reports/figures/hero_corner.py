@@ -9,12 +9,11 @@ import numpy as np
 
 from iapb.run import Run
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note, scale_bar
+from reports.figures.corner import MILLI, UNLIMITED, first_shown, legend_of, marks, runs_of
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.geometry import body_outlines
 from reports.figures.style import FORCE, MUTED, STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
-from reports.figures.trajectories import MILLI, first_shown, marks
-from reports.figures.worlds import UNLIMITED, legend_of, runs_of
 
 KEY, TITLE = "hero", "Four worlds in one corner"
 CAPTION = (

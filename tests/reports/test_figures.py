@@ -180,7 +180,7 @@ def test_cells(value: object, text: str) -> None:
 
 
 def test_penetration_is_that_of_the_deepest_contact(inputs: dict[str, object]) -> None:
-    from reports.figures.trajectories import penetration_over_time
+    from reports.figures.corner import penetration_over_time
 
     run = inputs["corner/IAPB"]
     assert isinstance(run, Run)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from reports.figures.corner import UNLIMITED
 from reports.figures.film import LARGEST, film, frames
 from reports.figures.films import SIGHT, bodies_markup
-from reports.figures.worlds import UNLIMITED
 from reports.pages.records import Evidence
 
 MOVED = "(old) => document.querySelector('#film-corner [data-layer=bodies] path').getAttribute('d') !== old"

@@ -1,0 +1,263 @@
+"""Figures 7 to 13 of the paper: the peg in the corner, in four worlds and with a limited or emulated device.
+
+Each figure shows trajectories or forces of some runs, on the device side. The paper's frame has x to the left and y
+down (its drawing turned by 180 degrees), so both axes of a path are reversed: the corner is at the lower right, as in
+the paper's Figure 4. Lengths in metres, angles in radians, unless a name says otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.run import Run
+from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.style import PANEL, STYLES, line_arguments, styled
+from reports.figures.traces import PATH, curve_id, traced_svg
+
+Floats = NDArray[np.float64]
+
+# The runs, by the name that the paper gives their curve, which is also its style; right: the name among the inputs.
+UNLIMITED = {"ideal": "corner/ideal", "IAPB": "corner/IAPB", "PB": "corner/PB", "CBuc": "corner/CBuc"}
+LIMITED = {**UNLIMITED, "IAPB": "corner/IAPB-spread"}
+STRATEGIES = {
+    "ideal": "corner/ideal", "pfull": "corner/IAPB", "psaturated": "corner/IAPB-saturate",
+    "pscaled": "corner/IAPB-scale", "pspread": "corner/IAPB-spread",
+}
+DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
+
+MILLI, DEGREES = 1e3, 180.0 / np.pi
+_COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
+# An impact of one step is hundreds of times the force that holds the peg afterwards, so each force is drawn twice: in
+# full, and magnified around the force that balances the hand (coordinate, heading, label, where it is cut).
+_FORCES = ((0, "force along x", "Fx [N]", 1.5), (2, "torque", "τ [N m]", 0.03))
+_BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
+_LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
+_MARKS = 9  # markers along a curve: enough to tell it in grey, few enough to see the line
+# A peg slower than this (and turning slower than this) counts as settled: a tenth of its speed at contact, where
+# the eye no longer sees it move [m/s], [rad/s].
+SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
+_FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "
+_SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
+_HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
+         "balance holds 0.32 and −0.4 N.")  # fmt: skip
+_DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One figure: its number in the paper, its runs, and what is drawn of them."""
+
+    number: int
+    title: str
+    runs: Mapping[str, str]
+    forces: bool
+    caption: str
+
+    @property
+    def recipe(self) -> Recipe:
+        """How the figure is made."""
+        key, number = f"fig{self.number:02d}", f"Figure {self.number}"
+
+        def draw(inputs: Mapping[str, Any]) -> Figure:
+            runs = runs_of(self.runs, inputs)
+            panels, numbers = _force_figure(key, runs) if self.forces else _trajectory_figure(key, runs, self.runs)
+            needs = tuple(self.runs.values())
+            return Figure(key, number, self.title, self.caption, panels, numbers, legend_of(self.runs), needs)
+
+        return Recipe(key, number, self.title, tuple(self.runs.values()), draw)
+
+
+FIGURES = (
+    Shown(7, "Hand trajectories of the four worlds", UNLIMITED, False,
+          "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
+          "line (“ideal”) is the rigid world. Look at which curve leaves it at the first contact, and which come "
+          "back to it. The device can apply any force here."),
+    Shown(8, "Forces that the hand feels", UNLIMITED, True,
+          "In full: a new contact answers with one blow of one step in the worlds with impulses. Magnified: what "
+          "remains between blows, to be compared with the 0.32 N that balances the hand."),
+    Shown(9, "Three ways to live with a weak device", STRATEGIES, False,
+          "The device can apply 15 N and 1 N m only. Saturating clips what the device gets, so that tool and device "
+          "come apart (fifth panel); scaling weakens the blow for both; spreading repeats the scaled blow in the "
+          "next steps."),
+    Shown(10, "Hand trajectories with a limited device", LIMITED, False,
+          "As Figure 7, but IAPB spreads its impulses over as many steps as the 15 N and 1 N m of the device ask "
+          "for. The last panel shows how deep the virtual peg sinks into the walls; rigid worlds do not."),
+    Shown(11, "Forces with a limited device", LIMITED, True,
+          "As Figure 8 with spread impulses. Compare the first contact of IAPB, now spread over steps, with the slow"
+          " rise of the penalty force."),
+    Shown(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
+          "The paper measured these on hardware; here the device is emulated at 512 Hz with the delay, quantisation "
+          "and damping that the scene states. Look at how often each curve bounces, and when it comes to rest."),
+    Shown(13, "Emulated device at 512 Hz: forces", DEVICE, True,
+          "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
+          "within the limits of the device. The fine chatter is the resolution of the encoders, felt through the "
+          "damping of the position channel."),
+)  # fmt: skip
+
+
+def runs_of(names: Mapping[str, str], inputs: Mapping[str, Any]) -> dict[str, Run]:
+    """Return the runs by the name of their curve."""
+    return {curve: inputs[name] for curve, name in names.items()}
+
+
+def legend_of(names: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return the legend: each curve under its own style."""
+    return tuple((curve, curve) for curve in names)
+
+
+def marks(count: int, number: int) -> tuple[int, int]:
+    """Return matplotlib's (first, every) so that curves that coincide show their markers side by side."""
+    every = max(count // _MARKS, 1)
+    return (number * every // 5) % every, every
+
+
+def first_shown(runs: Mapping[str, Run]) -> int:
+    """Return the step shortly before the first contact of any run: before it all paths are one straight line."""
+    touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
+    dt = next(iter(runs.values())).dt
+    return max(min(touching) - round(_BEFORE_CONTACT / dt), 0) if touching else 0
+
+
+# Trajectories
+
+
+def _trajectory_figure(key: str, runs: Mapping[str, Run],
+                       names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Numbers]:
+    """The path and the three coordinates; where the device is limited, also tool against device and penetration."""
+    panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
+    if names in (LIMITED, STRATEGIES):
+        panels += [_separation_panel(key, runs), _penetration_panel(key, runs)]
+    reference = "ideal" if "ideal" in runs else None
+    apart = ("from ideal x [mm]", "y [mm]", "θ [°]") if reference else ()
+    columns = ("world", *apart, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
+    note = _FROM_IDEAL + _SETTLED if reference else _SETTLED
+    return tuple(panels), Numbers(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
+
+
+def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
+    """Draw y against x of the device, from shortly before the first contact."""
+    first = first_shown(runs)
+    with styled() as new_figure:
+        drawing = new_figure(figsize=PANEL, layout="constrained")
+        axes = drawing.add_subplot()
+        for number, (curve, run) in enumerate(runs.items()):
+            x, y = MILLI * run.device_q[first:, :2].T
+            axes.plot(x, y, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                      markevery=marks(len(x), number), zorder=3 + number / 10)
+        axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        axes.xaxis.set_inverted(True)
+        axes.yaxis.set_inverted(True)
+        svg = traced_svg(drawing, f"{key}-path", PATH)
+    ends = {curve: MILLI * run.device_q[-1, :2] for curve, run in runs.items()}
+    words = "; ".join(f"{curve} ends at ({x:.1f}, {y:.1f})" for curve, (x, y) in ends.items()) + "."
+    return Panel(svg, f"Paths of the hand in the plane, in mm: {words}", "path of the hand, from just before contact")
+
+
+def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Floats], label: str, *,
+               shown: float | None = None, **how: Any) -> str:
+    """Draw one quantity of each run over time; `shown` cuts the axis to plus and minus that value."""
+    with styled() as new_figure:
+        drawing = new_figure(figsize=PANEL, layout="constrained")
+        axes = drawing.add_subplot()
+        for number, (curve, run) in enumerate(runs.items()):
+            values = values_of(run)
+            axes.plot(run.time[: len(values)], values, **line_arguments(STYLES[curve]), **how, gid=curve_id(curve),
+                      markevery=marks(len(values), number), zorder=3 + number / 10)
+        axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
+        if shown is not None:
+            axes.set_ylim(-shown, shown)
+        return traced_svg(drawing, key)
+
+
+def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
+    name, unit, factor = _COORDINATES[k]
+    svg = _over_time(f"{key}-{'xyz'[k]}", runs, lambda run: factor * run.device_q[:, k], f"{name} [{unit}]")
+    return Panel(svg, f"{name} of the hand over time in {unit}, for {', '.join(runs)}.", f"{name} over time")
+
+
+def _separation_panel(key: str, runs: Mapping[str, Run]) -> Panel:
+    def apart(run: Run) -> Floats:
+        return MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
+
+    svg = _over_time(f"{key}-apart", runs, apart, "distance [mm]")
+    return Panel(svg, f"Distance between tool and device over time, for {', '.join(runs)}.",
+                 "how far tool and device come apart")
+
+
+def _penetration_panel(key: str, runs: Mapping[str, Run]) -> Panel:
+    svg = _over_time(f"{key}-depth", runs, lambda run: MILLI * penetration_over_time(run), "penetration [mm]")
+    return Panel(svg, f"Penetration of the virtual peg over time, for {', '.join(runs)}.",
+                 "how deep the virtual peg sinks in")
+
+
+def tool_positions(run: Run) -> Floats:
+    """Return the tool's coordinates (n + 1, d_t); planar and one-dof joints have as many as they have velocities."""
+    return run.q[:, slice(*run.tool_coordinates)]
+
+
+def penetration_over_time(run: Run) -> Floats:
+    """Return the deepest penetration of each step (n,) [m], 0 without contact."""
+    depth = np.zeros(run.steps)
+    steps = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
+    np.maximum.at(depth, steps, -run.contacts.gap)
+    return depth
+
+
+def distance_between(run: Run, other: Run) -> Floats:
+    """Return the root mean square difference of the two device trajectories, per coordinate (d_t,)."""
+    count = min(len(run.device_q), len(other.device_q))
+    return np.sqrt(np.mean((run.device_q[:count] - other.device_q[:count]) ** 2, axis=0))
+
+
+def settling_time(run: Run) -> float | None:
+    """Return when the device was last faster than SETTLED_SPEED [s]; None if it still is at the end."""
+    moving = np.flatnonzero(np.any(np.abs(run.device_v) > SETTLED_SPEED[: run.device_v.shape[1]], axis=1))
+    if not len(moving):
+        return 0.0
+    return None if moving[-1] == len(run.time) - 1 else float(run.time[moving[-1] + 1])
+
+
+def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[object, ...]:
+    run = runs[curve]
+    apart: tuple[object, ...] = ()
+    if reference:
+        distance = distance_between(run, runs[reference])
+        apart = tuple(float(distance[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
+    widest = np.max(np.abs(tool_positions(run) - run.device_q), axis=0)
+    lengths = (float(penetration_over_time(run).max(initial=0.0)), float(np.hypot(*widest[:2])))
+    return (curve, *apart, *(round(MILLI * length, _DIGITS) for length in lengths), len(run.impacts.step),
+            settling_time(run))
+
+
+# Forces that the device's actuators apply
+
+
+def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Numbers]:
+    """Force along x and torque, each in full and magnified; peaks, and what is held at the end."""
+    panels = tuple(_force_panel(key, runs, k, title, label, shown) for k, title, label, cut in _FORCES
+                   for shown in (None, cut))  # fmt: skip
+    columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
+               "held τ [N m]")
+    rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(), *held_force(run).tolist())
+                 for curve, run in runs.items())  # fmt: skip
+    return panels, Numbers(columns, rows, digits=3, note=_HELD)
+
+
+def _force_panel(key: str, runs: Mapping[str, Run], k: int, title: str, label: str, shown: float | None) -> Panel:
+    magnified = f", magnified: cut at ±{shown:g} {label[label.index('[') + 1 : -1]}" if shown else ""
+    svg = _over_time(f"{key}-{k}{'m' if shown else ''}", runs, lambda run: run.device_force[:, k], label, shown=shown,
+                     drawstyle="steps-post")
+    return Panel(svg, f"{label} over time{magnified}, for {', '.join(runs)}.", title + magnified)
+
+
+def held_force(run: Run) -> Floats:
+    """Return the mean device force over the last part of the run (d_t,)."""
+    return np.asarray(run.device_force[-max(int(_LAST_PART * run.steps), 1):].mean(axis=0))
+
+
+RECIPES = tuple(figure.recipe for figure in FIGURES)
