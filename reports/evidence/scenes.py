@@ -22,8 +22,8 @@ ID, TITLE = "scene-ledger", "The scenes"
 LEAD = (
     "Every scene file of the project, run in the world IAPB at the scene's own step. The energy books say where each "
     "joule came from and went; what they leave open is energy that the steps in time made up or swallowed, and must "
-    "fall with the integrator's declared order when the step is shortened. Other load on the machine lengthens the times "
-    "per step: compare the ratios."
+    "fall with the integrator's declared order when the step is shortened. Other load on the machine lengthens the "
+    "times per step: compare the ratios."
 )
 WORLD = "IAPB"
 TIMED_AGAIN = 3  # short runs are timed in one piece, which may hold compilation
