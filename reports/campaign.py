@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from reports.batches import worker_pool
 from reports.store.keys import canonical_json, code_version
 from reports.store.tables import Column, Table, read_table, write_table
-from reports.workers import worker_pool
 
 if TYPE_CHECKING:
     from verification.properties.campaign import Batch, BatchOutcome, Subject

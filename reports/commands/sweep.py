@@ -9,10 +9,9 @@ from typing import Annotated
 
 import typer
 
+from reports.batches import cluster, processes
 from reports.commands.progress import stage_progress
-from reports.sweeps.files import find_study, scene_of
-from reports.sweeps.schedule import cluster, processes
-from reports.sweeps.study import load_study
+from reports.sweeps.study import find_study, load_study, scene_of
 from reports.sweeps.sweep import SUMMARY, run_sweep
 
 

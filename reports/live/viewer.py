@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, IapbError
 from iapb.simulation import Simulation
+from reports.batches import starting_a_process
 from reports.live.browser import HOST, show_in_browser
 from reports.live.window import Window
-from reports.workers import starting_a_process
 
 Floats = NDArray[np.float64]
 

@@ -1,19 +1,27 @@
-"""Study: what a sweep file may say. Read like a scene: every mistake at once, with its line and column."""
+"""Study: what a sweep file may say, where it is found, and its points. Read like a scene: every mistake at once."""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, ValidationError
 from pydantic_core import InitErrorDetails
 
 from iapb.errors import ArgumentError, Mistake, SceneError
+from iapb.names import one_of
+from iapb.scene import find_scene, scene_folder, scene_names
 from iapb.scene.document import MAX_CHARACTERS
 from iapb.scene.parts import Name, Number, Part, Text, located, mistakes_of
 from iapb.scene.reading import read_values
+from reports.store.keys import hash_of
 
+LAW = "law."  # paths below it are settings of the contact law
 MAX_POINTS = 1_000_000  # files in one folder: more is no sweep but a slip of the pen
 MAX_VALUES = 100_000  # of one axis
 
@@ -127,3 +135,95 @@ def study_from_text(text: str, file: str = "(text)") -> Study:
     if mistakes:
         raise SceneError(mistakes, "study")
     return study
+
+
+def study_names() -> tuple[str, ...]:
+    """The studies that come with the project."""
+    return tuple(sorted(path.stem for path in (scene_folder() / "sweeps").glob("*.yaml")))
+
+
+def find_study(name: str) -> Path:
+    """Return the study file that `name` means: a path, or the name of a study that comes with the project.
+
+    Raises
+    ------
+    ArgumentError
+        If there is neither; the message lists the studies there are.
+    """
+    path, ours = Path(name), scene_folder() / "sweeps" / f"{name}.yaml"
+    if path.is_file():
+        return path
+    if Path(name).name == name and ours.is_file():
+        return ours
+    raise ArgumentError("study", name, one_of(path.stem, study_names(), "a file, or one of: "))
+
+
+def scene_of(study: Study, path: Path) -> Path:
+    """Return the scene file of a study: in its folder or below, or one that comes with the project.
+
+    Parameters
+    ----------
+    study : as read from its file
+    path : of that file
+
+    Raises
+    ------
+    ArgumentError
+        The scene lies elsewhere, or there is none.
+    """
+    folder = path.resolve().parent
+    if study.scene in scene_names():
+        beside = folder / study.scene
+        return beside if beside.is_file() else find_scene(study.scene)
+    given = Path(study.scene)
+    if given.is_absolute() or ".." in given.parts or "\0" in study.scene:
+        raise ArgumentError("scene", study.scene, "a path inside the study's folder, or the name of a scene of ours")
+    found = (folder / given).resolve()
+    if not (found.is_relative_to(folder) and found.is_file()):
+        expected = one_of(given.stem, scene_names(), "a file beside the study, or one of: ")
+        raise ArgumentError("scene", study.scene, expected)
+    return found
+
+
+@dataclass(frozen=True)
+class Point:
+    """One simulation of a sweep: plain values, so that it travels to another machine.
+
+    scene : path of the scene's file or its name; values : by scene path; law : settings of the law by name
+    """
+
+    index: int
+    scene: str
+    world: str
+    rendering: str
+    values: dict[str, Any]
+    law: dict[str, Any]
+
+    def key(self, code: str) -> str:
+        """Hash of what is asked for, by the given version of code and scene."""
+        asked = {"world": self.world, "rendering": self.rendering, "values": self.values, "law": self.law}
+        return hash_of({"asked": asked, "code": code})[:32]
+
+
+def points_of(study: Study, scene: str) -> Iterator[Point]:
+    """Yield the points: worlds outermost, then the grid in the order of its axes, the draws innermost."""
+    axes = study.axes()
+    combinations = itertools.product(study.worlds, itertools.product(*axes.values()))
+    index = 0
+    for world, chosen in combinations:
+        for drawn in draws(study):
+            given = {**study.values, **dict(zip(axes, chosen, strict=True)), **drawn}
+            law = {path.removeprefix(LAW): value for path, value in given.items() if path.startswith(LAW)}
+            values = {path: value for path, value in given.items() if not path.startswith(LAW)}
+            yield Point(index, scene, world, study.rendering, values, law)
+            index += 1
+
+
+def draws(study: Study) -> Iterator[dict[str, float]]:
+    """Yield the random values; draw number i has a generator of its own, so that more draws change none before."""
+    if study.random is None:
+        yield {}
+        return
+    for i in range(study.random.count):
+        rng = np.random.default_rng([study.random.seed, i])
+        yield {path: float(rng.uniform(span.start, span.stop)) for path, span in study.random.values.items()}

@@ -11,22 +11,53 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from iapb.errors import ArgumentError, IapbError
+from iapb.names import one_of
+from iapb.run import Run
+from iapb.scene import Scene, find_scene, load_scene
+from iapb.simulation import simulate
+from reference.one_thread import one_thread
+from reference.worlds import find_world, require_complete
+from reports.batches import Scheduler, do_missing, here
+from reports.runner import run_inputs
+from reports.store.folder import file_name
 from reports.store.io import remove_abandoned
-from reports.store.keys import code_version
+from reports.store.keys import code_version, run_key
+from reports.store.runs import RunEntry, read_stored, store_run
 from reports.store.tables import Column, Table, write_table
-from reports.sweeps.points import Point, points_of
-from reports.sweeps.schedule import Scheduler, here
-from reports.sweeps.study import Study
-from reports.sweeps.work import DONE, FAILED, Result
+from reports.sweeps.study import Point, Study, points_of
 
+DONE, FAILED = "done", "failed"
 JOURNAL, RUNS, SUMMARY = "results.jsonl", "runs", "summary.h5"
 _MEASURES = {"impacts": "1", "energy_lost": "J", "penetration": "m", "kinetic_energy": "J"}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of one point; the measures are None where it failed, and `note` says why."""
+
+    index: int
+    point: str  # key of the point
+    status: str
+    file: str = ""
+    content_hash: str = ""
+    note: str = ""
+    impacts: int | None = None
+    energy_lost: float | None = None  # in impacts [J]
+    penetration: float | None = None  # deepest [m]
+    kinetic_energy: float | None = None  # at the end [J]
+
+    def record(self) -> dict[str, Any]:
+        """As plain values."""
+        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -58,7 +89,7 @@ def run_sweep(
     study : what to vary
     scene : path of its scene file
     out : folder of all sweeps; this one goes into the folder of its name
-    scheduler : who computes (`reports.sweeps.schedule`)
+    scheduler : who computes (`reports.batches`)
     progress : called as progress(points done, points in all)
     """
     folder = Path(out).resolve() / study.name
@@ -68,17 +99,16 @@ def run_sweep(
     points = list(points_of(study, str(Path(scene).resolve())))
     found = _journal(folder)
     results = {p.index: r for p in points if (r := found.get(p.key(code))) is not None}
-    reused, open_points = len(results), [p for p in points if p.index not in results]
-    keys = {p.index: p.key(code) for p in open_points}
-    say = progress or (lambda done, total: None)
-    say(reused, len(points))
-    computed = scheduler(open_points, str(folder / RUNS), code_version())
-    with _appending(folder / JOURNAL) as append, closing(computed):
-        for result in computed:
-            result = _under(result, keys[result.index])
-            append(result)
-            results[result.index] = result
-            say(len(results), len(points))
+    reused = len(results)
+    with _appending(folder / JOURNAL) as append:
+
+        def keep(point: Point, result: Result) -> None:
+            results[point.index] = replace(result, point=point.key(code))
+            append(results[point.index])
+
+        do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()), keep,
+                   done=lambda point: point.index in results, scheduler=scheduler,
+                   progress=progress or (lambda done, total: None))  # fmt: skip
     ordered = tuple(results[p.index] for p in points)
     _write_summary(folder / SUMMARY, study, points, ordered)
     return SweepOutcome(folder, ordered, reused, _hash(ordered))
@@ -87,12 +117,6 @@ def run_sweep(
 def _code(scene: str) -> str:
     """Version of code and scene: both decide what a point gives."""
     return hashlib.sha256(code_version().encode() + Path(scene).read_bytes()).hexdigest()
-
-
-def _under(result: Result, key: str) -> Result:
-    from dataclasses import replace
-
-    return replace(result, point=key)
 
 
 def _journal(folder: Path) -> dict[str, Result]:
@@ -156,3 +180,67 @@ def _changed(points: list[Point]) -> Iterator[Column]:
 
 def _numbers(results: tuple[Result, ...], name: str) -> np.ndarray:
     return np.array([np.nan if (value := getattr(result, name)) is None else float(value) for result in results])
+
+
+def compute_point(point: Point, folder: str, code: str) -> Result:
+    """Compute a point, or read its run where there is one.
+
+    Parameters
+    ----------
+    folder : of the run files, which this machine must see
+    code : version that the sweep is made with; a worker of another version may not take part
+
+    Raises
+    ------
+    IapbError
+        This process runs another version of the code, or does not see the folder.
+    """
+    if code_version() != code:
+        raise IapbError("a worker runs another version of iapb: install the same one on every machine")
+    if not Path(folder).is_dir():
+        raise IapbError(f"a worker does not see the folder {folder}: the machines of a cluster must share it")
+    key = point.key(code)
+    try:
+        run, entry = _run(point, Path(folder))
+    except IapbError as error:
+        return Result(point.index, key, FAILED, note=" ".join(str(error).split()))
+    return Result(point.index, key, DONE, entry.file, entry.content_hash, "", **_measures(run))
+
+
+def _run(point: Point, folder: Path) -> tuple[Run, RunEntry]:
+    """The run of a point and its file's entry; BLAS on one thread, or the sums would depend on the machine's cores."""
+    scene = _scene(point.scene).with_values(point.values)
+    world = find_world(point.world, point.rendering)
+    law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
+    key = run_key(run_inputs(scene, law, coupling, point.world))
+    path = folder / file_name(f"{scene.name}-{point.world}", key)
+    if path.is_file():
+        return read_stored(path)
+    with one_thread():
+        run = require_complete(simulate(scene, law, coupling, world=point.world))
+    return run, store_run(path, run, key=key)
+
+
+@cache
+def _scene(name: str) -> Scene:
+    return load_scene(find_scene(name))
+
+
+def _with_settings(law: Any, settings: dict[str, Any]) -> Any:
+    """The law with other settings; an unknown one is refused by name."""
+    known = [field.name for field in fields(law)] if is_dataclass(law) else []
+    for name, value in settings.items():
+        if name not in known:
+            expected = one_of(name, known or ["it has none"], f"a setting of the law {law.name!r}: ")
+            raise ArgumentError(f"law.{name}", value, expected)
+    return replace(law, **settings) if settings else law
+
+
+def _measures(run: Run) -> dict[str, Any]:
+    energy = run.energy.get("kinetic")
+    return {
+        "impacts": len(run.impacts.step),
+        "energy_lost": float(np.sum(run.impacts.energy_lost)),
+        "penetration": max(0.0, -float(run.contacts.gap.min(initial=0.0))),
+        "kinetic_energy": None if energy is None else float(energy[-1]),
+    }

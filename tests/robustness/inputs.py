@@ -36,9 +36,7 @@ from reports.cli import main
 from reports.commands.inspect import inspect
 from reports.store.io import seal
 from reports.store.tables import Column, Table, read_table, write_table
-from reports.sweeps.files import scene_of
-from reports.sweeps.points import points_of
-from reports.sweeps.study import load_study
+from reports.sweeps.study import load_study, points_of, scene_of
 from tests.robustness.damage import TOKENS, Rng, damaged_bytes, damaged_text, damaged_values
 from tests.robustness.faults import inputs_of, open_store, sample_run
 

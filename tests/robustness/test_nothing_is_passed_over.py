@@ -18,8 +18,7 @@ from iapb.mechanics.urdf_collision import read_collisions
 from iapb.scene import load_scene, scene_folder
 from iapb.scene.document import read_document
 from reference.datasets import DatasetError, read_problem
-from reports.sweeps.files import find_study, scene_of
-from reports.sweeps.study import study_from_text
+from reports.sweeps.study import find_study, scene_of, study_from_text
 
 SCENES = sorted(scene_folder().glob("*.yaml"))
 ROBOT = scene_folder() / "robots" / "seven_axis_arm.urdf"  # it has collision elements

@@ -6,9 +6,17 @@ import pytest
 
 from iapb import load_scene
 from iapb.errors import ArgumentError, SceneError
-from reports.sweeps.files import find_study, scene_of, study_names
-from reports.sweeps.points import points_of
-from reports.sweeps.study import MAX_POINTS, Range, Study, load_study, study_from_text
+from reports.sweeps.study import (
+    MAX_POINTS,
+    Range,
+    Study,
+    find_study,
+    load_study,
+    points_of,
+    scene_of,
+    study_from_text,
+    study_names,
+)
 
 
 def test_every_combination_of_world_grid_and_draw_is_a_point(study: Study) -> None:

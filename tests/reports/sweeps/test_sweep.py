@@ -7,19 +7,26 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
 
 from iapb import find_scene
 from iapb.errors import ArgumentError, IapbError
+from reports.batches import cluster, here, processes
 from reports.store.tables import read_table
-from reports.sweeps.points import Point
-from reports.sweeps.schedule import cluster, here, processes
-from reports.sweeps.study import Study, study_from_text
-from reports.sweeps.sweep import JOURNAL, RUNS, SUMMARY, SweepOutcome, run_sweep
-from reports.sweeps.work import FAILED, Result, compute_point
+from reports.sweeps.study import Point, Study, study_from_text
+from reports.sweeps.sweep import (
+    FAILED,
+    JOURNAL,
+    RUNS,
+    SUMMARY,
+    Result,
+    SweepOutcome,
+    compute_point,
+    run_sweep,
+)
 
 SCENE = str(find_scene("two_discs"))
 
@@ -36,13 +43,13 @@ class Stopped(Exception):
 def stopping_after(count: int):  # type: ignore[no-untyped-def]
     """A scheduler that computes backwards and dies after `count` points."""
 
-    def compute(points: Iterable[Point], folder: str, code: str) -> Iterator[Result]:
-        for done, result in enumerate(here(reversed(list(points)), folder, code)):
+    def schedule(compute: Callable[[Point], Result], points: Iterable[Point]) -> Iterator[tuple[Point, Result]]:
+        for done, found in enumerate(here(compute, reversed(list(points)))):
             if done == count:
                 raise Stopped
-            yield result
+            yield found
 
-    return compute
+    return schedule
 
 
 def test_a_sweep_that_was_stopped_goes_on_and_ends_alike(
@@ -95,7 +102,7 @@ def test_an_address_where_nobody_answers_is_refused(study: Study, tmp_path: Path
 
 
 def test_a_worker_of_another_version_does_not_take_part(study: Study, tmp_path: Path) -> None:
-    from reports.sweeps.points import points_of
+    from reports.sweeps.study import points_of
 
     with pytest.raises(IapbError, match="another version"):
         compute_point(next(points_of(study, SCENE)), str(tmp_path), "other code")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from iapb.errors import IapbError
-from reports.workers import worker_pool
+from reports.batches import worker_pool
 
 
 def blocked() -> bool:
@@ -43,7 +43,7 @@ def test_what_stops_the_work_ends_the_workers_in_the_middle_of_theirs():
 
 ORPHANING = """
 import os, signal
-from reports.workers import worker_pool
+from reports.batches import worker_pool
 if __name__ == "__main__":
     with worker_pool(1) as pool:
         print(pool.submit(os.getpid).result(60), flush=True)

@@ -1,0 +1,193 @@
+"""Work in parts: what is done is not done again, and who does the rest makes no difference to what comes of it.
+
+Whoever has parts to do knows which are done (`do_missing`), and hands the others to a scheduler: `here`,
+`processes(count)` or `cluster(address)`. Ctrl-C is the parent's, which ends its workers; what was kept stays.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from itertools import islice
+from multiprocessing import active_children, get_context
+from threading import Thread
+from typing import Any
+
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from reports.compiling import tell_from_worker
+
+# Called as scheduler(compute, parts); yields (part, result) as results come.
+Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Generator[tuple[Any, Any]]]
+
+_AHEAD = 4  # parts handed out per worker: enough that none waits, few enough that little is lost on Ctrl-C
+_CLUSTER_AHEAD = 256  # parts on their way to a cluster
+_WATCH = 1.0  # [s] between two looks at whether the parent is still there
+
+
+def do_missing(
+    parts: Iterable[Any], compute: Callable[[Any], Any], keep: Callable[[Any, Any], None], *,
+    done: Callable[[Any], bool], scheduler: Scheduler, progress: Callable[[int, int], None],
+    size: Callable[[Any], int] = lambda part: 1,
+) -> None:
+    """Compute the parts that are not done yet, and keep each result as it comes.
+
+    Parameters
+    ----------
+    compute : makes the result of a part; in another process, where the scheduler says so
+    keep : called as keep(part, result), in this process
+    done : whether the result of a part is kept already
+    progress : called as progress(size done, size in all)
+    size : of a part
+    """
+    every = list(parts)
+    missing = [part for part in every if not done(part)]
+    total = sum(map(size, every))
+    made = total - sum(map(size, missing))
+    progress(made, total)
+    with closing(scheduler(compute, missing)) as results:
+        for part, result in results:
+            keep(part, result)
+            made += size(part)
+            progress(made, total)
+
+
+def here(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+    """Compute in this process, one after the other."""
+    for part in parts:
+        yield part, compute(part)
+
+
+def processes(workers: int) -> Scheduler:
+    """Compute in `workers` processes of this machine; results come as they are done."""
+
+    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+        left = iter(parts)
+        with worker_pool(workers) as pool:
+
+            def begin(count: int) -> dict[Future[Any], Any]:
+                return {pool.submit(compute, part): part for part in islice(left, count)}
+
+            running = begin(workers * _AHEAD)
+            while running:
+                finished, _ = wait(running, return_when=FIRST_COMPLETED)
+                running |= begin(len(finished))
+                for future in finished:
+                    yield running.pop(future), future.result()
+
+    return schedule
+
+
+def cluster(address: str) -> Scheduler:
+    """Compute on the dask.distributed cluster whose scheduler has this address.
+
+    Raises
+    ------
+    MissingDependencyError
+        Without dask.distributed (extra ``cluster``).
+    ArgumentError
+        Where no scheduler answers.
+    """
+
+    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+        client = _client(address)
+        try:
+            yield from _on_cluster(client, compute, parts)
+        finally:
+            client.close()
+
+    return schedule
+
+
+def _client(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise MissingDependencyError("distributed", "A sweep on a cluster", "pip install 'iapb[cluster]'") from error
+    try:
+        return Client(address, timeout="10s")
+    except (OSError, ValueError, TimeoutError) as error:
+        raise ArgumentError("--scheduler", address, "the address of a running dask scheduler") from error
+
+
+def _on_cluster(client: Any, compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+    """Keep _CLUSTER_AHEAD parts on their way; pure=False: the work writes a file."""
+    from distributed import as_completed
+
+    left, part_of = iter(parts), dict[str, Any]()
+
+    def send(part: Any) -> Any:
+        future = client.submit(compute, part, pure=False)
+        part_of[future.key] = part
+        return future
+
+    pending = as_completed([send(part) for part in islice(left, _CLUSTER_AHEAD)])
+    for future in pending:
+        for part in islice(left, 1):
+            pending.add(send(part))
+        yield part_of.pop(future.key), future.result()
+
+
+@contextmanager
+def starting_a_process() -> Iterator[None]:
+    """Keep Ctrl-C from a process that is started inside, for good.
+
+    A child inherits what its parent's thread has blocked. One that ignored it only once it runs would be hit while
+    it imports: a traceback, and a pool whose lock a dying worker held waits for ever.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Pool(ProcessPoolExecutor):
+    """Starts its workers as they are needed, in `submit`."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
+        with starting_a_process():
+            return super().submit(function, *arguments, **options)
+
+
+def _begin(told: Any, parent: int) -> None:
+    """Initialise a worker, which otherwise would wait for ever for a parent that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+    tell_from_worker(told)
+
+
+@contextmanager
+def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Give `count` processes that start Python anew; whatever ends this early ends them, at once.
+
+    The first to compile a kernel says so.
+
+    Raises
+    ------
+    IapbError
+        A worker was killed, as happens where memory runs out.
+    """
+    others, context = set(active_children()), get_context("spawn")
+    told = context.Value("b", False)
+    pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(told, os.getpid()))
+    try:
+        yield pool
+    except BrokenProcessPool as error:
+        raise IapbError("a worker process was killed, as happens where memory runs out; what was done is kept, and "
+                        "the same command goes on from there, with fewer --workers for less memory") from error
+    except BaseException:
+        for worker in set(active_children()) - others:
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
