@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from verification.accuracy_time import work_precision as work_precision
+    from verification.cost import work_precision as work_precision
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.properties import bulk_impacts as bulk_impacts
     from verification.properties import check_passivity as check_passivity
@@ -18,7 +18,7 @@ _HOME = {
     "check_passivity": "verification.properties",
     "bulk_impacts": "verification.properties",
     "judge_hard_cases": "verification.hard_cases",
-    "work_precision": "verification.accuracy_time",
+    "work_precision": "verification.cost",
 }
 
 __all__ = sorted(_HOME)

@@ -14,7 +14,7 @@ from reports.evidence import accuracy
 from reports.evidence.haptic_rate import topic_of
 from reports.figures.figure import Numbers
 from reports.figures.numbers import format_cell
-from verification.accuracy_time.study import haptic_study
+from verification.cost.study import haptic_study
 from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed

@@ -15,12 +15,12 @@ from iapb.errors import ArgumentError
 from reference.datasets import problem_files
 from reference.fclib import write_fclib
 from reports.commands.progress import stage_progress
-from verification.comparison import sentences
-from verification.comparison.own_problems import own_problems
-from verification.comparison.problem_study import FACTORS, ProblemStudy, study_problems
-from verification.comparison.step_cost import CostRow
-from verification.comparison.study import ComparisonStudy
-from verification.comparison.study import compare as study_all
+from verification.complementarity import sentences
+from verification.complementarity.own_problems import own_problems
+from verification.complementarity.problem_study import FACTORS, ProblemStudy, study_problems
+from verification.complementarity.step_cost import CostRow
+from verification.complementarity.study import ComparisonStudy
+from verification.complementarity.study import compare as study_all
 
 
 def compare(

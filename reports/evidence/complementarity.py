@@ -13,7 +13,7 @@ from reports.runner import Runner
 from verification.finding import VERDICTS
 
 if TYPE_CHECKING:
-    from verification.comparison.study import ComparisonStudy
+    from verification.complementarity.study import ComparisonStudy
 
 ID, TITLE = "complementarity", "Against complementarity"
 LEAD = (
@@ -29,8 +29,8 @@ FOLDER_NAME = "problems of others"
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Compare, judge each sentence from the records, and keep what is behind it."""
-    from verification.comparison.judgement import judge
-    from verification.comparison.study import compare
+    from verification.complementarity.judgement import judge
+    from verification.complementarity.study import compare
 
     stages: list[str] = []
 

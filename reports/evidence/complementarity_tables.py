@@ -14,8 +14,8 @@ from reports.runner import Runner
 from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
-    from verification.comparison.problem_study import ProblemStudy
-    from verification.comparison.study import ComparisonStudy
+    from verification.complementarity.problem_study import ProblemStudy
+    from verification.complementarity.study import ComparisonStudy
 
 WORLD_SCENE = "peg_corner"
 SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
@@ -81,7 +81,7 @@ def step_costs(study: ComparisonStudy) -> Numbers:
 
 def profile(studies: Iterable[ProblemStudy]) -> Numbers:
     """Dolan and Moré's profile, in long form."""
-    from verification.comparison.problem_study import FACTORS
+    from verification.complementarity.problem_study import FACTORS
 
     rows = tuple(
         (each.folder, kind, solver, float(factor), float(share))
@@ -108,7 +108,7 @@ def problems(study: ProblemStudy) -> Numbers:
 
 def convergence(study: ComparisonStudy) -> Numbers:
     """Errors of the rigid world, a row per scene and step."""
-    from verification.comparison.convergence import COARSE, FINE
+    from verification.complementarity.convergence import COARSE, FINE
 
     rows = []
     for r in study.convergence:

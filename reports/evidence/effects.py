@@ -39,7 +39,7 @@ def effects_of(
     """Every effect of a scene in a world of the compiled engine, measured where it is on and can be left out."""
     from iapb import decide_effects
     from reference.worlds import find_world
-    from verification.accuracy_time.effect_cost import in_words, measure_effects
+    from verification.cost.effect_cost import in_words, measure_effects
 
     chosen = find_world(world)
     measured = {one.effect: one for one in measure_effects(scene, world, progress=progress, failures=failures)}

@@ -22,7 +22,7 @@ LARGEST_EXPONENT = {"contacts": 1.1, "bodies": 1.2}
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Measure and say what came out; nothing is simulated for keeping."""
-    from verification.accuracy_time.study import haptic_study
+    from verification.cost.study import haptic_study
 
     return topic_of(haptic_study(depth, lambda stage, done, total: progress(done, total)))
 
@@ -49,7 +49,7 @@ def _outcome(met: bool) -> str:
 
 
 def _races(study: Any) -> Iterator[Finding]:
-    from verification.accuracy_time.against_mujoco import fastest_of_theirs
+    from verification.cost.against_mujoco import fastest_of_theirs
 
     if not study.races:
         yield Finding(f"A step against MuJoCo's: {study.without_mujoco}", NOT_COMPUTED)
@@ -91,7 +91,7 @@ def _printed(study: Any) -> Iterator[Finding]:
 
 def _solvers(study: Any) -> Iterator[Finding]:
     """One sentence per way of calling: faster everywhere, or where not."""
-    from verification.comparison.step_cost import rivals
+    from verification.complementarity.step_cost import rivals
 
     for called in ("compiled", "from Python"):
         pairs = [pair for pair in rivals(study.solvers) if pair.called == called and pair.solver.verdict == "solved"]
@@ -116,7 +116,7 @@ def _solvers(study: Any) -> Iterator[Finding]:
 
 def _checks(rows: Any) -> str:
     """What of a call from Python is the impact itself."""
-    from verification.comparison.step_cost import IAPB, KERNEL
+    from verification.complementarity.step_cost import IAPB, KERNEL
 
     shares = [kernel.median / whole.median for kernel in rows for whole in rows if
               (kernel.solver, whole.solver) == (KERNEL, IAPB) and (kernel.family, kernel.contacts) ==
@@ -130,7 +130,7 @@ def _listed(contacts: list[int]) -> str:
 
 
 def _growth(study: Any) -> Iterator[Finding]:
-    from verification.accuracy_time.scaling import exponent
+    from verification.cost.scaling import exponent
 
     power, printed = (exponent(study.scaling, method, "contacts") for method in ("factored", "gram_pinv"))
     wide = exponent(study.scaling, "factored", "coordinates")
@@ -142,7 +142,7 @@ def _growth(study: Any) -> Iterator[Finding]:
 
 
 def _rate(study: Any) -> Iterator[Finding]:
-    from verification.accuracy_time.haptic_rate import FACTORED, PRINTED, most_contacts
+    from verification.cost.haptic_rate import FACTORED, PRINTED, most_contacts
 
     sizes = dict.fromkeys(trial.coordinates for trial in study.trials)
     texts = [f"{most_contacts(study.trials, FACTORED, d)} at d = {d} ({most_contacts(study.trials, PRINTED, d)} by "
@@ -151,7 +151,7 @@ def _rate(study: Any) -> Iterator[Finding]:
 
 
 def _bodies(study: Any) -> Iterator[Finding]:
-    from verification.studies.many_bodies import growth_exponent
+    from verification.cost.many_bodies import growth_exponent
 
     power, costs = growth_exponent(study.bodies), study.bodies
     yield Finding(

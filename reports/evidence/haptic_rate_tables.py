@@ -55,7 +55,7 @@ def scaling(study: Any) -> Numbers:
 
 def fitted(study: Any) -> Numbers:
     """A row per method and axis."""
-    from verification.accuracy_time.scaling import exponent
+    from verification.cost.scaling import exponent
 
     rows = tuple((method, axis, exponent(study.scaling, method, axis))
                  for method in ("factored", "gram_pinv") for axis in ("contacts", "coordinates"))  # fmt: skip
@@ -65,7 +65,7 @@ def fitted(study: Any) -> Numbers:
 
 def rate(study: Any) -> Numbers:
     """C19: a row per number of coordinates."""
-    from verification.accuracy_time.haptic_rate import FACTORED, PRINTED, most_contacts
+    from verification.cost.haptic_rate import FACTORED, PRINTED, most_contacts
 
     sizes = dict.fromkeys(trial.coordinates for trial in study.trials)
     rows = tuple((d, *(most_contacts(study.trials, method, d) for method in (FACTORED, PRINTED))) for d in sizes)

@@ -29,10 +29,10 @@ LEAD = (
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Run every study of the mechanics and say what each found."""
+    from verification.cost.many_bodies import study_many_bodies
     from verification.mechanics import STUDIES, check_mechanics
-    from verification.studies.false_collisions import study_false_collisions
-    from verification.studies.linked_impacts import study_linked_impacts
-    from verification.studies.many_bodies import study_many_bodies
+    from verification.mechanics.false_collisions import study_false_collisions
+    from verification.mechanics.linked_impacts import study_linked_impacts
 
     failures: list[Failure] = []
     total = len(STUDIES) + 3

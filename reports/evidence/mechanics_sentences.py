@@ -9,9 +9,10 @@ import numpy as np
 
 from reports.evidence.mechanics_tables import AGAINST_PINOCCHIO
 from reports.pages.records import Finding
+from verification.cost.many_bodies import StepCost, growth_exponent
 from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Table
-from verification.studies.false_collisions import EDGE_JUMP, FalseCollisions
-from verification.studies.linked_impacts import (
+from verification.mechanics.false_collisions import EDGE_JUMP, FalseCollisions
+from verification.mechanics.linked_impacts import (
     ALL,
     APPROACHING,
     CONSERVED,
@@ -19,7 +20,6 @@ from verification.studies.linked_impacts import (
     RELATIVE,
     LinkedOutcome,
 )
-from verification.studies.many_bodies import StepCost, growth_exponent
 
 Studies = Mapping[str, Table]
 # Slope of the pairs tested over the bodies: 1 is linear, all pairs have 2.

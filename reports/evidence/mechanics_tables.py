@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.figure import Numbers
+from verification.cost.many_bodies import StepCost
 from verification.finding import WORDS, Table
+from verification.mechanics.false_collisions import FalseCollisions
+from verification.mechanics.linked_impacts import LinkedOutcome
 from verification.mechanics.robots import TOLERANCE
-from verification.studies.false_collisions import FalseCollisions
-from verification.studies.linked_impacts import LinkedOutcome
-from verification.studies.many_bodies import StepCost
 
 # Studies that compare with Pinocchio, and what their rows are called together.
 AGAINST_PINOCCHIO = {

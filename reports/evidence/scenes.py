@@ -15,8 +15,8 @@ from verification.finding import Failure, attempt
 
 if TYPE_CHECKING:
     from iapb.run import Run
-    from verification.studies.open_books import OpenBooks
-    from verification.studies.scene_measures import SceneMeasure
+    from verification.scenes.open_books import OpenBooks
+    from verification.scenes.scene_measures import SceneMeasure
 
 ID, TITLE = "scene-ledger", "The scenes"
 LEAD = (
@@ -34,8 +34,8 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     """Run every scene, at shorter steps too, and keep the books of each."""
     from iapb.scene import scene_names
     from reference.worlds import run_world
-    from verification.studies.open_books import open_books
-    from verification.studies.scene_measures import measure
+    from verification.scenes.open_books import open_books
+    from verification.scenes.scene_measures import measure
 
     def studied(name: str) -> tuple[Run, SceneMeasure, OpenBooks]:
         scene = shipped_scene(name)

@@ -15,8 +15,8 @@ from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Fai
 
 if TYPE_CHECKING:
     from iapb.run import Run
-    from verification.studies.open_books import OpenBooks
-    from verification.studies.scene_measures import SceneMeasure
+    from verification.scenes.open_books import OpenBooks
+    from verification.scenes.scene_measures import SceneMeasure
 
 DEEP = 0.5  # share of the thinnest moving shape from where a contact would be pushed out on the wrong side
 WORTH_NAMING = 0.01  # share of the energy turned over from which open books are named one by one

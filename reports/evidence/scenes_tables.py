@@ -11,8 +11,8 @@ from reports.figures.figure import Numbers
 
 if TYPE_CHECKING:
     from iapb.run import Run
-    from verification.studies.open_books import OpenBooks
-    from verification.studies.scene_measures import SceneMeasure
+    from verification.scenes.open_books import OpenBooks
+    from verification.scenes.scene_measures import SceneMeasure
 
 YARDSTICK = "peg_corner"  # the paper's scene: its step is the unit of time
 INSTANTS = 90  # of the books over time: as many as a strip of the figure can show
@@ -92,7 +92,7 @@ def _heading(factor: int) -> str:
 
 def over_time(runs: Sequence[Run]) -> Numbers:
     """The books of each run at some instants, with the impacts since the instant before."""
-    from verification.studies.scene_measures import energy_series
+    from verification.scenes.scene_measures import energy_series
 
     rows: list[tuple[object, ...]] = []
     for run in runs:

@@ -16,15 +16,15 @@ from reports.figures import RECIPES
 from reports.figures.figure import Figure, Numbers, draw
 from reports.figures.style import VARIABLES
 from reports.runner import Runner
-from verification.comparison.agreement import compare_cases
-from verification.comparison.agreement_map import agreement_map, two_contact_map
-from verification.comparison.cases import random_cases
-from verification.comparison.convergence import ConvergenceRow
-from verification.comparison.extensions import compare_friction, compare_unequal, struck_bar
-from verification.comparison.problem_study import study_read
-from verification.comparison.step_cost import LEMKE_KERNEL, CostRow, impact_cost
-from verification.comparison.study import OWN, ComparisonStudy
-from verification.comparison.world_cost import WAYS, StepCostRow
+from verification.complementarity.agreement import compare_cases
+from verification.complementarity.agreement_map import agreement_map, two_contact_map
+from verification.complementarity.cases import random_cases
+from verification.complementarity.convergence import ConvergenceRow
+from verification.complementarity.extensions import compare_friction, compare_unequal, struck_bar
+from verification.complementarity.problem_study import study_read
+from verification.complementarity.step_cost import LEMKE_KERNEL, CostRow, impact_cost
+from verification.complementarity.study import OWN, ComparisonStudy
+from verification.complementarity.world_cost import WAYS, StepCostRow
 from verification.finding import VERDICTS
 
 NAN = float("nan")
@@ -97,7 +97,7 @@ def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
 
 def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypatch: pytest.MonkeyPatch,
                                                tmp_path: Path) -> None:  # fmt: skip
-    monkeypatch.setattr("verification.comparison.study.compare", lambda *arguments, **options: study)
+    monkeypatch.setattr("verification.complementarity.study.compare", lambda *arguments, **options: study)
     monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: Numbers(("world",), ()))
     topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
     assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(VERDICTS)

@@ -13,21 +13,21 @@ from iapb import find_scene, load_scene
 from reports.evidence import engines, haptic_rate, scenes, stability
 from reports.pages.records import Topic
 from reports.runner import Runner
-from verification.accuracy_time import (
+from verification.complementarity import step_cost
+from verification.cost import (
     against_mujoco,
     anytime,
     kernels,
+    many_bodies,
     resting_scenes,
     scaling,
     start_up,
     study,
     trajectories,
 )
-from verification.accuracy_time import haptic_rate as rate
-from verification.comparison import step_cost
+from verification.cost import haptic_rate as rate
 from verification.engines import study as engines_study
 from verification.stability import device_port, maps, peg, waveforms
-from verification.studies import many_bodies
 
 
 def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:

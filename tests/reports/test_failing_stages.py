@@ -32,8 +32,8 @@ from reports.evidence import (
 )
 from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
-from verification.accuracy_time import effect_cost, measure
 from verification.claims import c07_plastic
+from verification.cost import effect_cost, measure
 from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
 from verification.properties import engine_laws, laws, trajectory_laws
@@ -194,7 +194,7 @@ def of_survival(patch: Patch, folder: Path) -> list[str]:
 
 def rolled_ball(scene: Any, simulate: Any) -> Any:
     """A ball that no false collision stops."""
-    from verification.studies.false_collisions import FalseCollisions
+    from verification.mechanics.false_collisions import FalseCollisions
 
     contact = scene.contact
     filters = contact.cluster_distance > 0.0, contact.coherence_distance > 0.0

@@ -12,19 +12,19 @@ from reports.evidence.effects import summary
 from reports.evidence.haptic_rate import topic_of
 from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
 from reports.pages.records import SceneEffect
-from verification.accuracy_time.against_mujoco import StepRace
-from verification.accuracy_time.anytime import BudgetRow
-from verification.accuracy_time.haptic_rate import FACTORED, PRINTED, RateTrial
-from verification.accuracy_time.kernels import KernelTime, quartiles
-from verification.accuracy_time.scaling import Timing
-from verification.accuracy_time.start_up import StartUp
-from verification.accuracy_time.step_profile import PartTime
-from verification.accuracy_time.study import HapticStudy
-from verification.accuracy_time.trajectories import TrajectoryRun
-from verification.comparison.step_cost import IAPB, KERNEL, CostRow
+from verification.complementarity.step_cost import IAPB, KERNEL, CostRow
+from verification.cost.against_mujoco import StepRace
+from verification.cost.anytime import BudgetRow
+from verification.cost.haptic_rate import FACTORED, PRINTED, RateTrial
+from verification.cost.kernels import KernelTime, quartiles
+from verification.cost.many_bodies import StepCost
+from verification.cost.scaling import Timing
+from verification.cost.start_up import StartUp
+from verification.cost.step_profile import PartTime
+from verification.cost.study import HapticStudy
+from verification.cost.trajectories import TrajectoryRun
 from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
 from verification.mechanics.robot_timing import MANY, ONE
-from verification.studies.many_bodies import StepCost
 
 
 def _race(ratio: float) -> StepRace:

@@ -18,14 +18,14 @@ from reports.evidence.mechanics_tables import (
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
 from reports.figures.linked_impacts import BERNOULLI, CRADLE, outcomes
+from verification.cost.many_bodies import StepCost
 from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Table
 from verification.mechanics import robots
 from verification.mechanics.coordinate_invariance import coordinate_invariance
+from verification.mechanics.false_collisions import SETTINGS, FalseCollisions
+from verification.mechanics.linked_impacts import PER_BODY, LinkedOutcome, study_linked_impacts
 from verification.mechanics.own_robots import compare_kinds
 from verification.mechanics.tumbling import tumbling
-from verification.studies.false_collisions import SETTINGS, FalseCollisions
-from verification.studies.linked_impacts import PER_BODY, LinkedOutcome, study_linked_impacts
-from verification.studies.many_bodies import StepCost
 
 
 @pytest.fixture(scope="module")

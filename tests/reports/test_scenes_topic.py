@@ -20,8 +20,8 @@ from reports.figures import scenes_ledger, scenes_space
 from reports.figures.geometry import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
 from reports.pages.records import Topic
 from verification.finding import LIMITED, REFUTED, REPRODUCED
-from verification.studies.open_books import OpenBooks
-from verification.studies.scene_measures import SceneMeasure, measure
+from verification.scenes.open_books import OpenBooks
+from verification.scenes.scene_measures import SceneMeasure, measure
 
 SPACE = ("peg_hole_space", "arm_obstacles", "tumbling_body")
 NAMES = ("peg_corner", *SPACE)

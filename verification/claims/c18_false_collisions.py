@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
 from verification.finding import Column, Row, Table, table_of
-from verification.studies.false_collisions import EDGE_JUMP, FalseCollisions, count_false, socket
+from verification.mechanics.false_collisions import EDGE_JUMP, FalseCollisions, count_false, socket
 
 if TYPE_CHECKING:
     from iapb.run import Run

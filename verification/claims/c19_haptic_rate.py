@@ -22,7 +22,7 @@ MANY = 60  # collisions at once: ten times the six of the paper's peg in the hol
 
 def measure(study: Study) -> Table:
     """Both methods over coordinates and contacts."""
-    from verification.accuracy_time.haptic_rate import haptic_rate
+    from verification.cost.haptic_rate import haptic_rate
 
     return table_of(COLUMNS, (
         {"method": trial.method, "coordinates": trial.coordinates, "contacts": trial.contacts,
@@ -33,14 +33,14 @@ def measure(study: Study) -> Table:
 
 def holds(row: Row) -> bool | None:
     """At most one call in a thousand takes longer than 1 ms; None beyond MANY contacts, of which nothing is claimed."""
-    from verification.accuracy_time.haptic_rate import ALLOWED
+    from verification.cost.haptic_rate import ALLOWED
 
     return None if row["contacts"] > MANY else bool(row["late calls"] <= ALLOWED)
 
 
 def finding(table: Table) -> str:
     """One sentence."""
-    from verification.accuracy_time.haptic_rate import ALLOWED
+    from verification.cost.haptic_rate import ALLOWED
 
     texts = []
     for method in dict.fromkeys(table.column("method")):

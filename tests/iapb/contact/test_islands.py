@@ -7,7 +7,7 @@ import numpy as np
 from iapb import resolve_impact
 from iapb.scene import scene_from_text
 from iapb.simulation import simulate
-from verification.comparison.scene_cases import impacts_of_run
+from verification.complementarity.scene_cases import impacts_of_run
 
 DISC = "joint: planar, mass: 0.1, inertia: 2e-5, shapes: [{kind: circle, radius: 0.02}]"
 # Four discs in a row touch by 1 µm; one striker comes from each side and both meet the row in the same step.

@@ -1,0 +1,73 @@
+"""Where IAPB and the Newton LCP agree: the exact statements on random impacts, and a resolver that breaks them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError
+from verification.complementarity.agreement import SAME, compare_case, compare_cases, iapb
+from verification.complementarity.agreement_map import agreement_map, contradicts, two_contact_map
+from verification.complementarity.cases import FAMILIES, ImpactCase, random_cases, two_contacts
+
+CASES = list(random_cases(6, seed=11))
+FOUND = compare_cases(CASES)
+
+
+def test_one_contact_is_the_complementarity_solution() -> None:
+    single = [c for c in FOUND if c.family == "one contact"]
+    assert single and max(c.distance for c in single) <= 1e-12
+
+
+def test_agreement_if_and_only_if_some_pushing_impulse_gives_the_motion() -> None:
+    assert not [c for c in FOUND if contradicts(c)]
+    assert all(c.agrees == c.pushes for c in FOUND)
+    assert {c.agrees for c in FOUND} == {True, False}  # both sides of the border were seen
+
+
+def test_distance_is_that_from_the_cone_and_costs_the_stated_energy() -> None:
+    assert max(c.projection_defect for c in FOUND) <= 1e-12
+    assert max(c.energy_defect for c in FOUND) <= 1e-12
+    assert max(c.momentum_residual for c in FOUND) <= 1e-10
+
+
+def test_restitution_scales_the_distance_and_moves_no_border() -> None:
+    """The same impacts with e = 0 and e = 1: twice the distance."""
+    by_e = {e: [c for c in FOUND if c.restitution == e] for e in (0.0, 1.0)}
+    for plastic, elastic in zip(by_e[0.0], by_e[1.0], strict=True):
+        assert elastic.distance == pytest.approx(2.0 * plastic.distance, rel=1e-9, abs=1e-12)
+
+
+@given(st.floats(-0.95, 0.95), st.floats(0.05, 1.0), st.integers(0, 1000))
+def test_two_contacts_agree_exactly_where_the_speed_ratio_exceeds_the_cosine(c: float, r: float, seed: int) -> None:
+    if abs(r - c) < 1e-6:  # on the border itself rounding decides
+        return
+    assert compare_case(two_contacts(c, r, np.random.default_rng(seed))).agrees == (r > c)
+
+
+def test_map_counts_its_cells_and_finds_the_border_on_the_grid() -> None:
+    cells = agreement_map(FOUND)
+    assert sum(cell.cases for cell in cells) == len(FOUND)
+    assert len(FOUND) == 6 * 3 * sum(len(family.redundancies) for family in FAMILIES.values())
+    assert all(cell.contradictions == 0 for cell in cells)
+    assert all(cell.predicted == cell.found for cell in two_contact_map())
+
+
+def test_a_resolver_that_clips_its_impulses_is_found_out() -> None:
+    """Clipping negative impulses one by one is neither IAPB nor the LCP."""
+
+    def clipped(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
+        p = np.maximum(iapb(case)[1], 0.0)
+        return case.velocity + np.linalg.solve(case.mass_matrix, case.contact_jacobian.T @ p), p
+
+    adhesive = [case for case, c in zip(CASES, FOUND, strict=True) if c.adhesion == "adhesive"]
+    found = compare_cases(adhesive, resolver=clipped)
+    assert any(c.distance > SAME and c.adhesion == "none" for c in found)
+    assert max(c.energy_defect for c in found) > 1e-3
+
+
+def test_unknown_families_are_refused() -> None:
+    with pytest.raises(ArgumentError, match="families"):
+        list(random_cases(1, families=("spheres",)))

@@ -1,0 +1,59 @@
+"""Timings are records of solved impacts; a folder of problem files becomes lines, nothing left out in silence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from reference.complementarity.problem import ImpactProblem
+from reference.fclib import write_fclib
+from verification.complementarity import sentences, step_cost
+from verification.complementarity.problem_study import FACTORS, study_problems
+from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
+
+
+def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:
+    rows = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
+    assert {(r.family, r.contacts, r.solver) for r in rows} == {
+        (family, contacts, solver) for family in ("patch", "pile") for contacts in (1, 3)
+        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")
+    }  # fmt: skip
+    assert all(r.verdict == "solved" and r.repeats >= 3 and r.least <= r.median <= r.largest for r in rows)
+
+
+def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    original = step_cost.solver_call
+
+    def wrong(case, name):  # type: ignore[no-untyped-def]
+        return (lambda: case.velocity) if name == "lemke" else original(case, name)
+
+    monkeypatch.setattr(step_cost, "solver_call", wrong)
+    rows = {(r.family, r.contacts, r.solver): r for r in impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0)}
+    assert rows["patch", 1, "lemke"].verdict == "failed"
+    assert rows["patch", 2, "daqp"].verdict == "left out"
+
+
+def test_a_folder_of_problems(tmp_path: Path) -> None:
+    """A frictional, a frictionless asymmetric and a damaged file."""
+    w = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    write_fclib(tmp_path / "one.hdf5", ImpactProblem.from_delassus(w, [-1.0, 0.2, 0.1], 0.0, 0.5))
+    (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
+    (tmp_path / "damaged.lcp").write_text("3 1 2")
+    (tmp_path / "readme.md").write_text("not a problem")
+    told: list[tuple[str, int, int]] = []
+    study = study_problems(tmp_path, progress=lambda *state: told.append(state))
+    assert [done for stage, done, _ in told if stage.startswith("reading")] == [0, 1, 2]
+    solving = [(done, total) for stage, done, total in told if stage.startswith("problems of")]
+    assert solving == [(0, total := len(study.rows)), *((done, total) for done in range(total + 1))]
+    assert [line.problem for line in study.lines] == ["one.hdf5", "skew.lcp"]
+    assert [file.file for file in study.unread] == ["damaged.lcp"]
+    assert study.lines[1].asymmetry > 0.1 and dict(study.lines[1].verdicts)["daqp"] == "refused"
+    assert dict(study.lines[1].verdicts)["lemke"] == "solved"
+    text = " ".join(sentences.problems(study))
+    assert "1 files not" in text and "skew.lcp" in text
+    assert all(share.shape == FACTORS.shape and (np.diff(share) >= 0.0).all() for _, _, share in study.profile)
+    with pytest.raises(ArgumentError, match="folder"):
+        study_problems(tmp_path / "nowhere")

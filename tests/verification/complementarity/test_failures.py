@@ -1,0 +1,95 @@
+"""A fault in one case of the comparison costs that row only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reference.complementarity import benchmark
+from verification.complementarity import (
+    agreement,
+    agreement_map,
+    extensions,
+    judgement,
+    own_problems,
+    step_cost,
+    study,
+    world_cost,
+)
+from verification.finding import Failure
+
+
+def breaks(original: Any, here: Any) -> Any:
+    """`original`, which raises where here(arguments) is true."""
+
+    def broken(*arguments: Any, **options: Any) -> Any:
+        if here(*arguments):
+            raise ZeroDivisionError("planted")
+        return original(*arguments, **options)
+
+    return broken
+
+
+@pytest.fixture(scope="module")
+def found() -> Iterator[study.ComparisonStudy]:
+    """A small comparison with a fault in one case of each of its parts."""
+    monkeypatch = pytest.MonkeyPatch()
+    depth = study.Depth(1, 2, 3, (1, 2), 1, 9.0, ("two_discs", "bernoulli_balls"))
+    monkeypatch.setitem(study.DEPTHS, "quick", depth)
+    case_breaks = breaks(agreement.compare_case, lambda case, *_: case.family == "cradle" and case.restitution == 0.5)
+    monkeypatch.setattr(agreement, "compare_case", case_breaks)
+    border_breaks = breaks(agreement.compare_case, lambda case, *_: case.contact_jacobian.tolist() == border)
+    border = agreement_map.two_contacts(-0.9, 0.05, np.random.default_rng(2)).contact_jacobian.tolist()
+    monkeypatch.setattr(agreement_map, "compare_case", border_breaks)
+    monkeypatch.setattr(study, "scene_impacts", breaks(study.scene_impacts, lambda name: name == "two_discs"))
+    rough = breaks(extensions._friction_cell, lambda _, e, mu: (e, mu) == (0.5, 0.1))
+    monkeypatch.setattr(extensions, "_friction_cell", rough)
+    mixed = breaks(extensions._unequal_cell, lambda signs, *_: signs == "mixed signs")
+    monkeypatch.setattr(extensions, "_unequal_cell", mixed)
+    monkeypatch.setattr(study, "converge", breaks(study.converge, lambda case: case.scene == "two_discs"))
+    monkeypatch.setattr(step_cost, "solver_call", breaks(step_cost.solver_call, lambda case, name: name == "lemke"))
+    monkeypatch.setattr(step_cost.impact_cost, "__defaults__",
+                        (step_cost.CONTACTS, ("daqp", "lemke"), *step_cost.impact_cost.__defaults__[2:]))
+    monkeypatch.setattr(world_cost, "_seconds_per_step",
+                        breaks(lambda *_: 1.0, lambda scene, way, _: (scene, way) == ("peg_hole", world_cost.IDEAL)))
+    monkeypatch.setattr(own_problems, "SCENES", ())
+    monkeypatch.setattr(own_problems, "HARD", ("grazing", "mass_ratio"))
+    monkeypatch.setattr(own_problems, "_hyperstatic", lambda: ())
+    monkeypatch.setattr(own_problems, "_with_friction", lambda: ())
+    monkeypatch.setattr(benchmark, "solver_names",
+                        breaks(lambda _: ("daqp",), lambda problem: problem.name == "hard case grazing"))
+    yield study.compare(scenes=("two_discs", "newton_cradle"))
+    monkeypatch.undo()
+
+
+def test_only_the_rows_with_a_fault_are_lost(found: study.ComparisonStudy) -> None:
+    assert {failure.error for failure in found.failures} == {"ZeroDivisionError"}
+    assert [failure.case for failure in found.failures] == [
+        "cradle, e = 0.5, impact 11", "impacts of two_discs", "impacts of two_discs, e = 0.5",
+        "two contacts, cosine -0.9, speed ratio 0.05", "friction, e = 0.5, μ = 0.1",
+        "unequal restitution, mixed signs", "convergence on two_discs", "lemke on a patch of 1 contacts",
+        "lemke on a pile of 1 contacts", "lemke on a patch of 2 contacts", "lemke on a pile of 2 contacts",
+        "peg_hole, ideal (QP per step)", "hard case grazing",
+    ]  # fmt: skip
+    assert {cell.restitution for cell in found.cells if cell.family == "cradle"} == {0.0, 1.0}
+    assert {cell.family for cell in found.scenes} == {"scene newton_cradle"}
+    assert len(found.two_contacts) == 53 and len(found.friction) == 8
+    assert [cell.signs for cell in found.unequal] == ["all approach"]
+    assert [row.scene for row in found.convergence] == ["bernoulli_balls"]
+    assert {row.solver: row.verdict for row in found.impact_costs}["lemke"] == "failed"
+    assert [row.way for row in found.step_costs if row.scene == "peg_hole"] == [
+        way for way in world_cost.WAYS if way != world_cost.IDEAL]
+    assert [line.problem for line in found.problems[0].lines] == ["hard case mass_ratio"]
+
+
+def test_a_sentence_about_nothing_fails_alone(found: study.ComparisonStudy) -> None:
+    failures: list[Failure] = []
+    names = [judged.name for judged in judgement.judge(replace(found, friction=()), failures)]
+    assert [failure.case for failure in failures] == ["sentence on friction"]
+    assert "friction" not in names and {"wider_class", "energy", "cost", "problems"} <= set(names)
+    nothing = replace(found, two_contacts=())
+    assert judgement.VERDICTS["two_contacts"](nothing) == judgement.NOT_TESTABLE

@@ -1,0 +1,81 @@
+"""A sentence's verdict follows from the record: planted records turn it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reference.complementarity.problem import ImpactProblem
+from reference.datasets import StoredProblem
+from verification.complementarity.agreement import compare_cases
+from verification.complementarity.agreement_map import agreement_map, two_contact_map
+from verification.complementarity.cases import random_cases
+from verification.complementarity.judgement import VERDICTS, judge_problems
+from verification.complementarity.own_problems import own_problems
+from verification.complementarity.problem_study import study_read
+from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
+
+FOUND = compare_cases(random_cases(3, seed=12))
+CELLS = agreement_map(FOUND)
+SINGLE = tuple(c for c in FOUND if c.family == "one contact" and not c.redundancy)
+STUDY = SimpleNamespace(single=SINGLE, cells=CELLS, scenes=CELLS, two_contacts=two_contact_map())
+
+
+def row(solver: str, least: float, largest: float, verdict: str = "solved") -> CostRow:
+    return CostRow("pile", 4, 6, solver, verdict, 0.5 * (least + largest), least, largest, 3, 0.0)
+
+
+def verdict(name: str, **changed: Any) -> str:
+    return VERDICTS[name](SimpleNamespace(**{**vars(STUDY), **changed}))  # type: ignore[arg-type]
+
+
+def worse(**values: Any) -> tuple[Any, ...]:
+    return (replace(CELLS[0], **values), *CELLS[1:])
+
+
+def test_exact_statements_hold_and_one_exception_refutes_them() -> None:
+    assert {verdict(name) for name in ("single_contact", "wider_class", "two_contacts", "difference", "energy")} == {
+        REPRODUCED
+    }
+    assert verdict("single_contact", single=(replace(SINGLE[0], distance=1e-9),)) == REFUTED
+    assert verdict("wider_class", cells=worse(contradictions=1)) == REFUTED
+    assert verdict("two_contacts", two_contacts=(replace(STUDY.two_contacts[0], found=False),)) == REFUTED
+    assert verdict("difference", cells=worse(defect=1e-6)) == REFUTED
+    assert verdict("energy", cells=worse(least_extra_loss=-1e-6)) == REFUTED
+    assert verdict("energy", cells=worse(momentum=1e-3)) == REFUTED
+
+
+@pytest.mark.parametrize(("share", "expected"), [(1.0, REPRODUCED), (0.7, LIMITED), (0.2, LIMITED)])
+def test_shares_of_scene_impacts(share: float, expected: str) -> None:
+    assert verdict("scenes", scenes=(replace(CELLS[0], agree=share),)) == expected
+
+
+def test_costs_are_told_apart_only_where_samples_do_not_overlap() -> None:
+    rows = (row(IAPB, 1.0, 2.0), row(KERNEL, 0.1, 0.2), row("slow", 3.0, 4.0), row("alike", 1.5, 9.0),
+            row("fast", 0.1, 0.5), row("wrong", 3.0, 4.0, "failed"), row(LEMKE_KERNEL, 0.5, 0.9))  # fmt: skip
+    outcomes = {pair.solver.solver: pair.costs_more for pair in rivals(rows)}
+    assert outcomes == {"slow": True, "alike": None, "fast": False, "wrong": None, LEMKE_KERNEL: True}
+    assert verdict("cost", impact_costs=rows) == LIMITED
+    assert verdict("cost", impact_costs=rows[:2] + rows[3:4]) == NOT_TESTABLE
+
+
+def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_limits() -> None:
+    unsolvable = ImpactProblem.from_delassus([[0.0]], [-1.0], name="unsolvable")
+    larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
+    study = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0)
+    assert {dict(line.verdicts)["daqp"] for line in study.lines} == {"failed", "left out"}
+    judged = judge_problems(study)
+    assert judged[0].verdict == LIMITED and "left out" in judged[0].sentence
+
+
+def test_own_problems_are_named_apart_and_are_of_both_kinds() -> None:
+    problems = [stored.problem for stored in own_problems()]
+    assert len({problem.name for problem in problems}) == len(problems)
+    assert {problem.friction is None for problem in problems} == {True, False}
+    hyperstatic = [p for p in problems if np.linalg.matrix_rank(p.delassus, hermitian=True) < p.size]
+    assert len(hyperstatic) >= 10

@@ -1,0 +1,59 @@
+"""C18: what each filter does to the false collisions of a ball in a faceted socket."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference.worlds import run_world
+from verification.mechanics.false_collisions import FalseCollisions, socket, study_false_collisions
+from verification.scenes.open_books import open_books
+
+
+def by_filters(damping: float) -> dict[tuple[bool, bool], FalseCollisions]:
+    return {(f.clustering, f.coherence): f for f in study_false_collisions((damping,))}
+
+
+def test_coherence_removes_every_false_collision_and_clustering_the_doubled_contacts() -> None:
+    found = by_filters(40.0)
+    assert found[False, False].collisions >= 10
+    assert found[False, False].energy_lost > 0.2 * found[False, False].potential_drop
+    assert found[True, True].collisions == found[False, True].collisions == 0
+    assert found[True, True].doubled == found[True, False].doubled == 0 < found[False, True].doubled
+
+
+def test_clustering_alone_removes_no_false_collision() -> None:
+    """The one contact left at an edge jumps from facet to facet: new each time."""
+    found = by_filters(40.0)
+    assert found[True, False].collisions >= found[False, False].collisions
+
+
+def test_a_ball_that_bounces_off_the_edges_comes_back_as_new() -> None:
+    """Coherence looks one step back: it cannot know a contact that was away."""
+    assert by_filters(10.0)[True, True].collisions > 0
+
+
+def explicit_rates(contact: dict[str, float], rate: float | None = None) -> tuple[float, float]:
+    """B T / m, and μ F_n T / (v_threshold m_t) with the largest F_n of the run: what a held force may reach."""
+    scene = socket(contact, rate)
+    run, ball = run_world(scene, "IAPB"), scene.bodies[0]
+    felt = 1.0 / (1.0 / ball.mass + ball.shapes[0].radius ** 2 / ball.inertia)
+    pressed = float(np.max(run.contacts.normal_force))
+    slope = scene.contact.friction * pressed / scene.contact.friction_velocity
+    return scene.contact.damping * run.dt / ball.mass, slope * run.dt / felt
+
+
+def test_the_scene_is_slow_enough_for_its_step_and_its_books_show_it() -> None:
+    damper, friction = explicit_rates({})
+    assert damper < 0.2 and friction < 1.0
+    books = open_books(socket({}), lambda scene: run_world(scene, "IAPB"), (1, 2))
+    assert books.open_shares[0] < 0.05
+    assert books.order == pytest.approx(1.0, abs=0.15)  # semi-implicit Euler's, as declared
+
+
+def test_at_a_haptic_step_and_a_sharp_threshold_friction_chatters_and_a_quarter_is_left_open() -> None:
+    sharp = {"friction_velocity": 1e-2}
+    damper, friction = explicit_rates(sharp, 1000.0)
+    assert damper == pytest.approx(0.4) and friction > 2.0
+    books = open_books(socket(sharp, 1000.0), lambda scene: run_world(scene, "IAPB"), (1,))
+    assert books.open_shares[0] > 0.2

@@ -1,0 +1,177 @@
+"""The "ideal" world against event-driven truth: errors in proportion to the step, on every scene that has a truth.
+
+Errors are measured before impacts accumulate: positions in the sup norm, velocities in L¹ over time (at an impact any
+two motions that are not simultaneous differ by the whole jump). Several step lengths on each level, since where an
+impact falls within a step is an accident; the order follows from the largest errors of two levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from iapb.errors import SolverError
+
+if TYPE_CHECKING:
+    from iapb.scene import Scene
+    from reference.scene_events import SceneTruth
+
+COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
+_LEVELS = 4.0
+# Errors per step on the fine level up to this multiple of the coarse one's count as first order: the accident of
+# where impacts fall changes them by less than two on all scenes; errors that do not shrink at all would give four.
+BOUNDED = 2.5
+# Share of the errors on the fine level that the truth's own error may have: it then moves no order by more than 0.1.
+WORTH = 0.1
+_ROUNDING = 1e-9  # per second of step: an error of rounding alone is as good as none
+
+
+@dataclass(frozen=True)
+class TruthCase:
+    """A scene, the time before its impacts accumulate, and whether device and coupling take part."""
+
+    scene: str
+    duration: float
+    coupled: bool
+    why: str
+
+
+CASES = (
+    TruthCase("two_discs", 0.2, False, "one elastic impact"),
+    TruthCase("newton_cradle", 0.2, False, "four elastic impacts, one after another"),
+    TruthCase("bernoulli_balls", 0.1, False, "two simultaneous elastic impacts"),
+    TruthCase("two_link_arm_a", 0.3, False, "plastic impact, contact that holds and lets go"),
+    TruthCase("two_link_arm_b", 0.3, False, "plastic impact that takes all"),
+    TruthCase("double_pendulum", 0.5, False, "no contact: the integrator alone"),
+    TruthCase("wall_1d", 1.0, True, "plastic impact and rest, with device and coupling"),
+    TruthCase("peg_corner", 0.36, True, "three plastic impacts, with device and coupling"),
+    TruthCase("peg_room", 0.36, True, "two plastic impacts, with device and coupling"),
+    TruthCase("peg_hole", 0.36, True, "six contacts at once, with device and coupling"),
+    TruthCase("arm_pushing", 0.1, True, "one impact (e = 0.2) between moving bodies, before they accumulate"),
+    TruthCase("three_link_arm_plastic", 0.45, False, "plastic impacts between moving bodies"),
+    TruthCase("three_link_arm_elastic", 0.45, False, "elastic impacts between moving bodies"),
+    TruthCase("held_arm", 0.3, False, "no contact: the hand pulls at a linkage"),
+    TruthCase("tumbling_body", 0.5, False, "in space, no contact: quaternions and Euler's equations alone"),
+    TruthCase("ball_dropped_in_space", 0.3, False, "in space: one impact (e = 0.6) of a spinning, eccentric ball"),
+    TruthCase("box_dropped_in_space", 0.2, False, "in space: impacts (e = 0.3) of two corners of a turning box"),
+    TruthCase("box_landing_in_space", 0.19, False, "in space: plastic impact of a corner, about which the box turns"),
+    TruthCase("cradle_in_space", 0.1, False, "in space: spheres of unequal mass, two impacts (e = 0.7)"),
+    TruthCase("arm_meets_a_wall_in_space", 0.3, False, "in space: an arm's plastic impact, contact that holds"),
+)  # fmt: skip
+WITHOUT_TRUTH = {
+    "bar_on_posts": "its walls differ in restitution, of which exact events of Newton's law know one",
+    "box_stack": "rests on overlaps that only penalties have",
+    "faceted_socket": "impacts accumulate as the ball comes to rest",
+    "sliding_box": "starts sunk in by its weight, which only penalties have",
+    "arm_obstacles": "its block starts 0.1 mm in the table, an overlap that only penalties have",
+    "peg_hole_space": "its clutter starts 0.05 mm in the plate, an overlap that only penalties have",
+}
+
+
+@dataclass(frozen=True)
+class ConvergenceRow:
+    """One scene and scheme: errors divided by the step, largest on each level, and the order between the levels.
+
+    position : sup norm over time and coordinates, per second of step [m/s, rad/s]
+    velocity : L¹ over time, largest coordinate, per second of step
+    truth_error : bound of the truth's own errors of positions [m, rad] and velocities [m, rad]
+    """
+
+    scene: str
+    scheme: str
+    coupled: bool
+    duration: float
+    events: int
+    position_coarse: float
+    position_fine: float
+    velocity_coarse: float
+    velocity_fine: float
+    truth_error: tuple[float, float] = (np.nan, np.nan)
+
+    @property
+    def position_order(self) -> float:
+        """log₄ of the ratio of the largest position errors; infinite where they are rounding alone."""
+        return _order(self.position_coarse, self.position_fine)
+
+    @property
+    def velocity_order(self) -> float:
+        """log₄ of the ratio of the largest velocity errors; infinite where they are rounding alone."""
+        return _order(self.velocity_coarse, self.velocity_fine)
+
+    @property
+    def first_order(self) -> bool:
+        """Whether the errors per step stay bounded."""
+        return _bounded(self.position_coarse, self.position_fine) and _bounded(self.velocity_coarse, self.velocity_fine)
+
+
+def _order(coarse: float, fine: float) -> float:
+    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if min(coarse, fine) > _ROUNDING else np.inf
+
+
+def _bounded(coarse: float, fine: float) -> bool:
+    return fine <= max(BOUNDED * coarse, _ROUNDING)
+
+
+def convergence(
+    cases: Sequence[TruthCase] = CASES, scheme: str = "automatic",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> tuple[ConvergenceRow, ...]:
+    """Measure the convergence of the rigid world on each case."""
+    rows = []
+    for done, case in enumerate(cases):
+        rows.append(converge(case, scheme=scheme))
+        if progress is not None:
+            progress("convergence to event-driven truth", done + 1, len(cases))
+    return tuple(rows)
+
+
+def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> ConvergenceRow:
+    """Measure one case; `law` replaces the rigid world's."""
+    from reference.scene_events import scene_truth
+    from reference.time_stepping import RigidConstraints
+
+    scene = scene_of(case.scene)
+    truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints(scheme=scheme)
+    levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
+    (position_coarse, velocity_coarse), (position_fine, velocity_fine) = levels
+    return ConvergenceRow(
+        case.scene, scheme, case.coupled, case.duration, len(truth.events), float(position_coarse),
+        float(position_fine), float(velocity_coarse), float(velocity_fine),
+        _worth(case, truth, position_fine, velocity_fine),
+    )  # fmt: skip
+
+
+def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> tuple[float, float]:
+    """Bounds of the truth's errors, as the steps' are measured; refused where they could be taken for the steps'."""
+    bound, last = truth.bound, min(1.0 / rate for rate in FINE)
+    _, v = truth.state(np.linspace(0.0, truth.end, 101))
+    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ of velocities that jump too late
+    worth = bound.position, bound.velocity * case.duration + jumps
+    for error, measured in zip(worth, (position, velocity), strict=True):
+        if error > max(WORTH * measured, _ROUNDING) * last:
+            raise SolverError(f"{case.scene}: no truth: known to {error:.1e}, the steps err by {measured * last:.1e}")
+    return worth
+
+
+def scene_of(name: str) -> Scene:
+    """A scene of `truth_scenes`, or one of the project's."""
+    from iapb.scene import find_scene, load_scene, scene_from_text
+    from verification.complementarity.truth_scenes import TRUTH_SCENES
+
+    return scene_from_text(TRUTH_SCENES[name]) if name in TRUTH_SCENES else load_scene(find_scene(name))
+
+
+def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float) -> tuple[float, float]:
+    """Errors of positions (sup) and velocities (L¹), both divided by the step."""
+    from iapb.simulation import simulate
+    from reference.worlds import find_world
+
+    steps = int(np.floor(case.duration * rate))
+    stepped = scene.with_values({"rate": rate, "duration": case.duration})
+    coupling = find_world("ideal").coupling_in(stepped) if case.coupled else None
+    run = simulate(stepped, law, coupling, steps=steps)
+    q, v = truth.state(np.minimum(run.time, truth.end))
+    return float(np.abs(run.q - q).max() * rate), float(np.abs(run.v - v).sum(axis=0).max())

@@ -1,0 +1,138 @@
+"""The impacts of recorded runs as cases: which rows collided, rebuilt from the run alone.
+
+The run keeps v before and after and Jᵀp of every impact, and the contacts of its step: the rows (11)-(12) follow from
+the mechanism at the configuration of that step. Every rebuilt case is checked against what the run recorded.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import IapbError
+from iapb.mechanics.mechanism import Mechanism
+from iapb.run import Run
+from iapb.scene import Scene
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from verification.complementarity.cases import ImpactCase
+
+Floats = NDArray[np.float64]
+
+# The rebuilt v⁺ against the recorded one, relative to |v⁻|: both are roundings of the same numbers.
+_REBUILT = 1e-9
+
+
+class SceneImpacts(NamedTuple):
+    """The cases of one run, one for each step and contact group that collides in it.
+
+    `left_out` counts those under other rows (per body) or another law (unequal restitution, friction in the impact),
+    or cut by a device limit.
+    """
+
+    cases: tuple[ImpactCase, ...]
+    left_out: int
+
+
+def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
+    """Return the impacts of an IAPB run as cases.
+
+    Raises
+    ------
+    IapbError
+        A rebuilt impact does not give the velocity that the run recorded: the run and the scene do not belong together.
+    """
+    mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
+    values = restitution_by_pair(scene, pairs_of(scene, shapes_of(scene)))
+    rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.contact.friction > 0.0
+    other_law = scene.contact.self_collision_rows == "per_body" or len(np.unique(values)) != 1 or rubbing
+    cases, left_out = [], 0
+    for blow in _group_impacts(run, mechanism):
+        if other_law or blow.scaled:
+            left_out += 1
+            continue
+        rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
+        closing = rows @ v < -approach
+        case = ImpactCase(
+            f"scene {run.scene_name}", mechanism.mass_matrix(run.q[blow.step]), rows[closing], v, float(values[0]),
+            rows[~closing],
+        )  # fmt: skip
+        _check(case, run, blow)
+        cases.append(case)
+    return SceneImpacts(tuple(cases), left_out)
+
+
+class _GroupImpact(NamedTuple):
+    """All that one contact group underwent in one step: the engine resolves its islands one by one."""
+
+    step: int
+    trees: frozenset[int]
+    v_minus: Floats
+    v_plus: Floats  # (d,) of the group's coordinates; the others as in v_minus
+    scaled: bool
+
+
+def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
+    """Put the islands of a group together again: rows that touch and do not approach are its too."""
+    found, table = [], run.impacts
+    for step in np.unique(table.step):
+        of_step = np.flatnonzero(table.step == step)
+        before, after = table.v_minus[of_step[0]], table.v_plus[of_step[-1]]
+        groups = {k: _trees_of_group(run, mechanism, int(step), int(table.group[k])) for k in of_step}
+        for trees in dict.fromkeys(groups.values()):
+            own = np.zeros(mechanism.nv, bool)
+            for tree in trees:
+                own[slice(*mechanism.tree_dofs[tree])] = True
+            scaled = any(table.scale[k] != 1.0 for k in of_step if groups[k] == trees)
+            found.append(_GroupImpact(int(step), trees, before, np.where(own, after, before), scaled))
+    return found
+
+
+def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
+    """Simulate a scene that comes with the project and return its impacts."""
+    from iapb.scene import find_scene, load_scene
+    from reference.worlds import run_world
+
+    scene = load_scene(find_scene(name))
+    if restitution is not None:
+        scene = scene.with_values({"contact.restitution": restitution})
+    return impacts_of_run(run_world(scene, world), scene)
+
+
+def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
+    """nᵀ(J_a − J_b) (k, d) of the step's contacts that belong to the impact's contact group."""
+    table, q = run.contacts, run.q[blow.step]
+    chosen = [
+        m for m in range(int(table.offsets[blow.step]), int(table.offsets[blow.step + 1]))
+        if mechanism.tree_of_body[table.body_a[m]] in blow.trees
+    ]  # fmt: skip
+    rows = np.zeros((len(chosen), mechanism.nv))
+    for i, m in enumerate(chosen):
+        rows[i] = table.normal[m] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
+        if table.body_b[m] >= 0:
+            rows[i] -= table.normal[m] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
+    return rows
+
+
+def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> frozenset[int]:
+    """Trees that a chain of contacts between moving bodies links to tree `group` (paper, section III)."""
+    table, trees = run.contacts, {group}
+    links = [
+        {int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}
+        for m in range(int(table.offsets[step]), int(table.offsets[step + 1]))
+        if table.body_b[m] >= 0
+    ]
+    while any(link & trees and not link <= trees for link in links):
+        trees |= set().union(*(link for link in links if link & trees))
+    return frozenset(trees)
+
+
+def _check(case: ImpactCase, run: Run, blow: _GroupImpact) -> None:
+    from iapb import resolve_impact
+
+    impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+    scale = float(np.abs(case.velocity).max()) or 1.0
+    if np.abs(impact.velocity - blow.v_plus).max() > _REBUILT * scale:
+        where = f"the impact in step {blow.step} of {run.scene_name}"
+        raise IapbError(f"{where} cannot be rebuilt from its run: velocities differ")

@@ -1,0 +1,211 @@
+"""C22: what one impact costs by each solver, beside IAPB, in one run.
+
+Timed is the whole way from M, J, v to v⁺: for the references that includes forming W or its factor, for IAPB the
+checks of `resolve_impact`. The kernels, IAPB's and Lemke's, are called from compiled code as in the engine's step:
+`rivals` sets like against like. Every solver is warmed first (imports, compiling), then all take turns, so that a busy
+moment of the machine hits them alike; linear algebra runs on one thread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verification.complementarity.cases import ImpactCase
+from verification.complementarity.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
+from verification.finding import Failure, attempt, failure_of
+
+Floats = NDArray[np.float64]
+
+CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
+SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
+IAPB, KERNEL, PRINTED, LEMKE_KERNEL = "IAPB", "IAPB kernel", "IAPB printed formula", "Lemke kernel"
+REPEATS = 5
+LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked for a larger one; the row says so
+_SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
+# |v⁺ − v⁺_reference| in the kinetic metric below which an impact counts as solved; first-order solvers reach 1e-6.
+_SOLVED = 1e-5
+
+
+@dataclass(frozen=True)
+class CostRow:
+    """Seconds per impact of one solver on one problem: median, least and largest of `repeats` samples.
+
+    distance : of v⁺ from daqp's (from IAPB's for IAPB's own methods), kinetic metric, relative; NaN without v⁺
+    verdict : "solved", "failed", "missing" or "left out" (slower than LONGEST before)
+    """
+
+    family: str
+    contacts: int
+    coordinates: int
+    solver: str
+    verdict: str
+    median: float
+    least: float
+    largest: float
+    repeats: int
+    distance: float
+    note: str = ""
+
+
+class Rivals(NamedTuple):
+    """Two ways to resolve one impact, called alike: compiled, or from Python."""
+
+    called: str
+    solver: CostRow
+    ours: CostRow
+
+    @property
+    def costs_more(self) -> bool | None:
+        """Whether the solver costs more; None where it solved nothing, or where the samples of the two overlap."""
+        solver, ours = self.solver, self.ours
+        overlap = solver.least <= ours.largest and ours.least <= solver.largest
+        return None if solver.verdict != "solved" or overlap else solver.median > ours.median
+
+
+def rivals(rows: Sequence[CostRow]) -> tuple[Rivals, ...]:
+    """Every complementarity solver with IAPB at the same impact: kernel with kernel, the others from Python."""
+    ours = {(row.family, row.contacts, row.solver): row for row in rows}
+    found = []
+    for row in rows:
+        if row.solver in (IAPB, KERNEL, PRINTED):
+            continue
+        called, mine = ("compiled", KERNEL) if row.solver == LEMKE_KERNEL else ("from Python", IAPB)
+        found.append(Rivals(called, row, ours[row.family, row.contacts, mine]))
+    return tuple(found)
+
+
+def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """A box in space lands on `contacts` points of its lower face, slightly turning: d = 6, rank at most 3."""
+    points = np.column_stack([rng.uniform(-1.0, 1.0, (contacts, 2)), -0.5 * np.ones(contacts)])
+    up = np.array([0.0, 0.0, 1.0])
+    rows = np.column_stack([np.tile(up, (contacts, 1)), np.cross(points, up)])
+    velocity = np.array([0.3, 0.1, -1.0, *rng.uniform(-0.2, 0.2, 3)])
+    return ImpactCase("patch", np.diag([2.0, 2.0, 2.0, 0.5, 0.5, 0.8]), rows, velocity, 0.0)
+
+
+def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """Planar boxes in a stack, two contacts at each joint, every joint closing: three coordinates per two contacts."""
+    boxes = (contacts + 1) // 2
+    rows = np.zeros((contacts, 3 * boxes))
+    for i in range(contacts):
+        box, arm = i // 2, 1.0 if i % 2 else -1.0
+        rows[i, 3 * box + 1 : 3 * box + 3] = 1.0, arm
+        if box > 0:
+            rows[i, 3 * box - 2 : 3 * box] = -1.0, -arm
+    velocity = np.zeros(3 * boxes)
+    velocity[1::3] = -np.cumsum(rng.uniform(0.5, 1.0, boxes))
+    velocity[2::3] = rng.uniform(-0.1, 0.1, boxes)
+    return ImpactCase("pile", np.diag(np.tile([1.0, 1.0, 2.0 / 3.0], boxes)), rows, velocity, 0.0)
+
+
+def impact_cost(
+    contacts: Sequence[int] = CONTACTS,
+    solvers: Sequence[str] = SOLVERS,
+    repeats: int = REPEATS,
+    seed: int = 22,
+    longest: float = LONGEST,
+    progress: Callable[[str, int, int], None] | None = None,
+    failures: list[Failure] | None = None,
+) -> tuple[CostRow, ...]:
+    """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
+    from reference.one_thread import one_thread
+
+    rows: list[CostRow] = []
+    too_slow: dict[tuple[str, str], float] = {}
+    for done, count in enumerate(contacts):
+        for make in (patch, pile):
+            case = make(count, np.random.default_rng([seed, count]))
+            with one_thread():
+                timing = partial(_time_case, case, solvers, max(3, repeats), longest, too_slow, failures)
+                rows += attempt(f"{case.family} of {count} contacts", timing, failures) or []
+        if progress is not None:
+            progress("time per impact", done + 1, len(contacts))
+    return tuple(rows)
+
+
+def _time_case(
+    case: ImpactCase, solvers: Sequence[str], repeats: int, longest: float, too_slow: dict[tuple[str, str], float],
+    failures: list[Failure] | None,
+) -> list[CostRow]:
+    calls, answers, notes = _warm(case, solvers, too_slow, failures)
+    samples: dict[str, list[float]] = {name: [] for name in calls}
+    inner = {name: _repetitions(call) for name, call in calls.items()}
+    names = list(calls)
+    for turn in range(repeats):
+        for name in names[turn % len(names) :] + names[: turn % len(names)]:
+            samples[name].append(_seconds(calls[name], inner[name]))
+    for name, times in samples.items():
+        if np.median(times) > longest:
+            too_slow[case.family, name] = float(np.median(times))
+    return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, *solvers)]
+
+
+def _warm(
+    case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float], failures: list[Failure] | None
+) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
+    """The calls that work, their v⁺, and for the others why not."""
+    from iapb.errors import MissingDependencyError
+
+    calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case, "factored"),
+                              PRINTED: engine_call(case, "gram_pinv")}  # fmt: skip
+    answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()
+    for name in (LEMKE_KERNEL, *solvers):
+        if (case.family, name) in too_slow:
+            notes[name] = f"left out: {too_slow[case.family, name]:.3g} s for fewer contacts"
+            continue
+        try:
+            call = LemkeCall(case) if name == LEMKE_KERNEL else solver_call(case, name)
+            answers[name] = call()
+        except MissingDependencyError as error:
+            notes[name] = f"missing: {error}"
+        except Exception as error:
+            if failures is None:
+                raise
+            failures.append(failure_of(f"{name} on a {case.family} of {case.contacts} contacts", error))
+            notes[name] = f"failed: {error}"
+        else:
+            calls[name] = call
+    return calls, answers, notes
+
+
+def _repetitions(call: Call) -> int:
+    """Calls in one sample, so that it lasts long enough for the clock."""
+    times = 1
+    while _seconds(call, times) * times < _SHORTEST_SAMPLE:
+        times *= 4
+    return times
+
+
+def _seconds(call: Call, times: int) -> float:
+    """Seconds per call; the kernel repeats itself in compiled code, so that no call from Python is counted."""
+    repeated = getattr(call, "repeated", None)
+    started = time.perf_counter()
+    if repeated is not None:
+        repeated(times)
+    else:
+        for _ in range(times):
+            call()
+    return (time.perf_counter() - started) / times
+
+
+def _row(
+    case: ImpactCase, name: str, samples: dict[str, list[float]], answers: dict[str, Floats], notes: dict[str, str]
+) -> CostRow:
+    size = (case.family, case.contacts, len(case.velocity), name)
+    if name not in samples:
+        verdict = notes[name].split(":")[0]
+        return CostRow(*size, verdict, np.nan, np.nan, np.nan, 0, np.nan, notes[name])
+    reference = answers[IAPB] if name in (IAPB, KERNEL, PRINTED) else answers.get("daqp", answers[name])
+    upper = np.linalg.cholesky(case.mass_matrix).T
+    speed = float(np.linalg.norm(upper @ case.velocity))
+    distance = float(np.linalg.norm(upper @ (answers[name] - reference))) / speed
+    verdict = "solved" if distance <= _SOLVED else "failed"
+    times = samples[name]
+    return CostRow(*size, verdict, float(np.median(times)), min(times), max(times), len(times), distance)
