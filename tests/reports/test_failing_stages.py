@@ -202,8 +202,8 @@ def rolled_ball(scene: Any, simulate: Any) -> Any:
 
 
 def of_mechanics(patch: Patch, folder: Path) -> list[str]:
-    from verification.mechanics import robots
-    from verification.studies import false_collisions, linked_impacts, many_bodies
+    from verification.cost import many_bodies
+    from verification.mechanics import false_collisions, linked_impacts, robots
 
     patch.setattr(robots, "STATES", 1)
     patch.setattr(robots, "TREE_SIZES", (1, 2))
