@@ -26,8 +26,8 @@ from reports.store.keys import canonical_json, code_version
 from reports.store.tables import Column, Table, read_table, write_table
 
 if TYPE_CHECKING:
-    from verification.properties.campaign import Batch, BatchOutcome, Subject
-    from verification.properties.tally import LawCount
+    from verification.laws.campaign import Batch, BatchOutcome, Subject
+    from verification.laws.kit import LawCount
 
 ENGINE = "iapb:resolve_impact"
 _TABLE = "laws"
@@ -54,8 +54,8 @@ class CampaignRequest:
     def subject(self) -> Subject:
         """What the laws are put to; imports the resolver."""
         from reports.by_name import function_named
-        from verification.properties import bounds
-        from verification.properties.campaign import Subject
+        from verification.laws import bounds
+        from verification.laws.campaign import Subject
 
         tested = function_named("--resolver", self.resolver)
         return Subject(tested, getattr(bounds, self.bounds), self.largest_condition, self.seed)
@@ -132,7 +132,7 @@ class Campaign:
 
     def counts(self, batches: Iterable[Batch]) -> dict[str, dict[str, LawCount]]:
         """Sums over the batches that are there, by part and law."""
-        from verification.properties.tally import added
+        from verification.laws.kit import added
 
         sums: dict[str, dict[str, LawCount]] = {}
         for batch in batches:
@@ -154,7 +154,7 @@ class Campaign:
 
 def outcome_of(request: CampaignRequest, batch: Batch) -> BatchOutcome:
     """Do one batch; in a process of its own it finds its resolver by name."""
-    from verification.properties.campaign import do_batch
+    from verification.laws.campaign import do_batch
 
     return do_batch(batch, request.subject())
 
@@ -174,8 +174,8 @@ def _table(batch: Batch, outcome: BatchOutcome) -> Table:
 
 
 def _read(path: Path) -> Iterator[LawCount]:
-    from verification.properties.case import LawResidual
-    from verification.properties.tally import LawCount
+    from verification.laws.bounds import LawResidual
+    from verification.laws.kit import LawCount
 
     table = read_table(path, _TABLE)
     rows = zip(*(table[name] for name in ("law", "checked", "failures", "worst", "tolerance")), strict=True)

@@ -19,9 +19,10 @@ from reports.store.tables import Column, Table, read_table, write_table
 if TYPE_CHECKING:
     from reports.campaign import CampaignRequest
     from reports.store_impact import BrokenImpact
-    from verification.properties.campaign import Found, Subject
-    from verification.properties.case import ImpactCase, LawResidual
-    from verification.properties.struck import Struck
+    from verification.impacts import ImpactCase
+    from verification.laws.bounds import LawResidual
+    from verification.laws.campaign import Found, Subject
+    from verification.laws.counterexample import Struck
 
 _TABLE = "counterexample"
 
@@ -52,9 +53,9 @@ def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
 def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> BrokenImpact:
     from reports.campaign import ENGINE
     from reports.store_impact import BrokenImpact
-    from verification.properties.engine_laws import ENGINE_LAWS
-    from verification.properties.laws import LAWS, UNEQUAL_LAWS
-    from verification.properties.pasteable import as_test
+    from verification.laws.counterexample import as_test
+    from verification.laws.engine_laws import ENGINE_LAWS
+    from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
 
     subject = request.subject()
     return BrokenImpact(
@@ -103,7 +104,7 @@ def _recheck_impact(broken: BrokenImpact) -> Iterator[tuple[str, LawResidual]]:
 
 def _recheck_drawn(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
     """What is no impact: the case that its part, seed and number draw."""
-    from verification.properties.campaign import drawn
+    from verification.laws.campaign import drawn
 
     case = drawn(record["part"], record["index"], _subject(record))
     yield _judged(record["law"], record, case)
@@ -111,7 +112,7 @@ def _recheck_drawn(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
 
 def _judged(law: str, origin: dict[str, Any], case: Any) -> tuple[str, LawResidual]:
     from reference.one_thread import one_thread
-    from verification.properties.campaign import residuals
+    from verification.laws.campaign import residuals
 
     with one_thread():  # as it was found
         return law, residuals(origin["part"], case, _subject(origin))[0][law]
@@ -128,7 +129,7 @@ def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:
     from iapb.scene import scene_from_text
     from reference.worlds import run_world
     from reports.store import read_run
-    from verification.properties.trajectory_laws import judge_run
+    from verification.laws.trajectory_laws import judge_run
 
     run = read_run(path)
     yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))

@@ -27,8 +27,8 @@ from reports.store.io import opened, read_values, write_quantity, write_scale, w
 from reports.store.runs import write_run
 
 if TYPE_CHECKING:
-    from verification.properties.case import Floats, ImpactCase
-    from verification.properties.struck import Struck
+    from verification.impacts import Floats, ImpactCase
+    from verification.laws.counterexample import Struck
 
 STRUCK = "struck"
 _SOURCE = "# An impact of bare numbers, no scene: see the group /struck of this file.\n"
@@ -161,8 +161,8 @@ def read_broken_impact(path: Path | str) -> BrokenImpact | None:
 
 def _broken(texts: dict[str, str], arrays: dict[str, Any], moves: Any, head: dict[str, Any], rows: tuple[int, ...],
             place: str) -> BrokenImpact:
-    from verification.properties.case import ImpactCase
-    from verification.properties.struck import Struck
+    from verification.impacts import ImpactCase
+    from verification.laws.counterexample import Struck
 
     after, e, found = arrays.pop("velocity_after"), arrays.pop("restitution"), json.loads(texts["found"])
     d = len(arrays["velocity"])

@@ -42,7 +42,7 @@ OUT, TABLE = REPOSITORY / "out" / "mutants", Path(__file__).with_suffix(".toml")
 PHYSICS = ("iapb/mechanics/kernels/*.py", "iapb/mechanics/mechanism.py", "iapb/mechanics/integrators.py",
            "iapb/mechanics/energy.py", "iapb/contact/kernels/*.py", "iapb/contact/impact_methods.py",
            "iapb/haptics/kernels/*.py")  # fmt: skip
-TESTS = ("tests/iapb", "tests/verification/mechanics", "tests/verification/properties", "tests/verification/laws")
+TESTS = ("tests/iapb", "tests/verification/mechanics", "tests/verification/laws")
 WANTED = 0.90
 NOTICED, TOO_LONG, SURVIVED, UNREACHED = "noticed", "too long", "survived", "unreached"
 

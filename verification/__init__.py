@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from verification.cost import work_precision as work_precision
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
-    from verification.properties import bulk_impacts as bulk_impacts
-    from verification.properties import check_passivity as check_passivity
+    from verification.laws import bulk_impacts as bulk_impacts
+    from verification.laws import check_passivity as check_passivity
 
 _HOME = {
-    "check_passivity": "verification.properties",
-    "bulk_impacts": "verification.properties",
+    "check_passivity": "verification.laws",
+    "bulk_impacts": "verification.laws",
     "judge_hard_cases": "verification.hard_cases",
     "work_precision": "verification.cost",
 }

@@ -17,9 +17,9 @@ from reports.compiling import compiling_told
 from verification import check_passivity
 from verification.engines import SETTINGS, compare_engines, sentence, verdict
 from verification.engines.record import EngineRecord
-from verification.properties.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
-from verification.properties.kit import IMPACTS as KIT_IMPACTS
-from verification.properties.tally import LawCount
+from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
+from verification.laws.kit import IMPACTS as KIT_IMPACTS
+from verification.laws.kit import LawCount
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
 _SHOWN = 20  # counterexamples listed; all are in their folder

@@ -22,9 +22,9 @@ Progress = Callable[[int, int], None]
 
 def compute(progress: Progress, failures: list[Failure]) -> tuple[Property, ...]:
     """Every law on our resolver, on what else the engine does, and along trajectories; each with a planted fault."""
-    from verification.properties import LAWS
-    from verification.properties.engine_laws import ENGINE_LAWS
-    from verification.properties.trajectory_laws import TRAJECTORY_LAWS
+    from verification.laws import LAWS
+    from verification.laws.engine_laws import ENGINE_LAWS
+    from verification.laws.trajectory_laws import TRAJECTORY_LAWS
 
     records: list[Property] = []
     total = len(LAWS) + len(ENGINE_LAWS) + len(TRAJECTORY_LAWS)
@@ -37,7 +37,7 @@ def compute(progress: Progress, failures: list[Failure]) -> tuple[Property, ...]
 def _impact_laws(failures: list[Failure]) -> Iterator[Property]:
     """The kit on our resolver; a law that no planted bug names has none."""
     from iapb import resolve_impact
-    from verification.properties import PLANTED_BUGS, check_passivity
+    from verification.laws import PLANTED_BUGS, check_passivity
 
     first: dict[str, tuple[str, Any]] = {}
     for name, bug in PLANTED_BUGS.items():
@@ -62,8 +62,8 @@ def _impact_laws(failures: list[Failure]) -> Iterator[Property]:
 def _engine_law(name: str) -> Iterator[Property]:
     import numpy as np
 
-    from verification.properties.engine_laws import judge_engine_law
-    from verification.properties.planted_engine import PLANTED_ENGINE_FAULTS
+    from verification.laws.engine_laws import judge_engine_law
+    from verification.laws.planted_runs import PLANTED_ENGINE_FAULTS
 
     cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
     verdict, (fault, make) = judge_engine_law(name, cases=cases, seed=SEED), PLANTED_ENGINE_FAULTS[name]
@@ -75,11 +75,11 @@ def _engine_law(name: str) -> Iterator[Property]:
 def _trajectory_laws(failures: list[Failure]) -> Iterator[Property]:
     import numpy as np
 
-    from verification.properties.planted_trajectory import PLANTED_TRAJECTORY_FAULTS, first_occasion
-    from verification.properties.scenes import draw_scene
-    from verification.properties.scenes_space import draw_spatial_scene
-    from verification.properties.tally import residual_count
-    from verification.properties.trajectory_laws import TRAJECTORY_LAWS, Trajectory
+    from verification.laws.kit import residual_count
+    from verification.laws.planted_runs import PLANTED_TRAJECTORY_FAULTS, first_occasion
+    from verification.laws.scenes import draw_scene
+    from verification.laws.scenes_space import draw_spatial_scene
+    from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory
 
     rng = np.random.default_rng(SEED)
     scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
@@ -133,7 +133,7 @@ def bulk(depth: str, progress: Progress, failures: list[Failure]) -> Numbers:
 def _bulk_rows(
     label: str, method: str, clamp: bool | None, count: int, progress: Callable[..., None]
 ) -> Iterator[tuple[Any, ...]]:
-    from verification.properties import bulk_impacts
+    from verification.laws import bulk_impacts
 
     result = bulk_impacts(count, SEED, method, clamp, progress=progress)
     for row in result.by_condition():

@@ -17,21 +17,12 @@ from reports.campaign import Campaign, CampaignRequest
 from reports.campaign_counterexamples import keep_counterexample, recheck
 from reports.cli import main
 from reports.store.tables import read_table
-from verification.properties.campaign import (
-    IMPACTS,
-    TRAJECTORIES,
-    UNEQUAL,
-    Batch,
-    Found,
-    drawn,
-    plan,
-    residuals,
-)
-from verification.properties.case import LawResidual
-from verification.properties.planted_trajectory import doubled_impulse
+from verification.laws.bounds import LawResidual
+from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
+from verification.laws.planted_runs import doubled_impulse
 
-SOUND = CampaignRequest("verification.properties:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
-BROKEN = replace(SOUND, resolver="verification.properties.planted:wrong_sign")
+SOUND = CampaignRequest("verification.laws:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
+BROKEN = replace(SOUND, resolver="verification.laws.planted:wrong_sign")
 BATCHES = tuple(Batch(IMPACTS, first, 5) for first in range(0, 20, 5))
 
 
@@ -106,8 +97,8 @@ _ENDLESS = """
 import sys
 from pathlib import Path
 from reports.campaign import Campaign, CampaignRequest
-from verification.properties.campaign import IMPACTS, Batch
-request = CampaignRequest("verification.properties:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
+from verification.laws.campaign import IMPACTS, Batch
+request = CampaignRequest("verification.laws:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
 Campaign(Path(sys.argv[1]), request).run([Batch(IMPACTS, first, 5) for first in range(0, 10**5, 5)], lambda *told: None)
 """
 

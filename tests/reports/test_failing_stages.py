@@ -12,9 +12,9 @@ import typer
 
 import verification.claims
 import verification.hard_cases
+import verification.laws
 import verification.mechanics
 import verification.proofs
-import verification.properties
 from reports.commands import reproduce
 from reports.evidence import (
     accuracy,
@@ -36,7 +36,7 @@ from verification.claims import c07_plastic
 from verification.cost import effect_cost, measure
 from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
-from verification.properties import engine_laws, laws, trajectory_laws
+from verification.laws import engine_laws, impact_laws, trajectory_laws
 
 Patch = pytest.MonkeyPatch
 Found = tuple[Any, list[Failure]]
@@ -88,15 +88,15 @@ def of_properties(patch: Patch, folder: Path) -> list[str]:
              "TRAJECTORIES": 2, "IN_SPACE": 0, "TRAJECTORY_STEPS": 5}  # fmt: skip
     for name, size in sizes.items():
         patch.setattr(properties, name, size)
-    impact, engine = next(iter(laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
+    impact, engine = next(iter(impact_laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
     chosen = {name: engine_laws.ENGINE_LAWS[name] for name in (engine, "budget") if name in engine_laws.ENGINE_LAWS}
     patch.setattr(engine_laws, "ENGINE_LAWS", chosen)
     of_runs = trajectory_laws.TRAJECTORY_LAWS
-    for found, name in ((laws.LAWS, impact), (chosen, engine), (of_runs, "finite")):
+    for found, name in ((impact_laws.LAWS, impact), (chosen, engine), (of_runs, "finite")):
         patch.setitem(found, name, found[name]._replace(check=broken(found[name].check, lambda *_: True)))
     failures: list[Failure] = []
     records = properties.compute(nothing, failures)
-    every = len(laws.LAWS) + len(chosen) + len(of_runs)
+    every = len(impact_laws.LAWS) + len(chosen) + len(of_runs)
     assert len(records) == every - 3
     assert [failure.case for failure in failures] == [impact, engine, "finite"]
     return ["a law of each kind"]
@@ -114,8 +114,8 @@ def of_counterexamples(patch: Patch, folder: Path) -> list[str]:
 def of_bulk(patch: Patch, folder: Path) -> list[str]:
     patch.setitem(properties.IMPACTS, "quick", 20)
     patch.setitem(properties.COMPARED_IMPACTS, "quick", 20)
-    bulk = verification.properties.bulk_impacts
-    patch.setattr(verification.properties, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
+    bulk = verification.laws.bulk_impacts
+    patch.setattr(verification.laws, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
     failures: list[Failure] = []
     table = properties.bulk("quick", nothing, failures)
     assert list(dict.fromkeys(row[0] for row in table.rows)) == ["factored", "gram_pinv, as printed"]

@@ -18,13 +18,14 @@ from reports.store import read_run
 from reports.store.care import PARTIAL, check_store
 from reports.store.io import new_file
 from reports.store_impact import read_broken_impact
-from verification.properties.campaign import IMPACTS, UNEQUAL, Batch, Found, drawn
-from verification.properties.case import ImpactCase, LawResidual
-from verification.properties.planted import returns_too_much
-from verification.properties.struck import strike
+from verification.impacts import ImpactCase
+from verification.laws.bounds import LawResidual
+from verification.laws.campaign import IMPACTS, UNEQUAL, Batch, Found, drawn
+from verification.laws.counterexample import strike
+from verification.laws.planted import returns_too_much
 
 # The planted fault: 1e-4 too much of every impulse, computed in exact rationals, so that no BLAS has a say.
-FAULTY = CampaignRequest("verification.properties.planted:returns_too_much", "KIT", 1e8, 600, 0, 0, 1)
+FAULTY = CampaignRequest("verification.laws.planted:returns_too_much", "KIT", 1e8, 600, 0, 0, 1)
 BATCH = Batch(IMPACTS, 471, 1)  # elastic, so it gains energy
 
 
@@ -115,7 +116,7 @@ def test_the_engines_own_laws_of_impacts_are_runs_too(part: str, tmp_path: Path)
 
 
 def test_a_resolver_that_raises_leaves_no_velocity_and_its_words(tmp_path: Path) -> None:
-    request = replace(FAULTY, resolver="verification.properties.planted:gives_up")
+    request = replace(FAULTY, resolver="verification.laws.planted:gives_up")
     case = drawn(IMPACTS, 3, request.subject())
     path = _keep(IMPACTS, case, request, "kinetic_energy", tmp_path / "kept")
     broken = read_broken_impact(path)
@@ -148,7 +149,7 @@ def test_of_a_law_that_is_broken_all_the_time_the_first_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reports.campaign, "KEPT_PER_LAW", 3)
-    request = CampaignRequest("verification.properties.planted:wrong_sign", "KIT", 1e8, 60, 0, 0, 1)
+    request = CampaignRequest("verification.laws.planted:wrong_sign", "KIT", 1e8, 60, 0, 0, 1)
     campaign = Campaign(tmp_path, request)
     batches = [Batch(IMPACTS, 0, 10), Batch(IMPACTS, 10, 10)]
     campaign.run(batches, lambda *told: None)

@@ -38,7 +38,7 @@ def measure(study: Study) -> Table:
 
 def _trial(rate: float, K: float, device: float, share: float) -> dict[str, Any]:
     """`share` is of b − KT/2; where that is negative no B is allowed, and it is of KT/2."""
-    from verification.properties.engine_laws.hand_port import leak, ours, quickest_motion
+    from verification.laws.engine_laws.hand_port import leak, ours, quickest_motion
 
     half = 0.5 * K / rate
     b = device * half

@@ -1,7 +1,7 @@
 """The hand's port of a whole device scene: sensors, coupling, tool, contact law and actuators in the engine's loop.
 
 A hand moves the device along prescribed positions x_k, one per step; what the loop makes of them are forces F_k that
-the actuators hold until the next sample. As at the bare wall (`verification.properties.engine_laws.hand_port`), of all
+the actuators hold until the next sample. As at the bare wall (`verification.laws.engine_laws.hand_port`), of all
 motions through the same positions the straight one loses least in the physical damping b, and the device's inertia
 stores energy and makes none, so the hand has put in at least
 

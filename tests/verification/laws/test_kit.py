@@ -1,0 +1,208 @@
+"""The kit passes sound resolvers, finds what is wrong in others by itself, and says it so that one can paste it."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+import pytest
+
+from iapb import resolve_impact
+from reference.exact import exact_impact, relative_energy_gain
+from verification import check_passivity
+from verification.impacts import Floats, ImpactCase, adverse_cases
+from verification.laws import PLANTED_BUGS, sound_resolver
+from verification.laws.bounds import FACTORED, KIT
+from verification.laws.counterexample import as_test, shrink
+from verification.laws.planted import (
+    TOO_MUCH,
+    each_contact_its_own_restitution,
+    printed_formula,
+    returns_too_much,
+)
+from verification.laws.resolver import Resolver
+
+
+@pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, partial(resolve_impact, method="svd")])
+def test_sound_resolvers_pass(resolver: object) -> None:
+    report = check_passivity(resolver, impacts=200)
+    assert report.passed, report
+    assert report.counterexample is None and report.counterexample_test == ""
+    assert all(verdict.checked > 0 for verdict in report.verdicts)
+    assert report.worst.worst.ratio <= 1.0
+
+
+def test_our_resolver_keeps_its_own_bounds_on_wider_families() -> None:
+    report = check_passivity(resolve_impact, impacts=200, bounds=FACTORED, largest_condition=1e10)
+    assert report.passed, report
+
+
+@pytest.mark.parametrize("name", PLANTED_BUGS)
+def test_every_planted_bug_is_caught_by_its_law(name: str) -> None:
+    bug = PLANTED_BUGS[name]
+    report = check_passivity(bug.make(), impacts=150, search=0)
+    assert not report.passed
+    assert bug.caught_by in report.broken_laws, report
+
+
+class _Remembered:
+    """A resolver whose answers are kept: a BLAS may round a second call of the same impact in another way."""
+
+    def __init__(self, resolver: Resolver) -> None:
+        self.resolver, self.answers = resolver, dict[bytes, Floats]()
+
+    def __call__(self, M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+        answer = self.resolver(M, J, v, e)
+        self.answers[_bits(M, J, v, e)] = np.array(getattr(answer, "velocity", answer))
+        return self.answers[_bits(M, J, v, e)]
+
+    def exact_gain(self, case: ImpactCase) -> float:
+        """The relative gain of the last answer to a case, in exact rationals."""
+        M, J, v = case.mass_matrix, case.contact_jacobian, case.velocity
+        return relative_energy_gain(M, v, self.answers[_bits(M, J, v, case.restitution)])
+
+
+def _bits(M: Floats, J: Floats, v: Floats, e: float) -> bytes:
+    return b"".join(np.ascontiguousarray(array).tobytes() for array in (M, J, v, np.array(e)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("printed", [printed_formula, partial(resolve_impact, method="gram_pinv")])
+def test_the_printed_formula_is_found_to_gain_energy(printed: Resolver, seed: int) -> None:
+    """How much it gains is up to the BLAS; that the reported gains are gains, exact rationals say."""
+    resolver = _Remembered(printed)
+    report = check_passivity(resolver, impacts=100, seed=seed, search=60)
+    assert not report.passed and report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
+    for case in (report.counterexample, report.verdict("kinetic_energy").worst_case):
+        assert resolver.exact_gain(case) > KIT.energy_gain(case)
+
+
+def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() -> None:
+    """(1 + e)(1 + δ) times the projection P u changes the energy by its factor f (f − 2) of |P u|² / |u|²."""
+    resolver = _Remembered(returns_too_much)
+    report = check_passivity(resolver, impacts=60, search=60)
+    verdict, case = report.verdict("kinetic_energy"), report.counterexample
+    most = float(2 * TOO_MUCH * (2 * TOO_MUCH - 2))
+    assert verdict.largest == pytest.approx(most, rel=1e-12)  # e = 1 and rows that see all of the motion: rounded once
+    assert report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
+    assert (case.coordinates, case.contacts, case.restitution) == (1, 1, 1.0)
+    for found in (case, verdict.worst_case):
+        M, J, v, e = found.mass_matrix, found.contact_jacobian, found.velocity, found.restitution
+        plastic, factor = exact_impact(M, J, v, 0), (1 + Fraction(e)) * TOO_MUCH
+        share = 1 - plastic.energy_after / plastic.energy_before
+        assert resolver.exact_gain(found) == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
+    assert verdict.worst.value == pytest.approx(resolver.exact_gain(verdict.worst_case), rel=1e-12)
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_shrinking_ends_follows_from_the_answers_alone_and_leaves_nothing_to_take(index: int) -> None:
+    """The resolver gains in exact rationals, so neither its answers nor the verdicts know a BLAS."""
+
+    def gains(case: ImpactCase) -> bool:
+        asked.append(case)
+        after = returns_too_much(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+        return relative_energy_gain(case.mass_matrix, case.velocity, after) > 1e-6
+
+    asked: list[ImpactCase] = []
+    drawn = list(adverse_cases(np.random.default_rng(5)))[index]
+    smallest = shrink(drawn, gains)
+    assert (smallest.coordinates, smallest.contacts, smallest.restitution) == (1, 1, 1.0)
+    assert all(np.array_equal(x, np.round(x, 1)) for x in (smallest.mass_matrix, smallest.velocity))
+    first, count = smallest, len(asked)
+    again = shrink(drawn, gains)
+    assert repr(again) == repr(first) and len(asked) == 2 * count
+
+
+def test_the_counterexample_can_be_pasted() -> None:
+    resolver = PLANTED_BUGS["wrong_sign"].make()
+    report = check_passivity(resolver, impacts=50, search=50)
+    scope: dict[str, object] = {}
+    exec(report.counterexample_test, scope)
+    assert scope["resolver"] is resolver
+    with pytest.raises(AssertionError, match="kinetic_energy"):
+        scope["test_kinetic_energy"]()
+    scope["resolver"] = sound_resolver
+    scope["test_kinetic_energy"]()
+
+
+def test_the_report_reads_as_text() -> None:
+    report = check_passivity(PLANTED_BUGS["squared_restitution"].make(), impacts=50, search=0)
+    text = str(report)
+    assert "FAILED on 50 impacts" in text
+    assert "BROKEN J v⁺ = −e J v⁻" in text and "kept   KE⁺ ≤ KE⁻" in text
+
+
+@pytest.mark.parametrize(
+    ("answer", "complaint"),
+    [
+        (lambda M, J, v, e: v[:-1], "shape"),
+        (lambda M, J, v, e: v * np.nan, "not finite"),
+        (lambda M, J, v, e: "fast", "returned"),
+        (lambda M, J, v, e: 1 / 0, "ZeroDivisionError"),
+    ],
+)
+def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(answer: object, complaint: str) -> None:
+    report = check_passivity(answer, impacts=5, search=0)
+    assert not report.passed
+    assert complaint in report.verdict("kinetic_energy").fault
+
+
+def test_a_resolver_that_writes_on_its_input_is_told_so_and_nothing_else() -> None:
+    report = check_passivity(PLANTED_BUGS["writes_on_its_arguments"].make(), impacts=60, search=0)
+    assert report.broken_laws == ("arguments",)
+    assert "BROKEN the arguments are left as they were" in str(report)
+
+
+def test_unequal_restitution_is_opt_in() -> None:
+    """Newton's equalities with a restitution per row: sound while they are equal, and a gain of energy when not."""
+    assert check_passivity(each_contact_its_own_restitution, impacts=100).passed
+    report = check_passivity(each_contact_its_own_restitution, impacts=100, search=60, unequal_restitution=True)
+    assert report.broken_laws == ("unequal_kinetic_energy",)
+    assert report.verdict("unequal_kinetic_energy").largest > 0.1
+    scope: dict[str, object] = {}
+    with pytest.raises(AssertionError, match="kinetic_energy"):
+        exec(report.counterexample_test + "\n\ntest_unequal_kinetic_energy()", scope)
+    assert scope["resolver"] is each_contact_its_own_restitution
+    assert check_passivity(resolve_impact, impacts=100, unequal_restitution=True).passed
+
+
+def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
+    def slow(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> np.ndarray:
+        time.sleep(0.02)
+        return sound_resolver(M, J, v, e)
+
+    report = check_passivity(slow, impacts=1000, patience=0.2)
+    assert not report.passed and report.broken_laws == () and report.impacts < 1000
+    assert "NOT FINISHED" in str(report) and "too slow" in str(report)
+
+
+@pytest.mark.parametrize("name", ["per_body_rows", "reversed_velocity", "transposed_factor"])
+def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(name: str) -> None:
+    resolver = PLANTED_BUGS[name].make()
+    law = PLANTED_BUGS[name].caught_by
+    report = check_passivity(resolver, impacts=60, search=0)
+    case = report.verdict(law).worst_case
+    text = as_test(case, law, resolver=resolver) + f"\n\ntest_{law}()"
+    with pytest.raises(AssertionError, match=law):
+        exec(text, {})
+    exec(as_test(case, law, resolver=sound_resolver) + f"\n\ntest_{law}()", {})
+
+
+def test_a_partial_is_pasted_with_its_options() -> None:
+    report = check_passivity(partial(resolve_impact, budget=0), impacts=50, search=0)
+    assert str(report).startswith("resolve_impact(budget=0): FAILED")
+    with pytest.raises(AssertionError, match="restitution"):
+        exec(report.counterexample_test + "\n\ntest_restitution()", {})
+
+
+def test_the_same_seed_gives_the_same_report() -> None:
+    first, second = (check_passivity(sound_resolver, impacts=40, seed=3) for _ in range(2))
+    assert [v.worst for v in first.verdicts] == [v.worst for v in second.verdicts]
+
+
+def test_a_failed_assertion_shows_the_whole_report() -> None:
+    """What pytest prints for `assert report.passed, report` is the report's repr."""
+    report = check_passivity(lambda mass, jacobian, velocity, restitution: 2.0 * velocity, impacts=20)
+    assert repr(report) == str(report) and "counterexample to" in repr(report)

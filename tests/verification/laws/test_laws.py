@@ -1,0 +1,85 @@
+"""Every law on impacts that hypothesis draws: our resolver against the bounds it proves, up to κ(M) = 1e14."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from iapb import resolve_impact
+from verification.impacts import ImpactCase
+from verification.laws.bounds import FACTORED, KIT, LawResidual
+from verification.laws.impact_laws import LAWS
+from verification.laws.resolver import sound_resolver
+from verification.laws.strategies import impact_cases
+
+
+@pytest.mark.parametrize("law", LAWS)
+@given(case=impact_cases(largest_exponent=14))
+def test_the_default_method_keeps_its_proved_bounds(law: str, case: ImpactCase) -> None:
+    residual = LAWS[law].check(case, resolve_impact, FACTORED)
+    assert residual is None or residual.passed, residual
+
+
+@given(case=impact_cases())
+def test_the_reference_resolver_keeps_every_law(case: ImpactCase) -> None:
+    """A resolver of plain numpy, written apart from the engine, passes: the laws ask nothing peculiar to ours."""
+    for law in LAWS.values():
+        residual = law.check(case, sound_resolver, KIT)
+        assert residual is None or residual.passed, residual
+
+
+@given(case=impact_cases(largest_exponent=14))
+def test_every_budget_is_passive(case: ImpactCase) -> None:
+    for budget in range(case.coordinates + 1):
+        limited = partial(resolve_impact, budget=budget)
+        residual = LAWS["kinetic_energy"].check(case, limited, FACTORED)
+        assert residual is not None and residual.passed, (budget, residual)
+
+
+@given(case=impact_cases(largest_exponent=14))
+@pytest.mark.parametrize("method", ["damped", "svd"])
+def test_filters_of_the_family_are_passive(method: str, case: ImpactCase) -> None:
+    residual = LAWS["kinetic_energy"].check(case, partial(resolve_impact, method=method), FACTORED)
+    assert residual is not None and residual.passed, residual
+
+
+def test_an_unknown_residual_never_passes() -> None:
+    assert not LawResidual("any", np.nan, 1.0).passed
+    assert not LawResidual("any", np.inf, 1.0).passed
+    assert not LawResidual("any", 1e-30, 0.0).passed
+    assert LawResidual("any", 0.0, 0.0).passed and LawResidual("any", -1.0, 1e-9).passed
+
+
+def test_momentum_sees_what_energy_does_not() -> None:
+    """Erratum 3: an equal ball at rest, struck; per-body rows bounce it back as from a wall and keep the energy."""
+    case = ImpactCase(np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 0.0]), 1.0, "", np.ones((1, 2)))
+
+    def per_body(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> object:
+        return resolve_impact(M, np.vstack([np.maximum(J, 0), np.minimum(J, 0)]), v, e)
+
+    assert LAWS["kinetic_energy"].check(case, per_body, KIT).passed
+    assert not LAWS["momentum"].check(case, per_body, KIT).passed
+    assert LAWS["momentum"].check(case, resolve_impact, KIT).passed
+
+
+def test_impulse_range_sees_what_energy_and_restitution_do_not() -> None:
+    case = ImpactCase(np.eye(2), np.array([[1.0, 0.0]]), np.array([-1.0, 1.0]), 0.5)
+
+    def reversed_velocity(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> np.ndarray:
+        return -e * v
+
+    assert LAWS["kinetic_energy"].check(case, reversed_velocity, KIT).passed
+    assert LAWS["restitution"].check(case, reversed_velocity, KIT).passed
+    assert not LAWS["impulse_range"].check(case, reversed_velocity, KIT).passed
+
+
+def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:
+    """Rows 6e-14 apart count as one; which of them stands for both turns the impulse by as much."""
+    rows = np.array([[1.0, 0.0], [1.0, 6e-14]])
+    case = ImpactCase(np.eye(2), rows, np.array([-1.0, 1.0]), 1.0)
+    assert case.is_separated and 0.0 < case.largest_noise < 1e-13
+    residual = LAWS["redundancy"].check(case, resolve_impact, FACTORED)
+    assert residual is not None and residual.passed and residual.tolerance < 1e-12

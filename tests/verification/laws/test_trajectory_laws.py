@@ -1,0 +1,91 @@
+"""Laws along whole trajectories: random scenes keep them, each planted fault breaks its law, stored runs do as well."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from reports.store import read_run, write_run
+from verification.laws.planted_runs import PLANTED_TRAJECTORY_FAULTS, first_occasion
+from verification.laws.scenes import SceneCase, draw_scene
+from verification.laws.scenes_space import draw_spatial_scene
+from verification.laws.strategies import scenes, scenes_in_space
+from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory, _gain, judge_run
+
+STEPS = 200
+
+
+@pytest.fixture(scope="module", params=[draw_scene, draw_spatial_scene], ids=["in the plane", "in space"])
+def drawn(request: pytest.FixtureRequest) -> list[SceneCase]:
+    rng = np.random.default_rng(7)
+    return [request.param(rng, STEPS) for _ in range(60)]
+
+
+def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
+    applied = set()
+    for case in drawn[:30]:
+        for law, residual in judge_run(case.simulate()):
+            applied.add(law)
+            assert residual.passed, (case, residual)
+    assert applied >= set(TRAJECTORY_LAWS) - {"device_limits"}
+
+
+@settings(max_examples=20)
+@given(case=scenes())
+def test_small_scenes_keep_every_law(case: SceneCase) -> None:
+    for _, residual in judge_run(case.simulate()):
+        assert residual.passed, residual
+
+
+@settings(max_examples=20)
+@given(case=scenes_in_space())
+def test_small_scenes_in_space_keep_every_law(case: SceneCase) -> None:
+    for _, residual in judge_run(case.simulate()):
+        assert residual.passed, residual
+
+
+def test_scenes_in_space_have_boxes_balls_stacks_and_linkages_that_touch() -> None:
+    rng = np.random.default_rng(3)
+    drawn = [draw_spatial_scene(rng, STEPS) for _ in range(40)]
+    kinds = {shape["kind"] for case in drawn for body in case.values["bodies"] for shape in body["shapes"]}
+    joints = {body["joint"] for case in drawn for body in case.values["bodies"]}
+    assert kinds == {"box", "sphere"} and joints == {"free_flyer", "revolute", "spherical"}
+    stacked = next(case for case in drawn if any(body["name"] == "above" for body in case.values["bodies"]))
+    run = stacked.simulate()
+    names = np.array([*run.body_names, "world"])
+    first = slice(run.contacts.offsets[0], run.contacts.offsets[1])
+    met = {(names[a], names[b]) for a, b in zip(run.contacts.body_a[first], run.contacts.body_b[first], strict=True)}
+    assert {frozenset(pair) for pair in met} >= {frozenset({"below", "world"}), frozenset({"below", "above"})}
+
+
+def test_a_gain_beyond_the_range_of_double_double_is_judged_exactly() -> None:
+    before, after = np.array([1e70, 1e-5]), np.array([1e70, 1e-5])
+    assert _gain(np.eye(2), before, after) == 0.0
+    assert _gain(np.eye(2), before, 2.0 * after) == 3.0
+
+
+@pytest.mark.parametrize("law", TRAJECTORY_LAWS)
+def test_the_planted_fault_breaks_its_law(law: str, drawn: list[SceneCase]) -> None:
+    assert set(PLANTED_TRAJECTORY_FAULTS) == set(TRAJECTORY_LAWS)
+    run = first_occasion(law, drawn)
+    assert run is not None
+    residual = TRAJECTORY_LAWS[law].check(Trajectory(run))
+    assert residual is not None and not residual.passed
+
+
+def test_a_stored_run_is_judged_from_its_file(drawn: list[SceneCase], tmp_path: Path) -> None:
+    run = drawn[0].simulate()
+    write_run(tmp_path / "run.h5", run)
+    again = dict(judge_run(read_run(tmp_path / "run.h5")))
+    assert again == dict(judge_run(run)) and all(residual.passed for residual in again.values())
+
+
+def test_a_run_of_another_law_is_asked_only_what_holds_for_it() -> None:
+    from iapb import find_scene, load_scene
+    from reference.worlds import run_world
+
+    run = run_world(load_scene(find_scene("peg_corner")), "CBuc", steps=50)
+    assert {law for law, _ in judge_run(run)} <= {"finite", "impact_energy", "impulse_momentum"}

@@ -1,0 +1,22 @@
+"""What every impact must keep: the laws, the tolerances, planted bugs, and the passivity kit for anybody's resolver."""
+
+from verification.impacts import ImpactCase
+from verification.laws.bounds import LawResidual
+from verification.laws.bulk import BulkImpacts, bulk_impacts
+from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
+from verification.laws.kit import PassivityReport, check_passivity
+from verification.laws.planted import PLANTED_BUGS
+from verification.laws.resolver import sound_resolver
+
+__all__ = [
+    "LAWS",
+    "PLANTED_BUGS",
+    "UNEQUAL_LAWS",
+    "BulkImpacts",
+    "ImpactCase",
+    "LawResidual",
+    "PassivityReport",
+    "bulk_impacts",
+    "check_passivity",
+    "sound_resolver",
+]

@@ -1,0 +1,71 @@
+"""How far an impact is from a law, and the tolerances of the laws, each with its reason."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from verification.impacts import ImpactCase
+
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class LawResidual:
+    """How far an impact is from keeping a law; passes while value <= tolerance (an unknown value never does)."""
+
+    law: str
+    value: float
+    tolerance: float
+
+    @property
+    def ratio(self) -> float:
+        """value / tolerance; infinite where the value is unknown."""
+        if not math.isfinite(self.value):
+            return np.inf
+        return self.value / self.tolerance if self.tolerance > 0.0 else (np.inf if self.value > 0.0 else 0.0)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the law holds to its tolerance."""
+        return self.ratio <= 1.0
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What is asked of a resolver.
+
+    Attributes
+    ----------
+    factor, power, ceiling : relative energy gain at most min(ceiling, factor · d · ε · κ(M)^power).
+    restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
+    bitwise_scaling : powers of two in row scale must change no bit.
+    """
+
+    factor: float
+    power: float
+    ceiling: float
+    restitution: float
+    bitwise_scaling: bool
+
+    def energy_gain(self, case: ImpactCase) -> float:
+        """Largest relative gain (KE⁺ − KE⁻)/KE⁻ that rounding excuses."""
+        return min(self.ceiling, self.factor * case.coordinates * EPS * case.condition**self.power)
+
+    def comparison(self, case: ImpactCase) -> float:
+        """Largest distance, relative to |u|, of two velocities that ought to be equal.
+
+        Whitening loses ε κ(M) (Cholesky's backward error); a direction of singular value σ carries ε √κ(M) / σ. Rows
+        dependent but for a noise below 1e-13 span directions that differ by the noise over σ, twice with 1 + e = 2.
+        """
+        root = np.sqrt(case.condition)
+        rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / case.smallest_motion))
+        return rounding + 4.0 * float(np.sqrt(max(case.contacts, 1))) * case.largest_noise / case.smallest_motion
+
+
+# Any sound resolver written with plain numpy (Cholesky, then an SVD of unit rows) keeps these.
+KIT = Bounds(factor=100.0, power=1.0, ceiling=1e-7, restitution=1e-8, bitwise_scaling=False)
+# What `factored` with its clamp promises (docstring of resolve_impact), on any κ(M) that Cholesky accepts.
+FACTORED = Bounds(factor=10.0, power=0.5, ceiling=np.inf, restitution=1e-8, bitwise_scaling=True)

@@ -1,0 +1,247 @@
+"""A failing impact: made smaller, written as a test to paste, and with what the resolver made of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from verification.impacts import Floats, ImpactCase
+from verification.laws.bounds import FACTORED, KIT, Bounds
+from verification.laws.engine_laws import ENGINE_LAWS
+from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
+
+_DIGITS = (0, 1, 2, 4, 8)
+
+
+def search_counterexample(
+    fails: Callable[[ImpactCase], bool], examples: int, seed: int, unequal: bool = False
+) -> ImpactCase | None:
+    """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing."""
+    import random
+
+    from hypothesis import HealthCheck, Phase, find, settings
+    from hypothesis.errors import NoSuchExample
+
+    from verification.laws.strategies import impact_cases, unequal_cases
+
+    profile = settings(
+        max_examples=examples,
+        database=None,
+        deadline=None,
+        phases=(Phase.generate, Phase.shrink),
+        suppress_health_check=list(HealthCheck),
+    )
+    try:
+        return find(unequal_cases() if unequal else impact_cases(), fails, settings=profile, random=random.Random(seed))
+    except NoSuchExample:
+        return None
+
+
+def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
+    """Return a smaller case that still fails, greedily; the case itself if nothing smaller does.
+
+    It ends: each step takes away translations, a row, a coordinate, a restitution other than 1, or written digits. What
+    it returns follows from the answers of `fails` alone.
+    """
+    improved = True
+    while improved:
+        improved = False
+        for smaller in _smaller(case):
+            if _is_valid(smaller) and fails(smaller):
+                case, improved = smaller, True
+                break
+    return case
+
+
+def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
+    if case.translations is not None:
+        yield replace(case, translations=None)
+    for i in range(case.contacts):
+        unequal = None if case.unequal is None else np.delete(case.unequal, i)
+        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=unequal)
+    if case.coordinates > 1 and case.translations is None:
+        for k in range(case.coordinates):
+            yield _without_coordinate(case, k)
+    for e in (1.0, 0.0):
+        if case.unequal is None and case.restitution not in (1.0, e):
+            yield replace(case, restitution=e)
+    for digits in _DIGITS:
+        for name in ("velocity", "contact_jacobian", "mass_matrix", "unequal"):
+            yield from _rounded(case, name, digits)
+
+
+def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
+    return replace(
+        case,
+        mass_matrix=np.delete(np.delete(case.mass_matrix, k, axis=0), k, axis=1),
+        contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
+        velocity=np.delete(case.velocity, k),
+    )
+
+
+def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
+    """The array in `digits` decimals, if that changes it and it was not rounder already."""
+    array = getattr(case, name)
+    if array is None:
+        return
+    rounder = np.round(array, digits) + 0.0  # no −0.0
+    if _length(rounder) < _length(array):
+        yield replace(case, **{name: rounder})
+
+
+def _length(array: np.ndarray) -> int:
+    """Length of the array as text: the measure of roundness, so that shrinking ends."""
+    return sum(len(repr(float(x))) for x in array.ravel())
+
+
+def _is_valid(case: ImpactCase) -> bool:
+    """Whether elimination, in floats and in a fixed order, meets no pivot near zero: no BLAS takes part."""
+    rows = case.mass_matrix.tolist()
+    least = 1e-14 * max(rows[k][k] for k in range(len(rows)))
+    for k, pivot_row in enumerate(rows):
+        if not pivot_row[k] > least:
+            return False
+        for row in rows[k + 1 :]:
+            factor = row[k] / pivot_row[k]
+            row[k:] = [x - factor * y for x, y in zip(row[k:], pivot_row[k:], strict=True)]
+    return True
+
+
+# A counterexample as the source of a test that can be pasted beside the resolver it breaks.
+
+_BY_NAME = {"KIT": KIT, "FACTORED": FACTORED}
+
+
+def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None) -> str:
+    """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap.
+
+    A law of the engine's own (a budget, extreme inputs) is put to the engine, whatever the resolver and the bounds.
+    """
+    if law in ENGINE_LAWS:
+        return _test_of_the_engine(case, law)
+    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else "LAWS"
+    name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
+    imports = ["import numpy as np", f"from verification.laws import {table}, ImpactCase"]
+    imports.append(f"from verification.laws.bounds import {name or 'Bounds'}")
+    return "\n".join([
+        *imports,
+        import_line(resolver) or "\n# resolver = ...  the one under test",
+        *_test_of(case, law),
+        f"    residual = {table}[{law!r}].check(case, resolver, {name or _bounds(bounds)})",
+        "    assert residual.passed, residual",
+    ])  # fmt: skip
+
+
+def _test_of_the_engine(case: ImpactCase, law: str) -> str:
+    return "\n".join([
+        "import numpy as np",
+        "from verification.laws import ImpactCase",
+        "from verification.laws.engine_laws import ENGINE_LAWS",
+        *_test_of(case, law),
+        f"    law = ENGINE_LAWS[{law!r}]",
+        "    residual = law.check(case, law.ours)",
+        "    assert residual.passed, residual",
+    ])  # fmt: skip
+
+
+def _test_of(case: ImpactCase, law: str) -> list[str]:
+    """The head of the test, and its case."""
+    optional = {"translations": case.translations, "unequal": case.unequal}
+    arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
+    arrays |= {name: array for name, array in optional.items() if array is not None}
+    more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)
+    return [
+        "",
+        "",
+        f"def test_{law}():",
+        *(f"    {key} = {_written(array)}" for key, array in arrays.items()),
+        f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
+    ]
+
+
+def import_line(resolver: Any) -> str:
+    """Return the lines that give `resolver`, or an empty text for a lambda or something made in place."""
+    if isinstance(resolver, partial) and not resolver.args:
+        line = _import_of(resolver.func, resolver.func.__name__) if _can_be_imported(resolver.func) else ""
+        return line and f"{line}\nfrom functools import partial\n\nresolver = {name_of(resolver, 'partial')}"
+    return _import_of(resolver, f"{resolver.__name__} as resolver") if _can_be_imported(resolver) else ""
+
+
+def name_of(resolver: Any, word: str = "") -> str:
+    """Return what a resolver is called, the options of a partial included; `word` writes that as a call."""
+    if isinstance(resolver, partial) and not resolver.args:
+        options = ", ".join(f"{key}={value!r}" for key, value in resolver.keywords.items())
+        name = getattr(resolver.func, "__name__", repr(resolver.func))
+        return f"{word}({name}, {options})" if word else f"{name}({options})"
+    return getattr(resolver, "__qualname__", None) or repr(resolver)
+
+
+def _can_be_imported(resolver: Any) -> bool:
+    module, name = getattr(resolver, "__module__", None), getattr(resolver, "__qualname__", "")
+    if not isinstance(module, str) or module == "__main__":
+        return False
+    return getattr(sys.modules.get(module), name, None) is resolver
+
+
+def _import_of(resolver: Any, name: str) -> str:
+    return f"from {resolver.__module__} import {name}"
+
+
+def _bounds(bounds: Bounds) -> str:
+    return repr(bounds).replace("=inf", "=np.inf")
+
+
+def _written(array: np.ndarray) -> str:
+    """The array as source; an empty one needs its shape."""
+    text = f"np.array({array.tolist()!r}, dtype=float)"
+    return text if array.size else f"{text}.reshape({array.shape})"
+
+
+# What a resolver made of one impact, as plain numbers: a reader of a counterexample need not call the resolver.
+@dataclass(frozen=True)
+class Struck:
+    """An impact and the velocity after it: once, or once for each budget of rows that the law tries.
+
+    rows : (k,) rows that the resolver might use.
+    velocity_after : (k, d), NaN where the resolver gave no finite velocity; `complaint` says why.
+    """
+
+    case: ImpactCase
+    rows: tuple[int, ...]
+    velocity_after: Floats
+    complaint: str = ""
+
+
+def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
+    """Return what comes of a case of a part: by `resolver` or, in the engine's own parts, by the engine.
+
+    None where the case is no impact: a wall in the hand, two rooms, a device that limits an impulse.
+    """
+    if not isinstance(case, ImpactCase):
+        return None
+    if part not in ENGINE_LAWS:
+        return _struck(case, (case.contacts,), (partial(own_outcome, resolver),))
+    ours = ENGINE_LAWS[part].ours
+    if part != "truncation":
+        return _struck(case, (case.contacts,), (partial(outcome, ours),))
+    budgets = tuple(range(min(case.contacts, case.coordinates) + 1))
+    return _struck(case, budgets, tuple(partial(outcome, partial(_in_budget, ours, rows)) for rows in budgets))
+
+
+def _in_budget(subject: Callable[..., Any], rows: int, *impact: Any) -> Any:
+    return subject(*impact, rows)
+
+
+def _struck(case: ImpactCase, rows: tuple[int, ...], calls: tuple[Callable[[ImpactCase], Floats], ...]) -> Struck:
+    after, complaints = np.full((len(rows), case.coordinates), np.nan), []
+    for velocity, call in zip(after, calls, strict=True):
+        try:
+            velocity[:] = call(case)
+        except ResolverFault as fault:
+            complaints.append(str(fault))
+    return Struck(case, rows, after, "; ".join(complaints))

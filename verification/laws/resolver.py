@@ -1,0 +1,108 @@
+"""What anybody's resolver answers to a case, checked; and a sound resolver of plain numpy, apart from the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from iapb.errors import IapbError
+from verification.impacts import Floats, ImpactCase
+
+Resolver = Callable[[Floats, Floats, Floats, Any], Any]
+
+
+class ResolverFault(IapbError):
+    """A resolver raised, or returned no finite velocity of the right shape."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One call: v⁺ (d,), or why there is none, and how many of its arguments the call has changed."""
+
+    velocity: Floats | ResolverFault
+    changed: int
+
+
+def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
+    """Return what the resolver gives for the case itself; all laws of a case share the one call."""
+    known = case._answers.get(id(resolver))
+    if known is None:
+        own = (case.mass_matrix, case.contact_jacobian, case.velocity, case.given_restitution())
+        given = tuple(np.copy(argument) if isinstance(argument, np.ndarray) else argument for argument in own)
+        velocity = _velocity(resolver, given, case)
+        changed = sum(not np.array_equal(one, other) for one, other in zip(own, given, strict=True))
+        known = case._answers[id(resolver)] = resolver, Answer(velocity, changed)
+    return known[1]
+
+
+def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
+    """Return v⁺ (d,) of the case itself, from the call that all its laws share."""
+    velocity = own_answer(resolver, case).velocity
+    if isinstance(velocity, ResolverFault):
+        raise velocity
+    return velocity
+
+
+def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
+    """Return v⁺ (d,) of a call of its own, on copies of the case's arrays, checked for shape and finiteness."""
+    given = case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy(), case.given_restitution()
+    velocity = _velocity(resolver, given, case)
+    if isinstance(velocity, ResolverFault):
+        raise velocity
+    return velocity
+
+
+def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> Floats | ResolverFault:
+    """Return v⁺, copied, or what is wrong with it; raise ResolverFault where the resolver raises."""
+    try:
+        answer = resolver(*given)
+    except Exception as error:  # anybody's resolver: whatever it raises is the finding
+        raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
+    velocity = np.asarray(getattr(answer, "velocity", answer))
+    if velocity.dtype.kind != "f" or velocity.shape != case.velocity.shape:
+        return ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
+    if not np.all(np.isfinite(velocity)):
+        return ResolverFault("returned a velocity that is not finite")
+    return velocity.astype(np.float64)
+
+
+# The sound resolver; the planted bugs are made from its parts.
+RANK_CUT = 1e-10
+
+
+class Parts(NamedTuple):
+    """M = L Lᵀ, u = Lᵀv, unit rows of A."""
+
+    lower: Floats
+    u: Floats
+    rows: Floats
+
+
+def whitened(M: Floats, J: Floats, v: Floats) -> Parts:
+    lower = np.linalg.cholesky(M)
+    rows = np.linalg.solve(lower, J.T).T
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return Parts(lower, lower.T @ v, np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0))
+
+
+def row_space(rows: Floats, cut: float = RANK_CUT) -> Floats:
+    _, values, right = np.linalg.svd(rows, full_matrices=False)
+    return right[values > cut]
+
+
+def back(parts: Parts, u_plus: Floats) -> Floats:
+    return np.linalg.solve(parts.lower.T, u_plus)
+
+
+def projecting(M: Floats, J: Floats, v: Floats, factor: float, cut: float = RANK_CUT) -> Floats:
+    parts = whitened(M, J, v)
+    Q = row_space(parts.rows, cut)
+    return back(parts, parts.u - factor * (Q.T @ (Q @ parts.u)))
+
+
+def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """u⁺ = u − (1 + e) Qᵀ Q u, Q from the singular value decomposition of the unit rows of A."""
+    return projecting(M, J, v, 1.0 + e)

@@ -1,0 +1,126 @@
+"""Hypothesis strategies: impacts of small whole numbers and powers of ten, which shrink to something one can read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import strategies as st
+
+from verification.impacts import Floats, ImpactCase, cradle_rows
+from verification.laws.scenes import SceneCase, Values
+
+
+@st.composite
+def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
+    """M = T D Tᵀ with T unit triangular of small whole numbers and D powers of ten, κ of order 10^largest_exponent."""
+    powers = draw(st.lists(st.integers(-largest_exponent, 0), min_size=d, max_size=d))
+    entries = draw(st.lists(st.integers(-1, 1), min_size=d * d, max_size=d * d))
+    T = np.tril(np.reshape(entries, (d, d)).astype(float), -1) + np.eye(d)
+    mass = T * 10.0 ** np.array(powers, dtype=float) @ T.T
+    return 0.5 * (mass + mass.T)
+
+
+@st.composite
+def contact_jacobians(draw: st.DrawFn, d: int, largest: int = 5) -> Floats:
+    """Whole-number rows; some are copies of others moved by a power of ten, some are zero."""
+    c = draw(st.integers(0, largest))
+    rows = np.zeros((c, d))
+    for i in range(c):
+        rows[i] = draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d))
+        if i and draw(st.booleans()):  # close to the row before, at a distance from 0.1 to rounding
+            rows[i] = rows[i - 1] + 10.0 ** -draw(st.integers(1, 16)) * rows[i]
+    return rows
+
+
+@st.composite
+def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
+    """Small whole numbers, as v or as Lᵀv, or M's lightest direction."""
+    d = len(mass)
+    whole = np.array(draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d)), dtype=float)
+    kind = draw(st.sampled_from(["v", "u", "light"]))
+    if kind == "u":
+        return np.linalg.solve(np.linalg.cholesky(mass).T, whole)
+    return np.linalg.eigh(mass)[1][:, 0] if kind == "light" else whole
+
+
+def restitutions() -> st.SearchStrategy[float]:
+    """e: the four that matter, or any."""
+    return st.one_of(st.sampled_from([1.0, 0.0, -1.0, 0.5]), st.floats(-1.0, 1.0))
+
+
+@st.composite
+def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
+    """An impact with a restitution of its own for each row."""
+    case = draw(impact_cases(largest_exponent))
+    e = draw(st.lists(st.sampled_from([0.0, 1.0, 0.5]), min_size=case.contacts, max_size=case.contacts))
+    return replace(case, unequal=np.array(e, dtype=float))
+
+
+@st.composite
+def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int = 4) -> ImpactCase:
+    """An impact with κ(M) about 10^largest_exponent at most."""
+    d = draw(st.integers(1, largest_size))
+    if draw(st.booleans()):
+        masses = 10.0 ** np.array(draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d)), dtype=float)
+        mass: Floats = np.diag(masses)
+        return ImpactCase(
+            mass, cradle_rows(d), draw(velocities(mass)), draw(restitutions()), "cradle", np.ones((1, d))
+        )
+    mass, rows = draw(mass_matrices(d, largest_exponent)), draw(contact_jacobians(d))
+    return ImpactCase(mass, rows, draw(velocities(mass)), draw(restitutions()), "whole numbers")
+
+
+@st.composite
+def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
+    """A short scene of whole numbers and simple shares: one or two discs or a link in a room, any law and rendering."""
+    count, linked = draw(st.integers(1, 2)), draw(st.booleans())
+    bodies = [draw(_discs(k)) for k in range(count)]
+    if linked:
+        angle, spin = draw(st.integers(-3, 3)), draw(st.integers(-9, 9))
+        bodies.append({"name": "link", "joint": "revolute", "mass": 1.0, "inertia": 1e-3,
+                       "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(spin)],
+                       "shapes": [{"kind": "box", "size": [0.1, 0.02], "center": [0.05, 0.0]}]})  # fmt: skip
+    contact = {
+        "stiffness": 10.0 ** draw(st.integers(1, 4)), "damping": float(draw(st.sampled_from([0, 1, 10]))),
+        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
+    }  # fmt: skip
+    walls = [{"name": "floor", "kind": "half_plane", "point": [0.0, -0.2], "normal": [0.0, 1.0]},
+             {"name": "side", "kind": "half_plane", "point": [0.2, 0.0], "normal": [-1.0, 0.0]}]  # fmt: skip
+    rate = float(draw(st.sampled_from([250, 1000])))
+    values = {"name": "small_scene", "rate": rate, "duration": steps / rate, "bodies": bodies, "walls": walls,
+              "gravity": draw(st.sampled_from([None, [0.0, -10.0]])), "contact": contact}  # fmt: skip
+    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))
+
+
+@st.composite
+def _discs(draw: st.DrawFn, k: int) -> Values:
+    """A disc of a simple mass, at rest in its place or thrown."""
+    v = draw(st.lists(st.integers(-3, 3), min_size=3, max_size=3))
+    return {"name": f"disc_{k}", "joint": "planar", "mass": 10.0 ** draw(st.integers(-2, 1)), "inertia": 1e-3,
+            "shapes": [{"kind": "circle", "radius": 0.05}], "position": [0.1 * k, -0.1, 0.0],
+            "velocity": [float(x) for x in v]}  # fmt: skip
+
+
+@st.composite
+def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
+    """A short scene in space of whole numbers: a ball, and a box that stands or is thrown, over a floor by a side."""
+    v = [draw(st.lists(st.integers(-3, 3), min_size=6, max_size=6)) for _ in range(2)]
+    turn = draw(st.sampled_from([[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, 0.8], [0.5, 0.5, 0.5, 0.5]]))
+    common = {"joint": "free_flyer", "mass": 10.0 ** draw(st.integers(-1, 1)), "inertia": [1e-3] * 3}
+    bodies = [
+        common | {"name": "ball", "shapes": [{"kind": "sphere", "radius": 0.05}], "velocity": [float(x) for x in v[0]],
+                  "position": [0.0, 0.0, draw(st.sampled_from([0.05, 0.15])), 0.0, 0.0, 0.0, 1.0]},
+        common | {"name": "box", "shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}],
+                  "velocity": [float(x) for x in v[1]], "position": [0.12, 0.0, 0.05, *turn]},
+    ]  # fmt: skip
+    contact = {
+        "stiffness": 10.0 ** draw(st.integers(1, 3)), "damping": float(draw(st.sampled_from([0, 1]))),
+        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
+    }  # fmt: skip
+    walls = [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]},
+             {"name": "side", "kind": "half_space", "point": [0.2, 0, 0], "normal": [-1, 0, 0]}]  # fmt: skip
+    values = {"name": "small_scene_in_space", "dimensions": 3, "rate": 1000.0, "duration": steps / 1000.0,
+              "bodies": bodies, "walls": walls, "gravity": draw(st.sampled_from([None, [0.0, 0.0, -10.0]])),
+              "contact": contact}  # fmt: skip
+    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))
