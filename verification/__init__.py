@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from verification.cost import work_precision as work_precision
+    from verification.cost.measure import work_precision as work_precision
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
@@ -18,7 +18,7 @@ _HOME = {
     "check_passivity": "verification.laws",
     "bulk_impacts": "verification.laws",
     "judge_hard_cases": "verification.hard_cases",
-    "work_precision": "verification.cost",
+    "work_precision": "verification.cost.measure",
 }
 
 __all__ = sorted(_HOME)

@@ -12,7 +12,7 @@ from verification.finding import Failure
 
 def compute(progress: Callable[[int, int], None], failures: list[Failure] | None = None) -> Numbers:
     """The table behind the work-precision figure: a row per method and problem."""
-    from verification.cost import work_precision
+    from verification.cost.measure import work_precision
 
     rows = tuple(_row(found) for found in work_precision(progress=progress, failures=failures))
     return Numbers(

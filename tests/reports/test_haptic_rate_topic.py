@@ -13,14 +13,13 @@ from reports.evidence.haptic_rate import topic_of
 from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
 from reports.pages.records import SceneEffect
 from verification.complementarity.step_cost import IAPB, KERNEL, CostRow
-from verification.cost.against_mujoco import StepRace
+from verification.cost.against_mujoco import PartTime, StepRace
 from verification.cost.anytime import BudgetRow
 from verification.cost.haptic_rate import FACTORED, PRINTED, RateTrial
 from verification.cost.kernels import KernelTime, quartiles
 from verification.cost.many_bodies import StepCost
 from verification.cost.scaling import Timing
 from verification.cost.start_up import StartUp
-from verification.cost.step_profile import PartTime
 from verification.cost.study import HapticStudy
 from verification.cost.trajectories import TrajectoryRun
 from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED

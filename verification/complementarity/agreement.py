@@ -14,16 +14,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from iapb import resolve_impact
+from reference.complementarity.adhesion import adhesion
+from reference.complementarity.laws import LAWS as laws
+from reference.complementarity.laws import Outcome
+from reference.complementarity.problem import ImpactProblem
 from verification.complementarity.cases import ImpactCase
 from verification.finding import Failure, attempt
-
-if TYPE_CHECKING:
-    from reference.complementarity.laws import Outcome
-    from reference.complementarity.problem import ImpactProblem
 
 # Two motions are the same below this distance (kinetic metric, of |v⁻|): what C05 asks for. Active-set solutions of
 # well-conditioned cases end near 1e-15; true disagreement starts near 1e-4 in all families.
@@ -86,8 +86,6 @@ class Comparison:
 
 def iapb(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
     """v⁺ and p of the engine."""
-    from iapb import resolve_impact
-
     impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     return impact.velocity, impact.impulses
 
@@ -100,10 +98,6 @@ def compare_case(case: ImpactCase, law: str = "newton_lcp", resolver: Resolver =
     SolverError
         Where the law's own solver leaves a residual: then there is nothing to compare with.
     """
-    from reference.complementarity.adhesion import adhesion
-    from reference.complementarity.laws import LAWS as laws
-    from reference.complementarity.problem import ImpactProblem
-
     problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     v, p = resolver(case)
     outcome: Outcome = laws[law].apply(problem)

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from iapb.errors import SolverError
-
-if TYPE_CHECKING:
-    from iapb.scene import Scene
-    from reference.scene_events import SceneTruth
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.simulation import simulate
+from reference.scene_events import SceneTruth, scene_truth
+from reference.time_stepping import RigidConstraints
+from reference.worlds import find_world
+from verification.complementarity.truth_scenes import TRUTH_SCENES
 
 COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
 _LEVELS = 4.0
@@ -130,9 +132,6 @@ def convergence(
 
 def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> ConvergenceRow:
     """Measure one case; `law` replaces the rigid world's."""
-    from reference.scene_events import scene_truth
-    from reference.time_stepping import RigidConstraints
-
     scene = scene_of(case.scene)
     truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints(scheme=scheme)
     levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
@@ -158,17 +157,11 @@ def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float)
 
 def scene_of(name: str) -> Scene:
     """A scene of `truth_scenes`, or one of the project's."""
-    from iapb.scene import find_scene, load_scene, scene_from_text
-    from verification.complementarity.truth_scenes import TRUTH_SCENES
-
     return scene_from_text(TRUTH_SCENES[name]) if name in TRUTH_SCENES else load_scene(find_scene(name))
 
 
 def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float) -> tuple[float, float]:
     """Errors of positions (sup) and velocities (L¹), both divided by the step."""
-    from iapb.simulation import simulate
-    from reference.worlds import find_world
-
     steps = int(np.floor(case.duration * rate))
     stepped = scene.with_values({"rate": rate, "duration": case.duration})
     coupling = find_world("ideal").coupling_in(stepped) if case.coupled else None

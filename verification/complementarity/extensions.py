@@ -11,16 +11,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impact
+from iapb.contact.impact_laws import FrictionalImpact, resolve_frictional_impact
+from iapb.errors import SolverError
+from reference.complementarity.laws import (
+    LAWS,
+    coulomb_ccp,
+    coulomb_ncp,
+    newton_equality,
+    newton_lcp,
+    poisson,
+)
+from reference.complementarity.problem import ImpactProblem
 from verification.complementarity.cases import random_mass_matrix
 from verification.finding import Failure, attempt
-
-if TYPE_CHECKING:
-    from iapb.contact.impact_laws import FrictionalImpact
 
 Floats = NDArray[np.float64]
 
@@ -117,8 +126,6 @@ def compare_friction(
 
 
 def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
-    from iapb.contact.impact_laws import resolve_frictional_impact
-
     pushing = same = reduced = unsolved = 0
     gains: dict[str, list[float]] = {"ours": [], "ncp": [], "ccp": []}
     distances = []
@@ -148,18 +155,12 @@ def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
 
 def _pushes(impact: _Impact, e: float, ours: FrictionalImpact) -> bool:
     """Every contact pushes, with friction and without it, and friction was not reduced."""
-    from iapb import resolve_impact
-
     without = resolve_impact(impact.mass, impact.rows, impact.velocity, e).impulses
     return bool(ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0)
 
 
 def _counterparts(impact: _Impact, e: float, mu: float) -> tuple[Floats | None, Floats | None]:
     """v⁺ of the NCP and of the CCP; None where NSGS does not solve it."""
-    from iapb.errors import SolverError
-    from reference.complementarity.laws import coulomb_ccp, coulomb_ncp
-    from reference.complementarity.problem import ImpactProblem
-
     blocks = np.concatenate([impact.rows[:, None, :], impact.tangents], axis=1)
     rows, size = blocks.reshape(-1, blocks.shape[2]), blocks.shape[1]
     problem = ImpactProblem.from_impact(impact.mass, rows, impact.velocity, e, mu, contact_size=size)
@@ -182,10 +183,6 @@ def compare_unequal(
 
 
 def _unequal_cell(signs: str, count: int, seed: int) -> UnequalCell:
-    from iapb import resolve_impact
-    from reference.complementarity.laws import newton_equality, newton_lcp, poisson
-    from reference.complementarity.problem import ImpactProblem
-
     rng = np.random.default_rng([seed, len(signs)])
     distances, gains = [], np.zeros((count, 3))
     for k in range(count):
@@ -202,10 +199,6 @@ def _unequal_cell(signs: str, count: int, seed: int) -> UnequalCell:
 
 def struck_bar() -> dict[str, float]:
     """The bar of docs/theory.md, struck at 0.5 and 0.4 with e = (1, 0): kinetic energies [J] by law."""
-    from iapb import resolve_impact
-    from reference.complementarity.laws import LAWS
-    from reference.complementarity.problem import ImpactProblem
-
     mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
     velocity, e = np.array([-1.0, 0.0]), (1.0, 0.0)
     problem = ImpactProblem.from_impact(mass, rows, velocity, e)

@@ -7,7 +7,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impact
+from iapb.compiled import block
+from iapb.contact.kernels.impact import make_impact_work
+from iapb.errors import MissingDependencyError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solvers import solve
 from verification.complementarity.cases import ImpactCase
+from verification.cost.loops import repeat_impact
 
 Floats = NDArray[np.float64]
 Call = Callable[[], Floats]
@@ -15,8 +22,6 @@ Call = Callable[[], Floats]
 
 def engine_call(case: ImpactCase, method: str) -> Call:
     """`resolve_impact` by a method, checks and all."""
-    from iapb import resolve_impact
-
     return lambda: resolve_impact(
         case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, method=method
     ).velocity
@@ -26,9 +31,6 @@ class KernelCall:
     """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
 
     def __init__(self, case: ImpactCase) -> None:
-        from iapb.compiled import block
-        from iapb.contact.kernels.impact import make_impact_work
-
         self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
         self.columns, self.restitution = np.ascontiguousarray(case.contact_jacobian.T), case.restitution
         d, c = len(self.v), case.contacts
@@ -37,8 +39,6 @@ class KernelCall:
 
     def repeated(self, times: int) -> None:
         """Resolve the impact `times` times."""
-        from verification.complementarity.kernels import repeat_impact
-
         repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.work, self.v_plus,
                       self.momentum, times)
 
@@ -52,8 +52,6 @@ class LemkeCall:
     """Lemke's kernel on the same arrays."""
 
     def __init__(self, case: ImpactCase) -> None:
-        from iapb.errors import MissingDependencyError
-
         try:
             import quantecon  # noqa: F401
         except ImportError as error:
@@ -75,9 +73,6 @@ class LemkeCall:
 
 def solver_call(case: ImpactCase, name: str) -> Call:
     """A solver by name, with the problem made anew at each call."""
-    from reference.complementarity.problem import ImpactProblem
-    from reference.complementarity.solvers import solve
-
     def call() -> Floats:
         problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
         return solve(problem, name).velocity_plus

@@ -6,20 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from reference.complementarity.problem import ImpactProblem
+from reference.datasets import StoredProblem
 from verification.complementarity.cases import ImpactCase, random_cases
 from verification.complementarity.scene_cases import scene_impacts
 from verification.complementarity.step_cost import patch, pile
 from verification.finding import Failure, attempt
-
-if TYPE_CHECKING:
-    from reference.complementarity.problem import ImpactProblem
-    from reference.datasets import StoredProblem
+from verification.hard_cases import HARD_CASES, HardCase
 
 Floats = NDArray[np.float64]
 Maker = Callable[[str], "ImpactProblem"]  # from its name
@@ -38,8 +36,6 @@ _SEED = 9
 
 def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
     """All of them, frictionless ones first; `failures` receives those that cannot be made."""
-    from reference.datasets import StoredProblem
-
     makers: dict[str, Maker] = {f"hard case {name}": partial(_hard_case, name) for name in HARD}
     makers |= {f"impact of {name}": partial(_scene_impact, name) for name in SCENES}
     makers |= dict(_hyperstatic()) | dict(_with_friction())
@@ -48,9 +44,6 @@ def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, 
 
 
 def _hard_case(hard: str, name: str) -> ImpactProblem:
-    from reference.complementarity.problem import ImpactProblem
-    from verification.hard_cases import HARD_CASES, HardCase
-
     case = HARD_CASES[hard]()
     if not isinstance(case, HardCase):
         raise ArgumentError("HARD", hard, "the name of a hard impact")
@@ -75,8 +68,6 @@ def _hyperstatic() -> Iterator[tuple[str, Maker]]:
 
 
 def _posed(case: ImpactCase, name: str) -> ImpactProblem:
-    from reference.complementarity.problem import ImpactProblem
-
     return ImpactProblem.from_impact(
         case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, name=name
     )
@@ -92,8 +83,6 @@ def _with_friction() -> Iterator[tuple[str, Maker]]:
 
 
 def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
-    from reference.complementarity.problem import ImpactProblem
-
     case = patch(contacts, np.random.default_rng([_SEED, contacts, 3]))
     rows = _with_tangents(case.contact_jacobian)
     return ImpactProblem.from_impact(case.mass_matrix, rows, case.velocity, 0.0, mu, name=name)
@@ -110,8 +99,6 @@ def _with_tangents(normals: Floats) -> Floats:
 
 def _wedged_rod(mu: float, name: str) -> ImpactProblem:
     """A rod whose ends press on two facing walls as it turns: normals opposed, friction may hold it by itself."""
-    from reference.complementarity.problem import ImpactProblem
-
     points, normals = ((-0.6, -0.8), (0.6, 0.8)), ((1.0, 0.0), (-1.0, 0.0))
     rows = [_row(np.array(point), np.array(direction)) for point, (x, y) in zip(points, normals, strict=True)
             for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip

@@ -11,16 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.complementarity.benchmark import SolverRow, performance_profile, run_solvers
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Solution
+from reference.complementarity.solvers import solver_names
+from reference.datasets import DatasetError, StoredProblem, problem_files, read_problem
+from reference.one_thread import one_thread
 from verification.finding import Failure, attempt
-
-if TYPE_CHECKING:
-    from reference.complementarity.benchmark import SolverRow
-    from reference.datasets import StoredProblem
 
 Floats = NDArray[np.float64]
 
@@ -99,8 +100,6 @@ def study_problems(
     ArgumentError
         If the folder does not exist.
     """
-    from reference.datasets import DatasetError, problem_files, read_problem
-
     read, unread = list["StoredProblem"](), list[UnreadFile]()
     files = problem_files(folder)
     for done, path in enumerate(files):
@@ -118,10 +117,6 @@ def study_read(
     longest: float = np.inf, progress: Progress | None = None, failures: list[Failure] | None = None,
 ) -> ProblemStudy:
     """Solve every problem of a collection called `name` by every solver that takes its kind."""
-    from reference.complementarity.benchmark import run_solvers
-    from reference.complementarity.solvers import solver_names
-    from reference.one_thread import one_thread
-
     pairs, say = sum(len(solver_names(stored.problem)) for stored in problems), progress or (lambda *_: None)
     stage, begun = f"problems of {name}, by every solver", itertools.count()
     say(stage, 0, pairs)
@@ -147,9 +142,6 @@ def study_read(
 
 def _warm(problems: Sequence[StoredProblem]) -> None:
     """Import and compile every solver on a problem of one contact, so that none of that counts as its time."""
-    from reference.complementarity.benchmark import run_solvers
-    from reference.complementarity.problem import ImpactProblem
-
     for friction in {stored.problem.friction is not None for stored in problems}:
         size = 3 if friction else 1
         w, b = np.eye(size), -np.eye(size)[0]
@@ -173,16 +165,12 @@ def _line(stored: StoredProblem, rows: list[SolverRow]) -> ProblemLine:
 
 def _stored_residual(stored: StoredProblem) -> float:
     """Worst recomputed residual of the multipliers that the file itself carries."""
-    from reference.complementarity.solution import Solution
-
     if stored.stored_impulse is None or stored.problem.size == 0:
         return np.nan
     return Solution(stored.problem, stored.stored_impulse, "stored in the file").residuals.worst
 
 
 def _profiles(kinds: dict[str, list[SolverRow]]) -> tuple[tuple[str, str, Floats], ...]:
-    from reference.complementarity.benchmark import performance_profile
-
     found = []
     for kind, rows in kinds.items():
         found += [(kind, solver, share) for solver, share in performance_profile(rows, FACTORS).items()]

@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impact
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from reference.worlds import run_world
 from verification.complementarity.cases import ImpactCase
 
 Floats = NDArray[np.float64]
@@ -91,9 +93,6 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
 
 def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
     """Simulate a scene that comes with the project and return its impacts."""
-    from iapb.scene import find_scene, load_scene
-    from reference.worlds import run_world
-
     scene = load_scene(find_scene(name))
     if restitution is not None:
         scene = scene.with_values({"contact.restitution": restitution})
@@ -129,8 +128,6 @@ def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> fr
 
 
 def _check(case: ImpactCase, run: Run, blow: _GroupImpact) -> None:
-    from iapb import resolve_impact
-
     impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     scale = float(np.abs(case.velocity).max()) or 1.0
     if np.abs(impact.velocity - blow.v_plus).max() > _REBUILT * scale:

@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.errors import MissingDependencyError
+from reference.one_thread import one_thread
 from verification.complementarity.cases import ImpactCase
 from verification.complementarity.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
 from verification.finding import Failure, attempt, failure_of
@@ -115,8 +117,6 @@ def impact_cost(
     failures: list[Failure] | None = None,
 ) -> tuple[CostRow, ...]:
     """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
-    from reference.one_thread import one_thread
-
     rows: list[CostRow] = []
     too_slow: dict[tuple[str, str], float] = {}
     for done, count in enumerate(contacts):
@@ -151,8 +151,6 @@ def _warm(
     case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float], failures: list[Failure] | None
 ) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
     """The calls that work, their v⁺, and for the others why not."""
-    from iapb.errors import MissingDependencyError
-
     calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case, "factored"),
                               PRINTED: engine_call(case, "gram_pinv")}  # fmt: skip
     answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()

@@ -10,7 +10,7 @@ from pathlib import Path
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, scene_names
 from verification.complementarity.agreement import Comparison, compare_cases
 from verification.complementarity.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
 from verification.complementarity.cases import random_cases
@@ -158,8 +158,6 @@ def compare_scenes(
     scenes: Iterable[str] | None = None, progress: Progress | None = None, failures: list[Failure] | None = None
 ) -> tuple[tuple[MapCell, ...], int]:
     """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
-    from iapb.scene import scene_names
-
     names, left_out = list(scene_names() if scenes is None else scenes), 0
     found: list[Comparison] = []
     for done, name in enumerate(names):

@@ -13,6 +13,10 @@ from functools import partial
 
 import numpy as np
 
+from iapb.scene import find_scene, load_scene
+from iapb.simulation import Simulation
+from reference.one_thread import one_thread
+from reference.worlds import find_world, run_world
 from verification.finding import Failure, attempt
 
 SCENES = ("peg_corner", "peg_hole")
@@ -54,8 +58,6 @@ def world_cost(
     progress: Callable[[str, int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> tuple[StepCostRow, ...]:
     """Time every world on every scene; the first run of each, which compiles, is not counted."""
-    from reference.one_thread import one_thread
-
     rows: list[StepCostRow] = []
     for done, name in enumerate(scenes):
         samples: dict[str, list[float]] = {way: [] for way in ways}
@@ -76,10 +78,6 @@ def world_cost(
 
 
 def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:
-    from iapb.scene import find_scene, load_scene
-    from iapb.simulation import Simulation
-    from reference.worlds import find_world, run_world
-
     scene, world = load_scene(find_scene(scene_name)), way.split(",")[0].split(" ")[0]
     if way != STEPPED:
         return float(np.sum(run_world(scene, world, steps=steps).chunk_seconds)) / steps

@@ -3,6 +3,7 @@
 Ours is `Simulation.advance_chunk`, as `simulate` runs it, record included; MuJoCo's is `mj_step(model, data, nstep)`,
 which records nothing. Both are called for the same number of steps in turn, by the thread's own clock; each round
 gives one ratio. Every solver of MuJoCo is tried, and the fastest one of a form is what counts.
+Where the time of our step goes: every part of it by itself, in turn.
 """
 
 from __future__ import annotations
@@ -15,7 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from iapb.errors import MissingDependencyError
+from iapb.recording import make_record
+from iapb.scene import scene_from_text
+from iapb.simulation import Simulation
 from verification.cost.kernels import quartiles
+from verification.cost.loops import PARTS, repeat_part
 from verification.cost.measure import Quartiles
 from verification.cost.resting_scenes import RestingScene, resting_scenes
 from verification.finding import Failure, attempt
@@ -105,9 +111,6 @@ class OwnLoop:
     """The scene in our loop, made anew for each sample and settled before the clock runs."""
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
-        from iapb.scene import scene_from_text
-        from iapb.simulation import Simulation
-
         self.simulation = Simulation(scene_from_text(scene.text, scene.file))
         self.settling, self.steps, self.times = scene.settling, steps, list[float]()
         self.contacts = self.moved = 0.0
@@ -126,8 +129,6 @@ class OwnLoop:
         return seconds
 
     def record(self, steps: int) -> Any:
-        from iapb.recording import make_record
-
         system, port = self.simulation.system, self.simulation.port
         sizes = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
         return make_record(steps, sizes, system.capacity, len(system.mechanism.tree_dofs))
@@ -160,10 +161,36 @@ class _Theirs:
 
 
 def _mujoco() -> Any:
-    from iapb.errors import MissingDependencyError
-
     try:
         import mujoco
     except ImportError as error:
         raise MissingDependencyError("mujoco", "The comparison with MuJoCo", "pip install 'iapb[peers]'") from error
     return mujoco
+
+
+@dataclass(frozen=True)
+class PartTime:
+    """Time of one part of a step [s]; part "whole step" is the loop itself."""
+
+    scene: str
+    part: str
+    seconds: Quartiles
+
+
+def profile_step(scene: RestingScene, rounds: int = ROUNDS, steps: int = STEPS) -> tuple[PartTime, ...]:
+    """Time of each part, and of the whole step, on a scene at rest."""
+    loop = OwnLoop(scene, steps)
+    times: dict[str, list[float]] = {"whole step": [], **{part: [] for part in PARTS}}
+    for turn in range(rounds + 1):
+        seconds = loop.sample()
+        found = {"whole step": seconds / steps}
+        simulation = loop.simulation
+        for number, part in enumerate(PARTS):
+            record = loop.record(steps)
+            started = time.thread_time()
+            repeat_part(simulation.world, simulation.state, simulation.port, record, number, steps)
+            found[part] = (time.thread_time() - started) / steps
+        if turn:
+            for part, value in found.items():
+                times[part].append(value)
+    return tuple(PartTime(scene.name, part, quartiles(samples)) for part, samples in times.items())

@@ -8,6 +8,8 @@ from functools import partial
 
 import numpy as np
 
+from iapb import resolve_impact
+from reference.exact import relative_energy_gain
 from verification.cost.kernels import random_impact
 from verification.finding import Failure, attempt
 
@@ -50,9 +52,6 @@ def anytime(
 
 
 def _row(d: int, c: int, rank: int, budget: int, cases: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> BudgetRow:
-    from iapb import resolve_impact
-    from reference.exact import relative_energy_gain
-
     residuals, gains, lost = [], [], []
     for mass, rows, v in cases:
         v_plus = resolve_impact(mass, rows, v, 0.0, budget=budget).velocity

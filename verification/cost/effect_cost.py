@@ -16,8 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import decide_effects
+from iapb.compiled import block
+from iapb.contact.laws import Penalty
 from iapb.errors import IapbError
+from iapb.haptics.coupling import NoCoupling
+from iapb.recorder import Recorder
 from iapb.scene import Scene
+from iapb.simulation import Simulation
 from reference.worlds import World, find_world
 from verification.finding import Failure, attempt
 
@@ -92,8 +98,6 @@ def measure_effects(
 
     `failures` receives the effects that raise anything but an `IapbError`; without it that passes through.
     """
-    from iapb import decide_effects
-
     chosen = find_world(world)
     on = [effect.name for effect in decide_effects(scene, chosen.law.name, chosen.coupling_in(scene).name, "full")
           if effect.active and effect.name in LEFT_OUT]  # fmt: skip
@@ -134,10 +138,6 @@ class _Loop:
     """A scene in the compiled loop, started anew for every sample; keeps the states of the last one."""
 
     def __init__(self, scene: Scene, world: World, variant: Variant) -> None:
-        from iapb.contact.laws import Penalty
-        from iapb.haptics.coupling import NoCoupling
-        from iapb.simulation import Simulation
-
         changed = scene.with_values(_values(scene, variant)) if variant.values else scene
         law = world.law if variant.impulses else Penalty()
         coupling = world.coupling_in(changed) if variant.coupled else NoCoupling()
@@ -151,8 +151,6 @@ class _Loop:
 
     def sample(self) -> float:
         """Seconds per step of one whole run, its record included."""
-        from iapb.recorder import Recorder
-
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.steps_done = system.make_state(), 0
         simulation.port = system.make_port(simulation.coupling)
@@ -211,8 +209,6 @@ def _values(scene: Scene, variant: Variant) -> dict[str, Any]:
 
 def _switched_off(world: Any, names: tuple[str, ...]) -> Any:
     """The same world with switches of the compiled step off."""
-    from iapb.compiled import block
-
     switches = world.switches._content._replace(**dict.fromkeys(names, False))
     return block(world._content._replace(switches=switches))
 

@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.kernels.cholesky import cholesky
+from iapb.contact.kernels.impact import make_impact_work, rank_tolerance
 from reference.one_thread import one_thread
+from verification.cost.loops import repeat_factored
 from verification.cost.measure import Quartiles
 from verification.finding import Failure, attempt
 
@@ -81,10 +84,6 @@ def printed_impact(mass: Floats, rows: Floats, v: Floats) -> Floats:
 
 def factored_loop(mass: Floats, rows: Floats, v: Floats, calls: int) -> Callable[[], None]:
     """A function that resolves the impact `calls` times in compiled code."""
-    from iapb.contact.kernels.cholesky import cholesky
-    from iapb.contact.kernels.impact import make_impact_work, rank_tolerance
-    from verification.cost.kernel_loop import repeat_factored
-
     (c, d), lower = rows.shape, np.zeros_like(mass)
     cholesky(mass, lower)
     work, v_plus, momentum = make_impact_work(d, c), np.zeros(d), np.zeros(d)

@@ -10,14 +10,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from iapb.contact.kernels.broadphase import near_pairs
+from iapb.recording import make_record
+from iapb.scene import scene_from_text
+from iapb.simulation import Simulation
 from verification.finding import Failure, attempt
-
-if TYPE_CHECKING:
-    from iapb.simulation import Simulation
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
@@ -71,10 +71,6 @@ def growth_exponent(costs: Sequence[StepCost], quantity: str = "seconds", least_
 
 def _cost(n: int) -> StepCost:
     """Do the same steps again and again: the quickest time of each chunk is the one that nothing else disturbed."""
-    from iapb.recording import make_record
-    from iapb.scene import scene_from_text
-    from iapb.simulation import Simulation
-
     simulation = Simulation(scene_from_text(field_of_discs(n)))
     sizes = (simulation.system.mechanism.nq, simulation.system.mechanism.nv, 0, 0)
     simulation.advance_chunk(make_record(1, sizes, simulation.system.capacity, n), 1)  # compiles
@@ -96,8 +92,6 @@ def _cost(n: int) -> StepCost:
 
 def _tested(simulation: Simulation) -> int:
     """How many pairs the narrow phase gets where the bodies are now."""
-    from iapb.contact.kernels.broadphase import near_pairs
-
     world, body = simulation.world, simulation.state.body
     if not world.switches.broad_phase:
         return len(world.pairs)

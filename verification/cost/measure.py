@@ -10,11 +10,57 @@ from functools import partial
 
 import numpy as np
 
-from iapb.errors import IapbError
+from iapb import resolve_impact
+from iapb.errors import IapbError, SolverError
+from reference.complementarity import ImpactProblem, solve
+from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
-from verification.cost.methods import METHODS
 from verification.cost.problems import Floats, TimedProblem, timed_problems
 from verification.finding import Failure, attempt
+
+TimedMethod = Callable[[TimedProblem], Floats]
+
+
+def _engine(method: str, budget: int | None = None) -> TimedMethod:
+    def call(problem: TimedProblem) -> Floats:
+        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
+        return resolve_impact(*given, method=method, budget=budget).velocity
+
+    return call
+
+
+def _solver(name: str) -> TimedMethod:
+    """The impact as a complementarity problem in p ≥ 0, made and solved anew at each call."""
+
+    def call(problem: TimedProblem) -> Floats:
+        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
+        solution = solve(ImpactProblem.from_impact(*given), name)
+        if solution.impulse is None:
+            raise SolverError(f"{name} gave no impulse: {solution.note}")
+        return solution.velocity_plus
+
+    return call
+
+
+METHODS: dict[str, TimedMethod] = {
+    "factored": _engine("factored"),
+    "gram_pinv": _engine("gram_pinv"),
+    "gram_cholesky": _engine("gram_cholesky"),
+    "damped": _engine("damped"),
+    "svd": _engine("svd"),
+    # complementarity: pivoting, sweeps, active sets, proximal, and an interior point modelled by cvxpy
+    "lemke LCP": _solver("lemke"),
+    "gauss_seidel LCP": _solver("gauss_seidel"),
+    "daqp QP": _solver("daqp"),
+    "quadprog QP": _solver("quadprog"),
+    "proxqp QP": _solver("proxqp"),
+    "cvxpy QP": _solver("cvxpy_clarabel"),
+    # the anytime form: what a budget of rows buys
+    "factored, 1 row": _engine("factored", 1),
+    "factored, 2 rows": _engine("factored", 2),
+    "factored, 4 rows": _engine("factored", 4),
+}
+
 
 ROUNDS = 30
 _ENOUGH = 0.5  # seconds spent on one method of one problem; slow methods get fewer rounds, never less than three
@@ -160,8 +206,6 @@ def _record(problem: TimedProblem, name: str, answer: Floats | str, times: list[
 
 def _quality(problem: TimedProblem, v_plus: Floats) -> tuple[float, float, float]:
     """Forward error, energy gain and restitution residual."""
-    from reference.exact import relative_energy_gain
-
     lower = np.linalg.cholesky(problem.mass_matrix)
     speed = float(np.linalg.norm(lower.T @ problem.velocity))
     error = np.array([float(Fraction(x) - t) for x, t in zip(v_plus.tolist(), problem.truth, strict=True)])

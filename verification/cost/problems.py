@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.exact import exact_impact
+
 Floats = NDArray[np.floating[Any]]
 
 
@@ -53,8 +55,6 @@ class TimedProblem:
     @cached_property
     def truth(self) -> tuple[Fraction, ...]:
         """Exact v⁺ of the numbers given."""
-        from reference.exact import exact_impact
-
         return exact_impact(self.mass_matrix, self.contact_jacobian, self.velocity, self.restitution).velocity
 
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from iapb.mechanics.mechanism import Mechanism
+
 ARM_FILE = Path(__file__).parents[2] / "scenes" / "robots" / "seven_axis_arm.urdf"
 ARM_POSE = (0.2, 0.3, 0.0, 1.9, 0.0, 0.9416, 0.3)  # [rad]: the two fingertips point down
 FINGER_RADIUS = 0.015  # [m], as in the file
@@ -146,8 +148,6 @@ hand: {{body: arm_link_7, point: {list(TOOL_CENTER)}, force: [{', '.join(map(str
 def _block_below_the_fingers() -> tuple[tuple[float, ...], tuple[float, float, float]]:
     """Centre and size of a block whose upper face the lower fingertip just touches."""
     import numpy as np
-
-    from iapb.mechanics.mechanism import Mechanism
 
     arm = Mechanism.from_urdf(ARM_FILE)
     rotations, positions = arm.placements(np.array(ARM_POSE))

@@ -9,7 +9,7 @@ from typing import Any
 
 from iapb.errors import MissingDependencyError
 from verification.complementarity.step_cost import CostRow, impact_cost
-from verification.cost.against_mujoco import StepRace, race_mujoco
+from verification.cost.against_mujoco import PartTime, StepRace, profile_step, race_mujoco
 from verification.cost.anytime import BudgetRow, anytime
 from verification.cost.haptic_rate import RateTrial, haptic_rate
 from verification.cost.kernels import KernelTime, kernel_times
@@ -17,9 +17,11 @@ from verification.cost.many_bodies import StepCost, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.scaling import Timing, scaling
 from verification.cost.start_up import StartUp, start_up
-from verification.cost.step_profile import PartTime, profile_step
 from verification.cost.trajectories import TrajectoryRun, trajectory_precision
 from verification.finding import Failure, attempt
+from verification.mechanics.own_robots import SHIPPED
+from verification.mechanics.robot_timing import time_robots
+from verification.mechanics.robots import robot_files
 
 SIZES = ((12, 60), (12, 300))  # (d, c) at which the printed formula is to be ten and a hundred times slower
 SOLVER_CONTACTS = {"quick": (1, 4, 16, 64), "full": (1, 4, 16, 64, 128, 300)}
@@ -88,10 +90,6 @@ def _races(
 
 def _robots(depth: str) -> tuple[tuple[dict[str, Any], ...], str]:
     """The robots of others where they are, else the project's own."""
-    from verification.mechanics.own_robots import SHIPPED
-    from verification.mechanics.robot_timing import time_robots
-    from verification.mechanics.robots import robot_files
-
     files, _ = robot_files()
     found = time_robots(None if files else SHIPPED / "robots", depth)
     return tuple(found.records()), "robots of others" if files else "the project's own robots"

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.scenes.scene_measures import EnergyBook, energy_book, share
@@ -58,8 +59,6 @@ def open_books(
 
     simulate : returns the run of a scene, in whatever world
     """
-    from iapb.mechanics.integrators import INTEGRATORS
-
     books: list[EnergyBook] = []
     for factor in refinements:
         run = simulate(scene.with_values({"rate": scene.rate * factor}))

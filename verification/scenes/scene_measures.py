@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from iapb.scene import Scene, scene_from_text
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from reference.worlds import run_world
 from verification.scenes.contact_energy import contact_energy
 
 Floats = NDArray[np.float64]
@@ -185,7 +186,4 @@ def ending(run: Run, turned: float) -> str:
 
 def study_scenes(names: Sequence[str], worlds: Sequence[str] = ("IAPB",)) -> tuple[SceneMeasure, ...]:
     """Return the measures of scenes that come with the project in the paper's worlds."""
-    from iapb.scene import find_scene, load_scene
-    from reference.worlds import run_world
-
     return tuple(measure(run_world(load_scene(find_scene(name)), world)) for name in names for world in worlds)

@@ -25,6 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.haptics.device import DeviceReading
 from iapb.scene import Scene, scene_from_text
+from iapb.simulation import Simulation
+from reference.worlds import find_world
 
 Floats = NDArray[np.float64]
 
@@ -109,9 +111,6 @@ def actuator_forces(loop: DeviceLoop, positions: Floats) -> Floats:
 
     Positive into the wall. The tool starts at its clearance before the wall, at rest; so should the device.
     """
-    from iapb.simulation import Simulation
-    from reference.worlds import find_world
-
     scene, world = loop.scene(), find_world(loop.world)
     device = MovedDevice(positions - RADIUS, loop)
     simulation = Simulation(scene, world.law, world.coupling_in(scene), device=device)

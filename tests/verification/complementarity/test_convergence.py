@@ -11,9 +11,9 @@ import pytest
 from iapb.errors import SolverError
 from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
-from reference import scene_events
 from reference.scene_events import COMPUTATIONS, scene_truth
 from reference.time_stepping import RigidConstraints
+from verification.complementarity import convergence
 from verification.complementarity.convergence import CASES, WITHOUT_TRUTH, TruthCase, converge, scene_of
 from verification.complementarity.truth_scenes import TRUTH_SCENES
 
@@ -63,7 +63,7 @@ def test_a_truth_does_not_depend_on_rounding(case: TruthCase) -> None:
 def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     found = scene_truth(load_scene(find_scene("two_discs")), 0.2)
     vague = replace(found, bound=found.bound._replace(position=1e-4))
-    monkeypatch.setattr(scene_events, "scene_truth", lambda *_: vague)
+    monkeypatch.setattr(convergence, "scene_truth", lambda *_: vague)
     with pytest.raises(SolverError, match="known to 1.0e-04"):
         converge(BY_SCENE["two_discs"])
 

@@ -9,8 +9,7 @@ import pytest
 
 from reference.simulators import FixedScene, Trajectory
 from verification.cost import trajectories
-from verification.cost.trajectories import FAILED, OK, TIMED_OUT, _Judge, _over_steps
-from verification.cost.trajectory_scenes import bouncing_ball
+from verification.cost.trajectories import FAILED, OK, TIMED_OUT, _Judge, _over_steps, bouncing_ball
 
 SCENE = bouncing_ball()
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from verification.cost import METHODS, kernel_times, timed_problems, work_precision
+from verification.cost.kernels import kernel_times
+from verification.cost.measure import METHODS, work_precision
+from verification.cost.problems import timed_problems
 
 
 @pytest.mark.parametrize("problem", timed_problems(), ids=lambda problem: problem.label)
