@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.device import Device
+from iapb.haptics.device import Device, SimulatedDevice
 from iapb.scene import Scene
 from iapb.simulation import Simulation
+from iapb.system import System
 from reference.worlds import World, find_world
 from reports.by_name import function_named
 from reports.live.budget import calibrated
 from reports.live.deadline import Clock, percentiles
 from reports.live.loop import LiveRun, Loop
 
-_SIMULATED = "simulated"  # the word for the device of `iapb.scene_device.simulated_device`
+_SIMULATED = "simulated"  # the word for `simulated_device`
 
 
 def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -> Simulation:
@@ -51,9 +53,8 @@ def made_device(name: str, scene: Scene) -> Device | None:
     """
     if not name:
         return None
-    if name == _SIMULATED:
-        name = "iapb.scene_device:simulated_device"
-    make = function_named("--device", name, "module:factory, such as my_lab.omega:connect, or simulated")
+    make = simulated_device if name == _SIMULATED else function_named(
+        "--device", name, "module:factory, such as my_lab.omega:connect, or simulated")  # fmt: skip
     try:
         device: Device = make(scene)
     except IapbError:
@@ -77,6 +78,29 @@ class Pace:
     behind: float  # [s] that simulated time fell behind the clock
     collisions: int
     rows_left_out: int  # rows that still approached after impacts that had used up their budget
+
+
+def simulated_device(scene: Scene) -> SimulatedDevice:
+    """Return the Python twin of a scene's compiled device: its inertia, damping, delay, sensors and limits.
+
+    Raises
+    ------
+    ArgumentError
+        A scene without a hand, or a tool whose mass matrix is not constant: only the compiled device has such.
+    """
+    system = System(scene)
+    if system.tool_tree < 0:
+        raise ArgumentError("scene", scene.name, "a scene with a hand")
+    tool, state = system.device_mechanism(), system.make_state()
+    q, v = state.q[slice(*system.tool_coordinates)], state.v[slice(*system.tool_dofs)]
+    if not tool.has_constant_mass_matrix or len(q) != len(v):
+        raise ArgumentError("scene", scene.name, "a tool of constant inertia, with as many velocities as coordinates")
+    given = scene.device
+    settings: dict[str, Any] = {} if given is None else {
+        "damping": given.damping, "force_limit": given.force_limit, "delay": given.delay,
+        "resolution": given.position_resolution,
+    }  # fmt: skip
+    return SimulatedDevice(tool.mass_matrix(q), q, v, dt=system.dt, **settings)
 
 
 def pace(scene: Scene, rate: float, seconds: float, *, world: str = "IAPB", budgeted: bool = True,

@@ -10,9 +10,9 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import DeviceReading
 from iapb.recorder import Recorder
 from iapb.scene import find_scene, load_scene
-from iapb.scene_device import simulated_device
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
+from reports.live.measure import simulated_device
 
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
