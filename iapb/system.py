@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from iapb.compiled import Entry, block
 from iapb.contact.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.geometry import contact_capacity, make_contact_buffer
-from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import make_friction_work
 from iapb.contact.kernels.step import advance
@@ -21,6 +20,7 @@ from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
 from iapb.mechanics.integrators import INTEGRATORS
+from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, restitution_by_shape, shapes_of

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.compiled import block
-from iapb.contact.kernels.cholesky import cholesky
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.kernels import FOUR_CHANNEL, Port
 from iapb.haptics.waveforms import waveform_weights
+from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.scene import Scene
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.impact_problem import ImpactInput
-from iapb.contact.kernels.cholesky import to_whitened, whiten_columns
 from iapb.contact.kernels.impact import (
     ImpactWork,
     apply_change,
@@ -24,6 +23,7 @@ from iapb.contact.kernels.projector import unit_columns
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.dense import product, solve
 from iapb.errors import ArgumentError, SolverError
+from iapb.mechanics.kernels.cholesky import to_whitened, whiten_columns
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.kernels.cholesky import cholesky
 from iapb.errors import ArgumentError
+from iapb.mechanics.kernels.cholesky import cholesky
 
 Floats = NDArray[np.float64]
 Exponents = NDArray[np.int32]

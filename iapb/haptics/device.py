@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.contact.contacts import finite_vector
-from iapb.contact.kernels.cholesky import cholesky, solve_mass
 from iapb.errors import ArgumentError
+from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import re
 from html import escape
 
 from reports.figures.figure import Figure, Panel
+from reports.figures.legend import swatch
 from reports.figures.style import INK, MUTED, PAPER
-from reports.pages.legend import swatch
 
 _GAP, _LABEL, _LEGEND = 24.0, 26.0, 34.0  # points: between panels, above them, below them
 _SWATCH = (36.0, 14.0)

@@ -10,10 +10,10 @@ from markupsafe import Markup
 
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
+from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
-from reports.pages.legend import swatch
 from reports.pages.records import Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user

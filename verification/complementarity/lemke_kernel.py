@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from quantecon.optimize import lcp_lemke
 
-from iapb.contact.kernels.cholesky import cholesky
+from iapb.mechanics.kernels.cholesky import cholesky
 
 
 @njit(cache=True)

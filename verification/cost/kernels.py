@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.impact import make_impact_work, rank_tolerance
+from iapb.mechanics.kernels.cholesky import cholesky
 from reference.one_thread import one_thread
 from verification.cost.loops import repeat_factored
 from verification.cost.measure import Quartiles

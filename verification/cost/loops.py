@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.cholesky import cholesky
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.impact import factored_impact, rank_tolerance
 from iapb.contact.kernels.step import clear, find_contacts, locate, move
 from iapb.haptics.kernels import couple, drive_device
+from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.recording import write_step
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from verification.proofs.statement import Line, ProofRecord, Refutation, StepRecord
+if TYPE_CHECKING:
+    from verification.proofs.statement import Line, ProofRecord, Refutation, StepRecord
 
 
 def proof_text(record: ProofRecord) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from verification.proofs.exact import Instance
 from verification.proofs.facts import Equation, Fact
+from verification.proofs.mathml import proof_html
+from verification.proofs.printing import proof_text
 from verification.proofs.steps import Exact, Step
 
 
@@ -123,12 +125,8 @@ class ProofRecord:
 
     def as_text(self) -> str:
         """The whole proof in plain text, to be followed without the code."""
-        from verification.proofs.printing import proof_text
-
         return proof_text(self)
 
     def as_mathml(self) -> str:
         """The whole proof as an HTML fragment with MathML, for the report."""
-        from verification.proofs.mathml import proof_html
-
         return proof_html(self)

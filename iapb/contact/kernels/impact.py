@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
 from iapb.contact.kernels.refine import refine_change
 from iapb.double_double import quadratic_forms
+from iapb.mechanics.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 
 UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. Restitution is

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.cholesky import from_whitened
 from iapb.double_double import add_product
+from iapb.mechanics.kernels.cholesky import from_whitened
 
 # The factor's error |E| below this share is left to the energy clamp: it moves energy and restitution by as little.
 _FELT = 1e-12

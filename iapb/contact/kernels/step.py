@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
-from iapb.contact.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.mechanics.kernels import bias, forward_kinematics, gravity, integrate, mass_matrix
+from iapb.mechanics.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Faster than this [m/s, rad/s] no product of masses, stiffnesses, displacements and speeds is sure to be finite: the

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.cholesky import cholesky, solve_mass
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import LARGEST_SPEED
 from iapb.haptics.kernels.port import FOUR_CHANNEL, NO_COUPLING, UNILATERAL
 from iapb.haptics.kernels.pulse import observe_work, shape_impulse
 from iapb.mechanics.kernels import bias, forward_kinematics, integrate, mass_matrix
+from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.run import FREE
 
 

@@ -1,7 +1,7 @@
 """Energies and momentum as sums over bodies: no cancellation between large entries of M."""
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.cholesky import cholesky, solve_mass
+from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference
 from iapb.mechanics.kernels.dynamics import body_velocities, turned_inertia
 from iapb.mechanics.kernels.kinematics import forward_kinematics
