@@ -15,7 +15,8 @@ from iapb.errors import ArgumentError
 from reference.datasets import problem_files
 from reference.fclib import write_fclib
 from reports.commands.progress import stage_progress
-from verification.complementarity import sentences
+from verification.complementarity.findings import parts_of
+from verification.complementarity.findings import problems as problem_parts
 from verification.complementarity.own_problems import own_problems
 from verification.complementarity.problem_study import FACTORS, ProblemStudy, study_problems
 from verification.complementarity.step_cost import CostRow
@@ -48,15 +49,15 @@ def compare(
     with stage_progress() as progress:
         if only_problems:
             studies = [study_problems(folder, progress=progress) for folder in problems or ()]
-            found = [text for study in studies for text in sentences.problems(study)]
+            found = [part for study in studies for part in problem_parts(study)]
             tables = [table for study in studies for table in _problem_tables(study)]
         else:
             study = study_all("full" if full else "quick", problems or (), progress=progress)
-            found, tables = list(sentences.sentences(study)), _tables(study)
+            found, tables = list(parts_of(study)), _tables(study)
     for table in tables:
         console.print(table)
-    for text in found:
-        console.print(f"• {text}", highlight=False)
+    for part in found:
+        console.print(f"• {part.sentence}", highlight=False)
 
 
 def _require_problems(folder: Path) -> None:

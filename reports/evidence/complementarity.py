@@ -29,7 +29,7 @@ FOLDER_NAME = "problems of others"
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
     """Compare, judge each sentence from the records, and keep what is behind it."""
-    from verification.complementarity.judgement import judge
+    from verification.complementarity.findings import parts_of
     from verification.complementarity.study import compare
 
     stages: list[str] = []
@@ -41,7 +41,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
     failures = list(study.failures)
-    findings = tuple(Finding(judged.sentence, judged.verdict, judged.timed) for judged in judge(study, failures))
+    findings = tuple(Finding(part.sentence, part.verdict, part.timed) for part in parts_of(study, failures))
     made = tables.all_tables(study, failures) | {"worlds": tables.worlds(runner, failures=failures)}
     progress(STAGES, STAGES)
     return with_failures(Topic(ID, TITLE, LEAD, findings, made, verdict(study, findings)), failures)

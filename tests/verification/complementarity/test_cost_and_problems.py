@@ -10,7 +10,8 @@ import pytest
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.fclib import write_fclib
-from verification.complementarity import sentences, step_cost
+from verification.complementarity import step_cost
+from verification.complementarity.findings import problems
 from verification.complementarity.problem_study import FACTORS, study_problems
 from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
 
@@ -52,7 +53,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     assert [file.file for file in study.unread] == ["damaged.lcp"]
     assert study.lines[1].asymmetry > 0.1 and dict(study.lines[1].verdicts)["daqp"] == "refused"
     assert dict(study.lines[1].verdicts)["lemke"] == "solved"
-    text = " ".join(sentences.problems(study))
+    text = " ".join(part.sentence for part in problems(study))
     assert "1 files not" in text and "skew.lcp" in text
     assert all(share.shape == FACTORS.shape and (np.diff(share) >= 0.0).all() for _, _, share in study.profile)
     with pytest.raises(ArgumentError, match="folder"):

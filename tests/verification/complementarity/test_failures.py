@@ -14,13 +14,13 @@ from verification.complementarity import (
     agreement,
     agreement_map,
     extensions,
-    judgement,
+    findings,
     own_problems,
     step_cost,
     study,
     world_cost,
 )
-from verification.finding import Failure
+from verification.finding import NOT_TESTABLE, Failure
 
 
 def breaks(original: Any, here: Any) -> Any:
@@ -88,8 +88,9 @@ def test_only_the_rows_with_a_fault_are_lost(found: study.ComparisonStudy) -> No
 
 def test_a_sentence_about_nothing_fails_alone(found: study.ComparisonStudy) -> None:
     failures: list[Failure] = []
-    names = [judged.name for judged in judgement.judge(replace(found, friction=()), failures)]
+    names = [part.name for part in findings.parts_of(replace(found, friction=()), failures)]
     assert [failure.case for failure in failures] == ["sentence on friction"]
-    assert "friction" not in names and {"wider_class", "energy", "cost", "problems"} <= set(names)
+    assert "friction" not in names and {"wider class", "energy", "cost", "problems"} <= set(names)
     nothing = replace(found, two_contacts=())
-    assert judgement.VERDICTS["two_contacts"](nothing) == judgement.NOT_TESTABLE
+    part = findings.two_contacts(nothing)
+    assert part is not None and part.verdict == NOT_TESTABLE

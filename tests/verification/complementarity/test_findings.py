@@ -14,7 +14,7 @@ from reference.datasets import StoredProblem
 from verification.complementarity.agreement import compare_cases
 from verification.complementarity.agreement_map import agreement_map, two_contact_map
 from verification.complementarity.cases import random_cases
-from verification.complementarity.judgement import VERDICTS, judge_problems
+from verification.complementarity.findings import PARTS, problems
 from verification.complementarity.own_problems import own_problems
 from verification.complementarity.problem_study import study_read
 from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
@@ -23,7 +23,7 @@ from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
 FOUND = compare_cases(random_cases(3, seed=12))
 CELLS = agreement_map(FOUND)
 SINGLE = tuple(c for c in FOUND if c.family == "one contact" and not c.redundancy)
-STUDY = SimpleNamespace(single=SINGLE, cells=CELLS, scenes=CELLS, two_contacts=two_contact_map())
+STUDY = SimpleNamespace(left_out=0, single=SINGLE, cells=CELLS, scenes=CELLS, two_contacts=two_contact_map())
 
 
 def row(solver: str, least: float, largest: float, verdict: str = "solved") -> CostRow:
@@ -31,7 +31,9 @@ def row(solver: str, least: float, largest: float, verdict: str = "solved") -> C
 
 
 def verdict(name: str, **changed: Any) -> str:
-    return VERDICTS[name](SimpleNamespace(**{**vars(STUDY), **changed}))  # type: ignore[arg-type]
+    part = PARTS[name](SimpleNamespace(**{**vars(STUDY), **changed}))  # type: ignore[arg-type]
+    assert part is not None
+    return part.verdict
 
 
 def worse(**values: Any) -> tuple[Any, ...]:
@@ -69,13 +71,13 @@ def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_limi
     larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
     study = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0)
     assert {dict(line.verdicts)["daqp"] for line in study.lines} == {"failed", "left out"}
-    judged = judge_problems(study)
+    judged = problems(study)
     assert judged[0].verdict == LIMITED and "left out" in judged[0].sentence
 
 
 def test_own_problems_are_named_apart_and_are_of_both_kinds() -> None:
-    problems = [stored.problem for stored in own_problems()]
-    assert len({problem.name for problem in problems}) == len(problems)
-    assert {problem.friction is None for problem in problems} == {True, False}
-    hyperstatic = [p for p in problems if np.linalg.matrix_rank(p.delassus, hermitian=True) < p.size]
+    own = [stored.problem for stored in own_problems()]
+    assert len({problem.name for problem in own}) == len(own)
+    assert {problem.friction is None for problem in own} == {True, False}
+    hyperstatic = [p for p in own if np.linalg.matrix_rank(p.delassus, hermitian=True) < p.size]
     assert len(hyperstatic) >= 10

@@ -1,0 +1,280 @@
+"""What a comparison found, in parts: each a sentence with its numbers and its verdict, from the record alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+
+import numpy as np
+
+from verification.claims.claim import verdict_of
+from verification.complementarity.agreement import REPRODUCED as CONE_TOLERANCE
+from verification.complementarity.agreement import SAME
+from verification.complementarity.agreement_map import MapCell
+from verification.complementarity.convergence import CASES, WITHOUT_TRUTH
+from verification.complementarity.extensions import GAIN
+from verification.complementarity.problem_study import ProblemStudy
+from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
+from verification.complementarity.study import ComparisonStudy
+from verification.complementarity.world_cost import costs_more, step_rivals
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Part, attempt
+
+C05_TOLERANCE = 1e-12
+# Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
+MOMENTUM = 1e-9
+# Two solvers' outcomes of one law: ten times the residual that `reference.complementarity.laws` accepts.
+SAME_LAW = 1e-8
+
+
+def parts_of(study: ComparisonStudy, failures: list[Failure] | None = None) -> tuple[Part, ...]:
+    """Return every part, most important first; those about nothing are left out.
+
+    failures : receives the parts that cannot be made, as where every case that they are about failed
+    """
+    found = [attempt(f"sentence on {name.replace('_', ' ')}", partial(make, study), failures)
+             for name, make in PARTS.items()]  # fmt: skip
+    for each in study.problems:
+        found += attempt(f"sentences on {each.folder}", partial(problems, each), failures) or ()
+    return tuple(part for part in found if part is not None)
+
+
+def single_contact(study: ComparisonStudy) -> Part | None:
+    """C05."""
+    worst = max(c.distance for c in study.single)
+    verdict = "reproduced" if worst <= C05_TOLERANCE else "refuted"
+    return Part(
+        f"C05 {verdict}: at one contact IAPB and the Newton LCP give the same motion in all {len(study.single)} "
+        f"impacts, to {worst:.1e} of |v⁻| in the kinetic metric (asked: {C05_TOLERANCE:.0e}).",
+        _all(c.distance <= C05_TOLERANCE for c in study.single), "single contact")  # fmt: skip
+
+
+def wider_class(study: ComparisonStudy) -> Part | None:
+    """Equality = LCP if and only if some p >= 0 gives its motion."""
+    cells = study.cells + study.scenes
+    cases, against = sum(c.cases for c in cells), sum(c.contradictions for c in cells)
+    whole = sorted({c.family for c in study.cells if _always(study.cells, c.family)})
+    return Part(
+        f"The wider class: with one e the two agree if and only if some p >= 0 gives IAPB's motion; {against} of "
+        f"{cases} impacts speak against it. They always agreed for: {', '.join(whole)}.",
+        _all(c.contradictions == 0 for c in cells), "wider class")  # fmt: skip
+
+
+def _always(cells: Sequence[MapCell], family: str) -> bool:
+    return all(c.agree == 1.0 for c in cells if c.family == family)
+
+
+def two_contacts(study: ComparisonStudy) -> Part | None:
+    """The border r = c."""
+    right = sum(c.predicted == c.found for c in study.two_contacts)
+    return Part(
+        f"Two contacts whose rows have the cosine c in the kinetic metric and close at speeds 1 and r agree "
+        f"exactly where r >= c: {right} of {len(study.two_contacts)} grid points.",
+        _all(c.predicted == c.found for c in study.two_contacts), "two contacts")  # fmt: skip
+
+
+def difference(study: ComparisonStudy) -> Part | None:
+    """By how much, and against what."""
+    cells = [c for c in study.cells if c.agree < 1.0]
+    if not cells:
+        return None
+    defect, farthest = max(c.defect for c in study.cells + study.scenes), max(c.farthest for c in cells)
+    redundancies = sorted({c.redundancy for c in cells})
+    apart = {r: 100.0 * (1.0 - np.mean([c.agree for c in cells if c.redundancy == r])) for r in redundancies}
+    return Part(
+        f"Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses (defect at "
+        f"most {defect:.0e}), up to {farthest:.2g} |v⁻|. It grows with 1 + e, which moves no impact across the "
+        "border. Impacts that differ, by redundant rows, "
+        f"{', '.join(f'{r}: {share:.0f} %' for r, share in apart.items())}.",
+        _all(c.defect <= CONE_TOLERANCE for c in study.cells + study.scenes), "difference")  # fmt: skip
+
+
+def energy(study: ComparisonStudy) -> Part | None:
+    """Extra loss."""
+    cells = study.cells + study.scenes
+    extra, momentum = 100 * max(c.extra_loss for c in cells), max(c.momentum for c in cells)
+    return Part(
+        f"IAPB never keeps more energy than the LCP: it loses ½ (1−e)/(1+e) · distance² more, up to "
+        f"{extra:.0f} % of "
+        f"KE⁻, nothing at e = 1. Momentum changes lie in range(Jᵀ) to {momentum:.0e}.",
+        _all(c.least_extra_loss >= -SAME and c.momentum <= MOMENTUM for c in cells), "energy")  # fmt: skip
+
+
+def scenes(study: ComparisonStudy) -> Part | None:
+    """The project's scenes."""
+    cases = sum(c.cases for c in study.scenes)
+    if not cases:
+        return None
+    apart = sorted({c.family.removeprefix("scene ") for c in study.scenes if c.agree < 1.0})
+    pulling = sum(round(c.adhesive * c.cases) for c in study.scenes)
+    artefacts = sum(round(c.artefact * c.cases) for c in study.scenes)
+    where = f"they differ in {', '.join(apart)}" if apart else "they agree in all"
+    return Part(
+        f"Impacts of the project's scenes: {cases}; {where}. {pulling} pull truly (no p >= 0 gives their motion), "
+        f"{artefacts} only in the least-norm p; {study.left_out} are left out (per-body rows or device limits).",
+        REPRODUCED if not apart else LIMITED, "scenes")  # fmt: skip
+
+
+def touching(study: ComparisonStudy) -> Part | None:
+    """Erratum 4: contacts that did not approach."""
+    cells = [c for c in study.cells if c.family == "with a neighbour"]
+    if not cells:
+        return None
+    ours = 100 * float(np.mean([c.left_approaching for c in cells]))
+    theirs = 100 * float(np.mean([c.left_approaching_law for c in cells]))
+    return Part(
+        f"A touching contact that is not given a row is left approaching in {ours:.0f} % of such "
+        f"impacts by IAPB and "
+        f"in {theirs:.0f} % by the LCP on the same rows.",
+        _by_share(1.0 - float(np.mean([c.left_approaching for c in cells]))), "touching")  # fmt: skip
+
+
+def friction(study: ComparisonStudy) -> Part | None:
+    """The extension by dry friction."""
+    cells = study.friction
+    pushing, same = sum(c.pushing for c in cells), sum(c.same for c in cells)
+    ours, ncp, ccp = (max(getattr(c, f"largest_gain{law}") for c in cells) for law in ("", "_ncp", "_ccp"))
+    bouncing = [c for c in cells if c.restitution > 0.0]
+    share = 100 * sum(c.ncp_gains for c in bouncing) / max(1, sum(c.cases for c in bouncing))
+    return Part(
+        f"Friction in the impact: where every contact pushes, IAPB's motion is Coulomb's NCP in {same} "
+        f"of {pushing} "
+        f"impacts. With e > 0 the NCP gains energy in {share:.0f} % (up to {ncp:.2g} KE⁻, the CCP up to "
+        f"{ccp:.2g}); "
+        f"IAPB never (largest change {ours:.0e} KE⁻).",
+        REFUTED if any(c.largest_gain > GAIN for c in cells) else _by_share(same / max(1, pushing)),
+        "friction")  # fmt: skip
+
+
+def unequal(study: ComparisonStudy) -> Part | None:
+    """The extension by unequal restitution."""
+    distance = max(c.distance for c in study.unequal)
+    ours, newton, equality = (
+        max(getattr(c, name) for c in study.unequal) for name in ("gain", "gain_newton_lcp", "gain_equality")
+    )
+    before, after = study.bar["newton_equality"], study.bar["IAPB, unequal restitution"]
+    return Part(
+        f"Unequal restitution: the engine's two LCPs are the reference's to {distance:.0e} and gain at "
+        f"most {ours:.0e} "
+        f"KE⁻; equalities gain up to {equality:.2g}, the Newton LCP up to {newton:.2g} where some "
+        f"contacts separate. "
+        f"On the struck bar (0.5 J): equalities {before:.4g} J, IAPB {after:.4g} J.",
+        _all(c.distance <= SAME_LAW and c.gain <= GAIN for c in study.unequal), "unequal")  # fmt: skip
+
+
+def ideal_world(study: ComparisonStudy) -> Part | None:
+    """Convergence of the rigid world to event-driven truth."""
+    rows = study.convergence
+    if not rows:
+        return None
+    apart = [row.scene for row in rows if not row.first_order]
+    place = f"not on {', '.join(apart)}" if apart else "on all"
+    more = f" ({len(CASES) - len(rows)} more with --full)" if len(rows) < len(CASES) else ""
+    orders = [order for row in rows for order in (row.position_order, row.velocity_order) if np.isfinite(order)]
+    return Part(
+        f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes{more} (positions "
+        f"in the sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
+        f"{np.median(orders):.2f}); without a truth: {', '.join(WITHOUT_TRUTH)}.",
+        verdict_of([row.first_order for row in rows]), "ideal world")  # fmt: skip
+
+
+def cost(study: ComparisonStudy) -> Part | None:
+    """C22, per impact."""
+    found = []
+    for called in ("compiled", "from Python"):
+        pairs = [pair for pair in rivals(study.impact_costs) if pair.called == called]
+        decided = [pair for pair in pairs if pair.costs_more is not None]
+        more = sum(bool(pair.costs_more) for pair in decided)
+        found.append(f"{called}, a solver costs more than IAPB in {more} of {len(decided)} pairs that differ clearly")
+    rows = study.impact_costs
+    most, least = max(row.contacts for row in rows), min(row.contacts for row in rows)
+    parts = [_cost_part(rows, family, contacts) for family in dict.fromkeys(row.family for row in rows)
+             for contacts in sorted({least, most})]  # fmt: skip
+    return Part(f"C22, time per impact: {'; '.join(found)}. Medians: {'; '.join(parts)}.",
+                verdict_of([pair.costs_more for pair in rivals(study.impact_costs)]), "cost", timed=True)  # fmt: skip
+
+
+def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
+    here = {row.solver: row for row in rows if row.family == family and row.contacts == contacts}
+    others = [row for name, row in here.items() if name not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL)
+              and row.verdict == "solved"]  # fmt: skip
+    compiled, called = _seconds(here[KERNEL].median), _seconds(here[IAPB].median)
+    text = f"{family} of {contacts}: IAPB {compiled} compiled, {called} from Python"
+    if LEMKE_KERNEL in here and here[LEMKE_KERNEL].verdict == "solved":
+        text += f", Lemke {_seconds(here[LEMKE_KERNEL].median)} compiled"
+    if not others:
+        return text + ", no LCP solver from Python solved it"
+    best = min(others, key=lambda row: row.median)
+    return text + f", fastest from Python {best.solver} {_seconds(best.median)}"
+
+
+def steps(study: ComparisonStudy) -> Part | None:
+    """C22, per step."""
+    parts = []
+    for scene in dict.fromkeys(row.scene for row in study.step_costs):
+        here = {row.way: row.median for row in study.step_costs if row.scene == scene}
+        parts.append(f"{scene}: " + ", ".join(f"{way} {_seconds(value)}" for way, value in here.items()))
+    if not parts:
+        return None
+    return Part("C22, time per step: " + "; ".join(parts) + ".",
+                verdict_of([costs_more(*pair) for pair in step_rivals(study.step_costs)]), "steps",
+                timed=True)  # fmt: skip
+
+
+def problems(study: ProblemStudy) -> tuple[Part, ...]:
+    """One folder of problem files: each solved by somebody, and solved alike."""
+    counts = ", ".join(
+        f"{name} {study.count(name, 'solved')}/{study.count(name, 'refused')}/{study.count(name, 'failed')}"
+        for name in study.solvers
+    )
+    skew = [f"{line.problem} ({line.asymmetry:.1g})" for line in study.lines if line.asymmetry > 0.0]
+    unsolved = [line.problem for line in study.lines if all(verdict != "solved" for _, verdict in line.verdicts)]
+    smooth, rough = _spread(study, 0), _spread(study, 1)
+    found = [
+        f"{study.folder}: {len(study.lines)} problems read, {len(study.unread)} files not. Solved/refused/failed by "
+        f"recomputed residuals: {counts}." + _left_out(study),
+        f"Solved by nobody: {', '.join(unsolved) or 'none'}. Those who solve a frictionless problem agree on its "
+        f"contact velocities to {smooth:.0e} (impulses are not unique and not compared)"
+        + (f"; with friction, where Coulomb's law leaves even velocities open, to {rough:.0e}." if rough else "."),
+    ]
+    if skew:
+        found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
+    # who is asked at all depends on how long he took before
+    verdict = LIMITED if unsolved or study.unread else REPRODUCED
+    return tuple(Part(sentence, verdict, "problems", timed=True) for sentence in found)
+
+
+def _spread(study: ProblemStudy, friction: int) -> float:
+    """Largest spread of contact velocities among the problems without (0) or with friction (1)."""
+    spreads = [line.spread for line in study.lines if line.friction == bool(friction)]
+    return max((spread for spread in spreads if np.isfinite(spread)), default=0.0)
+
+
+def _left_out(study: ProblemStudy) -> str:
+    """What a limit of time kept from being tried."""
+    count = sum(row.verdict == "left out" for row in study.rows)
+    return f" {count} pairs were left out: that solver was too slow on a smaller problem." if count else ""
+
+
+def _seconds(value: float) -> str:
+    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if value * factor >= 1.0 or unit == "µs":
+            return f"{value * factor:.3g} {unit}"
+    return f"{value:.3g} s"
+
+
+def _all(outcomes: Iterable[bool]) -> str:
+    """A statement that claims to be exact has no exceptions."""
+    found = list(outcomes)
+    return NOT_TESTABLE if not found else REPRODUCED if all(found) else REFUTED
+
+
+def _by_share(share: float) -> str:
+    return REPRODUCED if share == 1.0 else LIMITED if share >= 0.5 else REFUTED
+
+
+# In the order of the report.
+PARTS: dict[str, Callable[[ComparisonStudy], Part | None]] = {
+    make.__name__: make
+    for make in (single_contact, wider_class, two_contacts, difference, energy, scenes, touching, friction, unequal,
+                 ideal_world, cost, steps)
+}  # fmt: skip
