@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iapb.run import Run
 from reports.figures.figure import Figure, Numbers, Panel, Recipe
 from reports.figures.style import PANEL, STYLES, line_arguments, styled
-from reports.figures.traces import PATH, curve_id, traced_svg
+from reports.figures.svg import PATH, curve_id, traced_svg
 
 Floats = NDArray[np.float64]
 

@@ -2,6 +2,10 @@
 
 No date, no metadata, salted identifiers that are unique in the page, coordinates to 0.01 pt (or finer), colours as the
 page's variables (with the colour itself as fallback), text as text.
+
+The page's script can read curves: their SVG tells where its axes are and which curve is which. The script needs no
+other copy of the values: it reads them from the paths, which hold every point that is farther than TOLERANCE from a
+straight line between its neighbours. Without the script it is the drawing that it was.
 """
 
 from __future__ import annotations
@@ -13,10 +17,12 @@ from typing import Any
 from reports.figures.style import VARIABLES
 
 LARGEST_ENLARGEMENT = 1.35  # beyond, the lettering would shout
+TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
+TIME, PATH = "time", "path"  # a curve over time may be zoomed along t alone; a path in the plane both ways
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
-_TOLD = re.compile(r'\sid="(curve|axis|label)=([^"]*)"')  # what a gid tells the page's script, see traces.py
+_TOLD = re.compile(r'\sid="(curve|axis|label)=([^"]*)"')  # what a gid tells the page's script, see `traced_svg`
 _TURNED_BY_NOTHING = re.compile(r'\stransform="rotate\(-?0 [^)]*\)"')
 _COMMAND = re.compile(r"\s*([MLCQz])\s*")  # of a path's data; the letters part the numbers by themselves
 _PATH = re.compile(r'\sd="[^"]*"')
@@ -90,3 +96,40 @@ def _themed(text: str) -> str:
     """Let the page choose colours and font."""
     text = _FONT.sub("var(--sans, sans-serif)", text)
     return _HEX.sub(lambda match: f"var(--{VARIABLES[match.group()]}, {match.group()})", text)
+
+
+def curve_id(name: str) -> str:
+    """Return the `gid` of a curve; the legend toggles curves by this name."""
+    return f"curve={name}"
+
+
+def traced_svg(drawing: Any, key: str, kind: str = TIME) -> str:
+    """Return the SVG of a drawing with one pair of axes, with what a script needs to read values off it."""
+    import matplotlib
+
+    (axes,) = drawing.axes
+    for name in "xy":
+        axis = getattr(axes, f"{name}axis")
+        axis.set_gid(f"axis={name}")
+        axis.label.set_gid(f"label={name}")
+    with matplotlib.rc_context({"path.simplify_threshold": TOLERANCE}):
+        for line in axes.lines:
+            line.get_path().simplify_threshold = TOLERANCE
+        svg = to_svg(drawing, key)
+    return svg.replace("<svg ", f"<svg {_attributes(drawing, axes, kind)} ", 1)
+
+
+def _attributes(drawing: Any, axes: Any, kind: str) -> str:
+    """Return the frame of the axes in the drawing's points (left, top, right, bottom), their limits and names."""
+    width, height = 72.0 * drawing.get_size_inches()
+    place = axes.get_position()
+    frame = (width * place.x0, height * (1.0 - place.y1), width * place.x1, height * (1.0 - place.y0))
+    given = {
+        "trace": kind, "frame": _spaced(frame), "x": _spaced(axes.get_xlim()), "y": _spaced(axes.get_ylim()),
+        "names": f"{axes.get_xlabel()}|{axes.get_ylabel()}",
+    }  # fmt: skip
+    return " ".join(f'data-{name}="{value}"' for name, value in given.items())
+
+
+def _spaced(values: Any) -> str:
+    return " ".join(f"{value:.7g}" for value in values)
