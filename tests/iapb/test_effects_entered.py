@@ -17,12 +17,12 @@ import json, linecache, sys
 from collections import Counter
 from pathlib import Path
 
-import iapb.scene.mechanism
+import iapb.simulation
 from iapb import Simulation, decide_effects, find_scene, load_scene
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.system import coupling_of
 
-PACKAGE = str(Path(iapb.scene.mechanism.__file__).parent)
+PACKAGE = str(Path(iapb.simulation.__file__).parent)
 LAWS = {"penalty": Penalty, "impulses": ImpulseAugmented}
 
 

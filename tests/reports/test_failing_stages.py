@@ -266,7 +266,7 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(
 ) -> None:
     path = str(tmp_path / "tables" / "claims-failed.txt")
     failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
-    monkeypatch.setattr(gather, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
+    monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
     with pytest.raises(typer.Exit) as ended:
         reproduce.make_report(tmp_path, "quick")
     lines = capsys.readouterr().out.splitlines()

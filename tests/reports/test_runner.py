@@ -92,7 +92,7 @@ def test_claims_are_not_computed_from_interrupted_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(verified, "check_claims", of_runs)
     runner = Runner(tmp_path, interrupt)
     with pytest.raises(KeyboardInterrupt):
-        claims.compute(runner, "quick", lambda done, total: None)
+        claims.compute(runner, "quick", lambda done, total: None, [])
     assert len(list(tmp_path.glob("*.partial"))) == 1
 
 
@@ -143,6 +143,6 @@ def test_a_run_is_listed_under_every_claim_that_uses_it_though_it_is_made_once(t
     monkeypatch.setattr(claims, "as_record", lambda result: result)
     runner = Runner(tmp_path)
     with runner.recording("claims") as used:
-        claims.compute(runner, "quick", lambda done, total: None)
+        claims.compute(runner, "quick", lambda done, total: None, [])
     assert computed == ["IAPB", "PB"]
     assert [run.used_by for run in used.values()] == [("A", "B"), ("A", "B")]
