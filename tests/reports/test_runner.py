@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -123,11 +124,12 @@ def test_a_run_that_gave_up_is_listed_as_partial(tmp_path):
     assert used.status == "partial" and (tmp_path / used.file).is_file()
 
 
+@dataclass(frozen=True)
 class _UsesOne:
-    """A claim that looks at one run."""
+    """A claim that looks at one run, and its own result."""
 
-    def __init__(self, worlds):
-        self.worlds = worlds
+    worlds: tuple[str, ...]
+    failures: tuple = ()
 
     def check(self, study):
         for world in self.worlds:
@@ -139,7 +141,7 @@ def test_a_run_is_listed_under_every_claim_that_uses_it_though_it_is_made_once(t
     import verification.claims as verified
     from reports.evidence import claims
 
-    monkeypatch.setattr(verified, "CLAIMS", {"A": _UsesOne(["IAPB", "PB"]), "B": _UsesOne(["PB", "IAPB", "PB"])})
+    monkeypatch.setattr(verified, "CLAIMS", {"A": _UsesOne(("IAPB", "PB")), "B": _UsesOne(("PB", "IAPB", "PB"))})
     monkeypatch.setattr(claims, "as_record", lambda result: result)
     runner = Runner(tmp_path)
     with runner.recording("claims") as used:
