@@ -9,69 +9,25 @@ aside and renamed: a killed process leaves whole batches only.
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import closing
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from reports.batches import worker_pool
-from reports.store.keys import canonical_json, code_version
+from reports.batches import do_missing, here, processes
+from reports.counterexamples import CampaignRequest, keep_counterexample
 from reports.store.tables import Column, Table, read_table, write_table
+from verification.laws.bounds import LawResidual
+from verification.laws.campaign import Batch, BatchOutcome, do_batch
+from verification.laws.kit import LawCount, added
 
-if TYPE_CHECKING:
-    from verification.laws.campaign import Batch, BatchOutcome, Subject
-    from verification.laws.kit import LawCount
-
-ENGINE = "iapb:resolve_impact"
 _TABLE = "laws"
 _COMMAND = "iapb verify --full"
 # Files of one law: each is a run of about 150 kB. A resolver that breaks a law more often is not understood by more.
 KEPT_PER_LAW = 1000
-
-
-@dataclass(frozen=True)
-class CampaignRequest:
-    """What is verified: a resolver by its name, the tolerances by theirs, and how much.
-
-    workers : processes at work; 1 = this one.
-    """
-
-    resolver: str
-    bounds: str
-    largest_condition: float
-    impacts: int
-    trajectories: int
-    seed: int
-    workers: int
-
-    def subject(self) -> Subject:
-        """What the laws are put to; imports the resolver."""
-        from reports.by_name import function_named
-        from verification.laws import bounds
-        from verification.laws.campaign import Subject
-
-        tested = function_named("--resolver", self.resolver)
-        return Subject(tested, getattr(bounds, self.bounds), self.largest_condition, self.seed)
-
-    def key(self) -> str:
-        """Hash of all that a batch depends on; not how many there are."""
-        asked = {"resolver": self.resolver, "bounds": self.bounds, "condition": self.largest_condition,
-                 "seed": self.seed, "code": code_version(), "laws": _laws_version()}  # fmt: skip
-        return hashlib.sha256(canonical_json(asked).encode()).hexdigest()[:16]
-
-
-def _laws_version() -> str:
-    folder, digest = Path(__file__).resolve().parents[1] / "verification" / "properties", hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
 
 
 class Campaign:
@@ -90,39 +46,14 @@ class Campaign:
         parts: dict[str, list[Batch]] = {}
         for batch in batches:
             parts.setdefault(batch.part, []).append(batch)
+        scheduler = here if self.request.workers == 1 else processes(self.request.workers)
         for part, own in parts.items():
-            total = sum(batch.count for batch in own)
-            missing = [batch for batch in own if not self.path_of(batch).is_file()]
-            done = total - sum(batch.count for batch in missing)
-            progress(part, done, total)
-            with closing(self._outcomes(missing)) as outcomes:
-                for batch, outcome in outcomes:
-                    self._keep(batch, outcome)
-                    done += batch.count
-                    progress(part, done, total)
-
-    def _outcomes(self, batches: list[Batch]) -> Generator[tuple[Batch, BatchOutcome]]:
-        """Outcomes as they come; a few batches per worker wait, no more."""
-        if self.request.workers == 1 or len(batches) < 2:
-            yield from ((batch, outcome_of(self.request, batch)) for batch in batches)
-            return
-        left = iter(batches)
-        with worker_pool(self.request.workers) as pool:
-
-            def begin(count: int) -> dict[Future[BatchOutcome], Batch]:
-                return {pool.submit(outcome_of, self.request, batch): batch for batch in islice(left, count)}
-
-            running = begin(2 * self.request.workers)
-            while running:
-                finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    yield running.pop(future), future.result()
-                running |= begin(len(finished))
+            do_missing(own, partial(outcome_of, self.request), self._keep,
+                       done=lambda batch: self.path_of(batch).is_file(), scheduler=scheduler,
+                       progress=partial(progress, part), size=lambda batch: batch.count)  # fmt: skip
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
         """Counterexamples first: a batch that is there has all of its own, up to KEPT_PER_LAW in the whole folder."""
-        from reports.campaign_counterexamples import keep_counterexample
-
         kept = Counter(path.stem.rsplit("-", 1)[-1] for path in self.counterexamples())
         for found in outcome.found:
             kept[found.law] += 1
@@ -132,8 +63,6 @@ class Campaign:
 
     def counts(self, batches: Iterable[Batch]) -> dict[str, dict[str, LawCount]]:
         """Sums over the batches that are there, by part and law."""
-        from verification.laws.kit import added
-
         sums: dict[str, dict[str, LawCount]] = {}
         for batch in batches:
             if self.path_of(batch).is_file():
@@ -154,8 +83,6 @@ class Campaign:
 
 def outcome_of(request: CampaignRequest, batch: Batch) -> BatchOutcome:
     """Do one batch; in a process of its own it finds its resolver by name."""
-    from verification.laws.campaign import do_batch
-
     return do_batch(batch, request.subject())
 
 
@@ -174,9 +101,6 @@ def _table(batch: Batch, outcome: BatchOutcome) -> Table:
 
 
 def _read(path: Path) -> Iterator[LawCount]:
-    from verification.laws.bounds import LawResidual
-    from verification.laws.kit import LawCount
-
     table = read_table(path, _TABLE)
     rows = zip(*(table[name] for name in ("law", "checked", "failures", "worst", "tolerance")), strict=True)
     for law, checked, failures, value, tolerance in rows:

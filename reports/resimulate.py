@@ -14,7 +14,9 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralC
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
+from iapb.scene.model import scene_kind
 from iapb.simulation import simulate
+from reference.worlds import WORLDS, find_world
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.runs import read_run
 
@@ -75,8 +77,6 @@ def repeat_run(path: Path | str) -> Repetition:
 
 def scene_of(run: Run) -> Scene:
     """The scene of a run, from its resolved values."""
-    from iapb.scene.model import scene_kind
-
     scene: Scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
     scene._source_text = run.scene_source
     return scene
@@ -96,8 +96,6 @@ def law_of(run: Run) -> Any:
 
 def _law_of_world(name: str) -> Any:
     """The law of a world of reference/worlds.py, None where there is no such world."""
-    from reference.worlds import WORLDS, find_world
-
     return find_world(name).law if name in WORLDS else None
 
 

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from reports.commands.run import describe
+from reports.store.impact import BrokenImpact, read_broken_impact
 from reports.store.runs import read_provenance, read_stored
-from reports.store_impact import BrokenImpact, read_broken_impact
 
 
 def inspect(

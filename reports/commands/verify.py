@@ -10,10 +10,10 @@ import typer
 
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
-from reports.campaign import ENGINE, KEPT_PER_LAW, Campaign, CampaignRequest
-from reports.campaign_counterexamples import recheck
+from reports.campaign import KEPT_PER_LAW, Campaign
 from reports.commands.progress import stage_progress, to_log
 from reports.compiling import compiling_told
+from reports.counterexamples import ENGINE, CampaignRequest, recheck
 from verification import check_passivity
 from verification.engines import SETTINGS, compare_engines, sentence, verdict
 from verification.engines.record import EngineRecord

@@ -79,6 +79,8 @@ def sources_hash(folder: str) -> str:
     To parse all sources takes seconds, so what a file's bytes lead to is remembered beside the compiled modules.
     """
     files = {path.relative_to(_ROOT).as_posix(): path.read_bytes() for path in (_ROOT / folder).rglob("*.py")}
+    if not files:
+        raise ArgumentError("folder", folder, "a folder of the checkout with Python files")
     names = {name: hashlib.sha256(source).hexdigest() for name, source in files.items()}
     kept = Path(cache_from_source(__file__)).with_name(f"code-{folder.replace('/', '-')}-{sys.version_info.minor}.json")
     known = _remembered(kept)

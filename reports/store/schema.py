@@ -7,7 +7,7 @@
     /impacts                  one row per colliding group and step
     /energy                   the ledger, on instants and on steps
     /effects                  what was on, and why
-    /struck                   only where an impact of bare numbers broke a law: see reports.store_impact
+    /struck                   only where an impact of bare numbers broke a law: see reports.store.impact
     /timings, /provenance     outside the content hash: they differ from one machine to the next
 
 Each group carries its own dimension scales, so that it opens as one xarray dataset.

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from iapb.errors import RunFileError
-from reports.campaign import Campaign, CampaignRequest
-from reports.campaign_counterexamples import keep_counterexample, recheck
+from reports.campaign import Campaign
 from reports.cli import main
+from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
 from reports.store.tables import read_table
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
@@ -96,7 +96,8 @@ def test_the_plan_covers_every_part_once() -> None:
 _ENDLESS = """
 import sys
 from pathlib import Path
-from reports.campaign import Campaign, CampaignRequest
+from reports.campaign import Campaign
+from reports.counterexamples import CampaignRequest
 from verification.laws.campaign import IMPACTS, Batch
 request = CampaignRequest("verification.laws:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
 Campaign(Path(sys.argv[1]), request).run([Batch(IMPACTS, first, 5) for first in range(0, 10**5, 5)], lambda *told: None)

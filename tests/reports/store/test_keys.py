@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from iapb.errors import ArgumentError
 from reports.store import keys
 
 CODE = '''"""What it does."""
@@ -81,3 +82,10 @@ def test_what_is_remembered_saves_parsing_and_decides_nothing(
     with monkeypatch.context() as context:
         context.setattr(keys, "code_hash", lambda source: pytest.fail("parsed again"))
         assert version(folder) == found
+
+
+def test_a_folder_without_sources_is_refused(folder: Path) -> None:
+    """A folder that was renamed would otherwise leave every key."""
+    (folder / "a.py").unlink()
+    with pytest.raises(ArgumentError, match="engine"):
+        version(folder)

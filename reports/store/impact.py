@@ -17,7 +17,7 @@ import json
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +25,8 @@ from iapb.errors import RunFileError
 from iapb.run import ContactTable, ImpactTable, Run
 from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
 from reports.store.runs import write_run
-
-if TYPE_CHECKING:
-    from verification.impacts import Floats, ImpactCase
-    from verification.laws.counterexample import Struck
+from verification.impacts import Floats, ImpactCase
+from verification.laws.counterexample import Struck
 
 STRUCK = "struck"
 _SOURCE = "# An impact of bare numbers, no scene: see the group /struck of this file.\n"
@@ -161,9 +159,6 @@ def read_broken_impact(path: Path | str) -> BrokenImpact | None:
 
 def _broken(texts: dict[str, str], arrays: dict[str, Any], moves: Any, head: dict[str, Any], rows: tuple[int, ...],
             place: str) -> BrokenImpact:
-    from verification.impacts import ImpactCase
-    from verification.laws.counterexample import Struck
-
     after, e, found = arrays.pop("velocity_after"), arrays.pop("restitution"), json.loads(texts["found"])
     d = len(arrays["velocity"])
     shapes = (arrays["mass_matrix"].shape, arrays["contact_jacobian"].shape[1:], after.shape)

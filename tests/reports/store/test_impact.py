@@ -11,13 +11,13 @@ import pytest
 
 import reports.campaign
 from iapb.errors import RunFileError
-from reports.campaign import Campaign, CampaignRequest
-from reports.campaign_counterexamples import keep_counterexample, recheck
+from reports.campaign import Campaign
 from reports.cli import main
+from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
 from reports.store import read_run
 from reports.store.care import PARTIAL, check_store
+from reports.store.impact import read_broken_impact
 from reports.store.io import new_file
-from reports.store_impact import read_broken_impact
 from verification.impacts import ImpactCase
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, UNEQUAL, Batch, Found, drawn

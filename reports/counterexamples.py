@@ -6,32 +6,66 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from iapb.errors import IapbError, RunFileError
-from reports.store.keys import plain
-from reports.store.tables import Column, Table, read_table, write_table
+from iapb.scene import scene_from_text
+from reference.complementarity.problem import ImpactProblem
+from reference.fclib import write_fclib
+from reference.one_thread import one_thread
+from reference.worlds import run_world
+from reports.by_name import function_named
+from reports.store import read_run, write_run
+from reports.store.impact import BrokenImpact, read_broken_impact, write_broken_impact
+from reports.store.io import opened
+from reports.store.keys import code_version, hash_of, plain, sources_hash
+from reports.store.tables import TABLE_FORMAT, Column, Table, read_table, write_table
+from verification.impacts import ImpactCase
+from verification.laws import bounds
+from verification.laws.bounds import LawResidual
+from verification.laws.campaign import Found, Subject, drawn, residuals
+from verification.laws.counterexample import Struck, as_test
+from verification.laws.engine_laws import ENGINE_LAWS
+from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
+from verification.laws.trajectory_laws import judge_run
 
-if TYPE_CHECKING:
-    from reports.campaign import CampaignRequest
-    from reports.store_impact import BrokenImpact
-    from verification.impacts import ImpactCase
-    from verification.laws.bounds import LawResidual
-    from verification.laws.campaign import Found, Subject
-    from verification.laws.counterexample import Struck
-
+ENGINE = "iapb:resolve_impact"
 _TABLE = "counterexample"
+
+
+@dataclass(frozen=True)
+class CampaignRequest:
+    """What is verified: a resolver by its name, the tolerances by theirs, and how much.
+
+    workers : processes at work; 1 = this one.
+    """
+
+    resolver: str
+    bounds: str
+    largest_condition: float
+    impacts: int
+    trajectories: int
+    seed: int
+    workers: int
+
+    def subject(self) -> Subject:
+        """What the laws are put to; imports the resolver."""
+        tested = function_named("--resolver", self.resolver)
+        return Subject(tested, getattr(bounds, self.bounds), self.largest_condition, self.seed)
+
+    def key(self) -> str:
+        """Hash of all that a batch depends on; not how many there are."""
+        asked = {"resolver": self.resolver, "bounds": self.bounds, "condition": self.largest_condition,
+                 "seed": self.seed, "code": code_version(), "laws": sources_hash("verification")}  # fmt: skip
+        return hash_of(asked)[:16]
 
 
 def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) -> Path:
     """Write one; return its file. The same one again is the same file."""
-    from reports.store import write_run
-    from reports.store_impact import write_broken_impact
-
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{found.part.replace(' ', '_')}-{found.index:09d}-{found.law}.h5"
     if found.run is not None:
@@ -51,12 +85,6 @@ def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
 
 
 def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> BrokenImpact:
-    from reports.campaign import ENGINE
-    from reports.store_impact import BrokenImpact
-    from verification.laws.counterexample import as_test
-    from verification.laws.engine_laws import ENGINE_LAWS
-    from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
-
     subject = request.subject()
     return BrokenImpact(
         struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law,
@@ -66,9 +94,6 @@ def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> Br
 
 def _write_fclib(path: Path, case: ImpactCase) -> None:
     """The impact as FCLIB too, where it is a problem of that kind: contacts, and a restitution in [0, 1]."""
-    from reference.complementarity.problem import ImpactProblem
-    from reference.fclib import write_fclib
-
     e = case.given_restitution()
     if case.contacts == 0 or np.min(e) < 0.0:
         return
@@ -81,10 +106,6 @@ def _write_fclib(path: Path, case: ImpactCase) -> None:
 
 def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
     """Judge a counterexample again: an impact by its resolver, a run as recorded and as it comes out now."""
-    from reports.store.io import opened
-    from reports.store.tables import TABLE_FORMAT
-    from reports.store_impact import read_broken_impact
-
     if not path.is_file():
         raise RunFileError(f"{path}: no such file")
     try:
@@ -104,33 +125,22 @@ def _recheck_impact(broken: BrokenImpact) -> Iterator[tuple[str, LawResidual]]:
 
 def _recheck_drawn(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
     """What is no impact: the case that its part, seed and number draw."""
-    from verification.laws.campaign import drawn
-
     case = drawn(record["part"], record["index"], _subject(record))
     yield _judged(record["law"], record, case)
 
 
 def _judged(law: str, origin: dict[str, Any], case: Any) -> tuple[str, LawResidual]:
-    from reference.one_thread import one_thread
-    from verification.laws.campaign import residuals
-
     with one_thread():  # as it was found
         return law, residuals(origin["part"], case, _subject(origin))[0][law]
 
 
 def _subject(origin: dict[str, Any]) -> Subject:
-    from reports.campaign import CampaignRequest
 
     return CampaignRequest(**origin["request"]).subject()
 
 
 def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:
     """Laws on the stored arrays, then on the same scene simulated again."""
-    from iapb.scene import scene_from_text
-    from reference.worlds import run_world
-    from reports.store import read_run
-    from verification.laws.trajectory_laws import judge_run
-
     run = read_run(path)
     yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))
     world, _, rendering = run.world.partition(" ")
