@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from reference.exact import exact_impact
 
 Floats = NDArray[np.floating[Any]]
 
@@ -20,18 +23,34 @@ RANK_CUT = 1e-9  # anywhere in the gap
 
 @dataclass(frozen=True)
 class ImpactCase:
-    """M (d, d), J (c, d), v (d,) and scalar e; `translations` (k, d) are motions z with J z = 0 exactly.
+    """M (d, d), J (c, d), v (d,), scalar e, and what is known about them.
 
-    `unequal` (c,), each in [0, 1], takes the place of e where it is given.
+    Attributes
+    ----------
+    family : where the impact comes from.
+    translations : (k, d) motions z with J z = 0 exactly.
+    unequal : (c,) restitutions, each in [0, 1], that take the place of e.
+    touching : (k, d) rows of contacts that touch and do not approach.
+    rank : the first `rank` rows are independent, the others depend on them.
+    mass_condition, closeness : κ(M), and the distance of nearly dependent rows (1 = generic) it was made with.
     """
 
     mass_matrix: Floats
     contact_jacobian: Floats
     velocity: Floats
-    restitution: float
+    restitution: float = 0.0
     family: str = ""
-    translations: Floats | None = field(default=None)
-    unequal: Floats | None = field(default=None)
+    translations: Floats | None = None
+    unequal: Floats | None = None
+    touching: Floats | None = None
+    rank: int | None = None
+    mass_condition: float = np.nan
+    closeness: float = np.nan
+
+    @property
+    def arrays(self) -> tuple[Any, Any, Any]:
+        """M, J and v."""
+        return self.mass_matrix, self.contact_jacobian, self.velocity
 
     @property
     def coordinates(self) -> int:
@@ -42,6 +61,21 @@ class ImpactCase:
     def contacts(self) -> int:
         """c."""
         return len(self.contact_jacobian)
+
+    @property
+    def redundancy(self) -> int:
+        """Rows beyond the rank of J."""
+        return self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian)) if self.contacts else 0
+
+    @property
+    def label(self) -> str:
+        """Short name for a table."""
+        return f"d={self.coordinates} c={self.contacts} κ(M)={self.mass_condition:.0e} rows {self.closeness:.0e} apart"
+
+    @cached_property
+    def truth(self) -> tuple[Fraction, ...]:
+        """Exact v⁺ of the numbers given."""
+        return exact_impact(*self.arrays, self.restitution).velocity
 
     def given_restitution(self) -> Any:
         """What a resolver gets: the scalar e, or a copy of the unequal ones."""
@@ -114,6 +148,7 @@ class ImpactCase:
         return {}
 
 
+# Random impacts of many kinds: what the kit draws.
 MASS_KINDS = ("spectral", "graded", "arrow", "diagonal", "identity")
 # Nearly dependent rows come three times: most bugs of rank and conditioning live there.
 _NEAR = ("nearly dependent",) * 3
@@ -234,3 +269,112 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
         along = unseen.T @ (unseen @ v)
         return along + (1e-9 * v if kind == "grazing" else 0.0)
     return v
+
+
+# Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are small whole numbers,
+# and redundant rows are whole-number combinations of independent ones: rank and redundancy are then exact in doubles,
+# and the same impact can be solved in rationals.
+WHOLE = 5  # entries of rows lie in -5..5
+
+
+class Family(NamedTuple):
+    """What the impacts of a batch have in common."""
+
+    coordinates: int
+    contacts: int
+    rank: int
+    condition_number: float
+
+
+def draw_of_rank(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
+    """Yield `count` impacts; the same seed gives the same ones."""
+    rng = np.random.default_rng([seed, *(round(number) for number in family)])
+    for _ in range(count):
+        mass = _mass_of_condition(rng, family.coordinates, family.condition_number)
+        velocity = rng.standard_normal(family.coordinates)
+        yield ImpactCase(mass, _rows_of_rank(rng, family), velocity, rank=family.rank)
+
+
+def approaching(case: ImpactCase) -> ImpactCase:
+    """The case with its first row's sign chosen so that this contact approaches."""
+    jacobian = case.contact_jacobian.copy()
+    if jacobian[0] @ case.velocity > 0.0:
+        jacobian[0] *= -1.0
+    return replace(case, contact_jacobian=jacobian)
+
+
+def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
+    """Yield impacts in whole numbers (as doubles): M = B Bᵀ + 1, so that rationals stay short."""
+    rng = np.random.default_rng([seed, *(round(number) for number in family), 1])
+    d = family.coordinates
+    for _ in range(count):
+        factor = rng.integers(-3, 4, (d, d)).astype(np.float64)
+        velocity = rng.integers(-9, 10, d).astype(np.float64)
+        velocity[0] += not velocity.any()
+        yield ImpactCase(factor @ factor.T + np.eye(d), _rows_of_rank(rng, family), velocity, rank=family.rank)
+
+
+def _mass_of_condition(rng: np.random.Generator, size: int, condition_number: float) -> Floats:
+    """Return a symmetric positive definite matrix with log-spread eigenvalues between 1/sqrt(κ) and sqrt(κ)."""
+    axes, _ = np.linalg.qr(rng.standard_normal((size, size)))
+    half = 0.5 * np.log10(condition_number)
+    eigenvalues = 10.0 ** np.linspace(-half, half, size) if size > 1 else np.ones(1)
+    mass = (axes * eigenvalues) @ axes.T
+    return 0.5 * (mass + mass.T)
+
+
+def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
+    """Return (c, d) whole-number rows of exact rank `family.rank`, the first `rank` of them independent."""
+    rank, spare = family.rank, family.contacts - family.rank
+    while True:
+        basis = rng.integers(-WHOLE, WHOLE + 1, (rank, family.coordinates)).astype(np.float64)
+        if np.linalg.matrix_rank(basis) == rank:
+            break
+    mixing = rng.integers(-2, 3, (spare, rank)).astype(np.float64)
+    return np.vstack([basis, mixing @ basis])
+
+
+# Impacts on which equalities and complementarity have the same exact answer, so that both can be measured: the approach
+# is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes at every contact, so that the equality law (21) and
+# Newton's LCP have one and the same v⁺ (to the rounding of v⁻ in nearly dependent directions).
+def timed_problems(families: tuple[str, ...] = ("conditioning", "contacts"), seed: int = 0) -> tuple[ImpactCase, ...]:
+    """Return the problems: conditioning of M and of the rows at d = 6, c = 4; contact counts 4 to 300 at d = 12."""
+    problems = []
+    if "conditioning" in families:
+        for condition in (1e0, 1e4, 1e8):
+            for closeness in (1.0, 1e-4, 1e-8):
+                problems.append(_timed_problem("conditioning", 6, 4, condition, closeness, seed))
+    if "contacts" in families:
+        for contacts in (4, 12, 60, 300):
+            problems.append(_timed_problem("contacts", 12, contacts, 1e2, 1.0, seed))
+    return tuple(problems)
+
+
+def _timed_problem(family: str, d: int, c: int, condition: float, closeness: float, seed: int) -> ImpactCase:
+    rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
+    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass = axes * condition ** -np.linspace(0.0, 1.0, d) @ axes.T
+    mass = 0.5 * (mass + mass.T)
+    rows = _near_rows(rng, d, c, closeness)
+    lower = np.linalg.cholesky(mass)
+    whitened = np.linalg.solve(lower, rows.T).T
+    approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.linalg.norm(whitened, axis=1))
+    sliding = rng.normal(size=d)
+    _, values, right = np.linalg.svd(whitened, full_matrices=False)
+    for direction in right[values > 1e-12 * values[0]]:
+        sliding -= (direction @ sliding) * direction
+    sliding /= max(float(np.linalg.norm(sliding)), 1.0)
+    v = np.linalg.solve(lower.T, approach / float(np.linalg.norm(approach)) + sliding)
+    return ImpactCase(mass, rows, v, 0.5, family, mass_condition=condition, closeness=closeness)
+
+
+def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Floats:
+    """Half of the rows lie `closeness` beside the other half; many contacts span two thirds of the motion."""
+    rank = min(c, (2 * d) // 3)
+    base = rng.integers(-4, 5, size=(c, rank)) @ rng.integers(-4, 5, size=(rank, d)).astype(float)
+    if c <= d:
+        base = rng.normal(size=(c, d))
+    if closeness < 1.0:
+        half = c // 2
+        base[half:] = base[: c - half] + closeness * rng.normal(size=(c - half, d))
+    return base

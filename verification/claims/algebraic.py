@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from verification.claims.instances import Instance
 from verification.finding import Column, Row, Table
-
-Floats = NDArray[np.float64]
+from verification.impacts import Floats, ImpactCase
 
 EPSILON = float(np.finfo(np.float64).eps)
 
@@ -46,7 +43,7 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
     return 0.5 * float(velocity @ mass_matrix @ velocity)
 
 
-def energy_gains(instances: Sequence[Instance], velocities: Sequence[Floats]) -> Floats:
+def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) -> Floats:
     """Relative energy gain of each impact, in double-double arithmetic, plus the bound of its error."""
     from reference.energy_gain import bulk_energy_gain
 
@@ -56,7 +53,7 @@ def energy_gains(instances: Sequence[Instance], velocities: Sequence[Floats]) ->
     return gain + uncertainty
 
 
-def quadratic_form(instance: Instance) -> float:
+def quadratic_form(instance: ImpactCase) -> float:
     """vᵀ Jᵀ W† J v [J], W = J M⁻¹ Jᵀ, from the independent rows alone: the form of (18) and (24) without a factor."""
     rows = instance.contact_jacobian[: instance.rank]
     closing = rows @ instance.velocity

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from verification.claims.algebraic import COLUMNS, summary, within_bound
 from verification.claims.claim import Claim
-from verification.claims.instances import Family
 from verification.claims.losses import AS_PRINTED, EXACT, PASSIVE, WITH_HALF, loss_batches
 from verification.finding import Table, table_of
+from verification.impacts import Family
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

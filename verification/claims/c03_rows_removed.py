@@ -12,8 +12,8 @@ from iapb import resolve_impact
 from verification.claims.algebraic import COLUMNS, kinetic_energy, solve_bound, summary, within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.exact_pseudo_inverse import pseudo_inverse_velocity
-from verification.claims.instances import Family, Instance, draw, whole_numbers
 from verification.finding import Table, table_of
+from verification.impacts import Family, ImpactCase, draw_of_rank, whole_numbers
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -40,23 +40,23 @@ def measure(study: Study) -> Table:
 
 
 def _batches(family: Family, count: int, seed: int) -> Iterator[dict[str, Any]]:
-    instances = list(draw(family, count, seed))
+    instances = list(draw_of_rank(family, count, seed))
     bound = worst(_bound(instance, family.condition_number) for instance in instances)
     for part, method in ((PRINTED, "gram_pinv"), (FACTORED, "factored")):
         yield {**_names(family), "condition number": family.condition_number, "part": part, "impacts": count,
                "error": worst(_distance(instance, method) for instance in instances), "bound": bound}  # fmt: skip
 
 
-def _bound(instance: Instance, condition_number: float) -> float:
+def _bound(instance: ImpactCase, condition_number: float) -> float:
     """Both ways solve with M and, in effect, with W of the independent rows."""
-    mass, rows, velocity, rank = instance
+    (mass, rows, velocity), rank = instance.arrays, instance.rank
     delassus = rows[:rank] @ np.linalg.solve(mass, rows[:rank].T)
     return solve_bound(len(velocity), max(condition_number, float(np.linalg.cond(delassus))))
 
 
-def _distance(instance: Instance, method: str) -> float:
+def _distance(instance: ImpactCase, method: str) -> float:
     """|v⁺(all rows) − v⁺(independent rows)| in the kinetic metric, relative to |v⁻|."""
-    mass, rows, velocity, rank = instance
+    (mass, rows, velocity), rank = instance.arrays, instance.rank
     everything = resolve_impact(mass, rows, velocity, RESTITUTION, method=method).velocity
     chosen = resolve_impact(mass, rows[:rank], velocity, RESTITUTION, method="gram_cholesky").velocity
     return float(np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity)))
@@ -66,7 +66,7 @@ def _exact_batches(family: Family, count: int, seed: int) -> Iterator[dict[str, 
     from reference.exact import exact_impact
 
     e, wrong_inverse, wrong_rows = Fraction(RESTITUTION), 0, 0
-    for mass, rows, velocity, _ in whole_numbers(family, count, seed):
+    for mass, rows, velocity in (case.arrays for case in whole_numbers(family, count, seed)):
         first = exact_impact(mass, rows, velocity, e).velocity
         wrong_inverse += pseudo_inverse_velocity(mass, rows, velocity, e) != first
         wrong_rows += exact_impact(mass, rows[::-1], velocity, e).velocity != first

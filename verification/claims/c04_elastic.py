@@ -9,8 +9,8 @@ import numpy as np
 from iapb import resolve_impact
 from verification.claims.algebraic import COLUMNS, energy_gains, solve_bound, summary, within_bound, worst
 from verification.claims.claim import Claim
-from verification.claims.instances import Family, draw, whole_numbers
 from verification.finding import Table, table_of
+from verification.impacts import Family, draw_of_rank, whole_numbers
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -34,8 +34,8 @@ def measure(study: Study) -> Table:
 
 
 def _batch(family: Family, count: int, seed: int) -> dict[str, Any]:
-    instances = list(draw(family, count, seed))
-    after = [resolve_impact(*instance[:3], 1.0).velocity for instance in instances]
+    instances = list(draw_of_rank(family, count, seed))
+    after = [resolve_impact(*instance.arrays, 1.0).velocity for instance in instances]
     return {**_names(family), "part": DOUBLES, "condition number": family.condition_number, "impacts": count,
             "error": worst(np.abs(energy_gains(instances, after))),
             "bound": solve_bound(family.coordinates, family.condition_number)}  # fmt: skip
@@ -44,7 +44,7 @@ def _batch(family: Family, count: int, seed: int) -> dict[str, Any]:
 def _exact_batch(family: Family, count: int, seed: int) -> dict[str, Any]:
     from reference.exact import exact_impact
 
-    impacts = [exact_impact(*instance[:3], 1) for instance in whole_numbers(family, count, seed)]
+    impacts = [exact_impact(*instance.arrays, 1) for instance in whole_numbers(family, count, seed)]
     error = worst(float(abs(i.energy_after - i.energy_before)) for i in impacts)
     return {**_names(family), "part": EXACT, "impacts": count, "error": error, "bound": 0.0}
 

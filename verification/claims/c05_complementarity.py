@@ -10,8 +10,8 @@ import numpy as np
 from iapb import resolve_impact
 from verification.claims.algebraic import COLUMNS, solve_bound, summary, within_bound, worst
 from verification.claims.claim import Claim
-from verification.claims.instances import Family, Instance, approaching, draw
 from verification.finding import Table, table_of
+from verification.impacts import Family, ImpactCase, approaching, draw_of_rank
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -30,7 +30,7 @@ def measure(study: Study) -> Table:
 
 
 def _batch(family: Family, e: float, solver: str, count: int, seed: int) -> dict[str, Any]:
-    instances = (approaching(instance) for instance in draw(family, count, seed))
+    instances = (approaching(instance) for instance in draw_of_rank(family, count, seed))
     return {
         "part": f"LCP by {solver}", "coordinates": family.coordinates, "contacts": 1,
         "condition number": family.condition_number, "restitution": e, "impacts": count,
@@ -39,12 +39,12 @@ def _batch(family: Family, e: float, solver: str, count: int, seed: int) -> dict
     }  # fmt: skip
 
 
-def _difference(instance: Instance, e: float, solver: str) -> float:
+def _difference(instance: ImpactCase, e: float, solver: str) -> float:
     """|p − p_LCP| relative to p_LCP."""
     from reference.complementarity.laws import newton_lcp
     from reference.complementarity.problem import ImpactProblem
 
-    mass, rows, velocity, _ = instance
+    mass, rows, velocity = instance.arrays
     ours = resolve_impact(mass, rows, velocity, e).impulses
     theirs = newton_lcp(ImpactProblem.from_impact(mass, rows, velocity, e), solver).impulse
     return float(np.abs(ours - theirs)[0] / np.abs(theirs)[0])

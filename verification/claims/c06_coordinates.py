@@ -18,8 +18,8 @@ from verification.claims.algebraic import (
     worst,
 )
 from verification.claims.claim import Claim
-from verification.claims.instances import Family, Instance, draw, whole_numbers
 from verification.finding import Table, table_of
+from verification.impacts import Family, ImpactCase, draw_of_rank, whole_numbers
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -47,7 +47,7 @@ def measure(study: Study) -> Table:
 
 def _batches(family: Family, count: int, seed: int) -> Iterator[dict[str, Any]]:
     rng = np.random.default_rng([seed, family.coordinates, family.contacts])
-    instances = list(draw(family._replace(condition_number=MASS_CONDITION), count, seed))
+    instances = list(draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed))
     changes = [random_change(rng, family.coordinates, family.condition_number) for _ in instances]
     bound = solve_bound(family.coordinates, MASS_CONDITION * family.condition_number**2)
     for e in RESTITUTIONS:
@@ -64,9 +64,9 @@ def random_change(rng: np.random.Generator, size: int, condition_number: float) 
     return (left * np.logspace(0.0, -np.log10(condition_number), size)) @ right
 
 
-def _distance(instance: Instance, change: Floats, e: float) -> float:
+def _distance(instance: ImpactCase, change: Floats, e: float) -> float:
     """|v⁺ − T w⁺| in the kinetic metric relative to |v⁻|, with M' = TᵀMT, J' = JT, w = T⁻¹v."""
-    mass, rows, velocity, _ = instance
+    mass, rows, velocity = instance.arrays
     here = resolve_impact(mass, rows, velocity, e).velocity
     new_mass = change.T @ mass @ change
     there = resolve_impact(0.5 * (new_mass + new_mass.T), rows @ change, np.linalg.solve(change, velocity), e)
@@ -78,7 +78,7 @@ def _exact_batch(family: Family, count: int, seed: int) -> dict[str, Any]:
     from reference.exact import exact_impact
 
     different = 0
-    for mass, rows, velocity, _ in whole_numbers(family, count, seed):
+    for mass, rows, velocity in (case.arrays for case in whole_numbers(family, count, seed)):
         shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
         unshear = np.round(np.linalg.inv(shear))  # whole numbers, as the determinant is 1
         here = np.array(exact_impact(mass, rows, velocity, 0.5).velocity)

@@ -16,9 +16,9 @@ from verification.claims.algebraic import (
     worst,
 )
 from verification.claims.claim import Claim
-from verification.claims.instances import Family, draw
 from verification.claims.trace import Trace
 from verification.finding import Table, table_of
+from verification.impacts import Family, draw_of_rank
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -42,8 +42,8 @@ def measure(study: Study) -> Table:
 
 
 def _random(family: Family, e: float, count: int, seed: int) -> dict[str, Any]:
-    instances = list(draw(family, count, seed))
-    after = [resolve_impact(*instance[:3], e).velocity for instance in instances]
+    instances = list(draw_of_rank(family, count, seed))
+    after = [resolve_impact(*instance.arrays, e).velocity for instance in instances]
     return {"part": RANDOM, "coordinates": family.coordinates, "contacts": family.contacts,
             "condition number": family.condition_number, "restitution": e, "impacts": count,
             "error": worst(energy_gains(instances, after)),

@@ -12,8 +12,8 @@ from iapb import resolve_impact
 from verification.claims.algebraic import within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.conditions import columns
-from verification.claims.instances import Family, draw
 from verification.finding import Column, Table, table_of
+from verification.impacts import Family, draw_of_rank
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -48,8 +48,8 @@ def measure(study: Study) -> Table:
 
 
 def _impacts(family: Family, count: int, seed: int) -> dict[str, Any]:
-    instances = draw(family, count, seed)
-    moved = worst(float(np.abs(resolve_impact(*i[:3], -1.0).velocity - i.velocity).max()) for i in instances)
+    instances = draw_of_rank(family, count, seed)
+    moved = worst(float(np.abs(resolve_impact(*i.arrays, -1.0).velocity - i.velocity).max()) for i in instances)
     return {"part": RESOLVER, "contacts": family.contacts, "impacts": count, "error": moved, "bound": 0.0}
 
 

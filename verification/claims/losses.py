@@ -18,7 +18,7 @@ from verification.claims.algebraic import (
     solve_bound,
     worst,
 )
-from verification.claims.instances import Family, Instance, draw, whole_numbers
+from verification.impacts import Family, ImpactCase, draw_of_rank, whole_numbers
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -38,8 +38,8 @@ def loss_batches(study: Study, families: Sequence[Family], count: int) -> Iterat
 
 
 def _batch(family: Family, e: float, count: int, seed: int) -> Iterator[dict[str, Any]]:
-    instances = list(draw(family, count, seed))
-    after = [resolve_impact(*instance[:3], e).velocity for instance in instances]
+    instances = list(draw_of_rank(family, count, seed))
+    after = [resolve_impact(*instance.arrays, e).velocity for instance in instances]
     forms = np.array([quadratic_form(instance) for instance in instances])
     energy = np.array([kinetic_energy(i.mass_matrix, i.velocity) for i in instances])
     gains = energy_gains(instances, after)
@@ -58,11 +58,11 @@ def _exact_batch(family: Family, e: float, count: int, seed: int) -> dict[str, A
             "error": worst(map(float, misfits)), "bound": 0.0}  # fmt: skip
 
 
-def _exact_misfit(instance: Instance, e: Fraction) -> Fraction:
+def _exact_misfit(instance: ImpactCase, e: Fraction) -> Fraction:
     """Loss minus ½(1 − e²) vᵀJᵀW†Jv, both without rounding."""
     from reference.exact import exact_impact
 
-    mass, rows, velocity, _ = instance
+    mass, rows, velocity = instance.arrays
     after = exact_impact(mass, rows, velocity, e)
     plastic = exact_impact(mass, rows, velocity, 0)
     # e = 0 sends v to v − Pv, so vᵀM(v − v⁺) = vᵀMPv is the form itself: independent of the loss at e.

@@ -22,8 +22,8 @@ from reference.complementarity.adhesion import adhesion
 from reference.complementarity.laws import LAWS as laws
 from reference.complementarity.laws import Outcome
 from reference.complementarity.problem import ImpactProblem
-from verification.complementarity.cases import ImpactCase
 from verification.finding import Failure, attempt
+from verification.impacts import ImpactCase
 
 # Two motions are the same below this distance (kinetic metric, of |v⁻|): what C05 asks for. Active-set solutions of
 # well-conditioned cases end near 1e-15; true disagreement starts near 1e-4 in all families.

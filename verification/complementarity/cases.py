@@ -16,30 +16,9 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from verification.impacts import ImpactCase
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ImpactCase:
-    """One frictionless impact: M (d, d), J (c, d), v (d,), e, where it comes from, and rows (k, d) that only touch."""
-
-    family: str
-    mass_matrix: Floats
-    contact_jacobian: Floats
-    velocity: Floats
-    restitution: float
-    touching: Floats | None = None
-
-    @property
-    def contacts(self) -> int:
-        """c."""
-        return len(self.contact_jacobian)
-
-    @property
-    def redundancy(self) -> int:
-        """Rows beyond the rank of J."""
-        return self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian)) if self.contacts else 0
 
 
 @dataclass(frozen=True)
@@ -69,7 +48,7 @@ def random_cases(
             for e in restitutions:
                 for mass, rows, velocity in drawn:
                     closing = rows @ velocity < 0.0
-                    yield ImpactCase(family.name, mass, rows[closing], velocity, e, rows[~closing])
+                    yield ImpactCase(mass, rows[closing], velocity, e, family.name, touching=rows[~closing])
 
 
 def two_contacts(
@@ -86,7 +65,7 @@ def two_contacts(
     lower = np.linalg.cholesky(random_mass_matrix(rng, coordinates))
     lengths = np.exp(rng.normal(size=(2, 1)))
     velocity = np.linalg.solve(lower.T, u)
-    return ImpactCase("two contacts", lower @ lower.T, lengths * (rows @ lower.T), velocity, 0.0)
+    return ImpactCase(lower @ lower.T, lengths * (rows @ lower.T), velocity, 0.0, "two contacts")
 
 
 def random_mass_matrix(rng: np.random.Generator, coordinates: int) -> Floats:

@@ -13,8 +13,8 @@ from iapb.contact.kernels.impact import make_impact_work
 from iapb.errors import MissingDependencyError
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solvers import solve
-from verification.complementarity.cases import ImpactCase
 from verification.cost.loops import repeat_impact
+from verification.impacts import ImpactCase
 
 Floats = NDArray[np.float64]
 Call = Callable[[], Floats]

@@ -8,18 +8,17 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
-from verification.complementarity.cases import ImpactCase, random_cases
+from verification.complementarity.cases import random_cases
 from verification.complementarity.scene_cases import scene_impacts
 from verification.complementarity.step_cost import patch, pile
 from verification.finding import Failure, attempt
 from verification.hard_cases import HARD_CASES, HardCase
+from verification.impacts import Floats, ImpactCase
 
-Floats = NDArray[np.float64]
 Maker = Callable[[str], "ImpactProblem"]  # from its name
 
 # Of the catalogue, those with few contacts; a thousand copies of one row take the slowest solvers minutes.

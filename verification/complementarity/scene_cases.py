@@ -18,7 +18,7 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
 from reference.worlds import run_world
-from verification.complementarity.cases import ImpactCase
+from verification.impacts import ImpactCase
 
 Floats = NDArray[np.float64]
 
@@ -57,8 +57,8 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
         rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
         closing = rows @ v < -approach
         case = ImpactCase(
-            f"scene {run.scene_name}", mechanism.mass_matrix(run.q[blow.step]), rows[closing], v, float(values[0]),
-            rows[~closing],
+            mechanism.mass_matrix(run.q[blow.step]), rows[closing], v, float(values[0]), f"scene {run.scene_name}",
+            touching=rows[~closing],
         )  # fmt: skip
         _check(case, run, blow)
         cases.append(case)

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError
 from reference.one_thread import one_thread
-from verification.complementarity.cases import ImpactCase
 from verification.complementarity.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
 from verification.finding import Failure, attempt, failure_of
+from verification.impacts import ImpactCase
 
 Floats = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
     up = np.array([0.0, 0.0, 1.0])
     rows = np.column_stack([np.tile(up, (contacts, 1)), np.cross(points, up)])
     velocity = np.array([0.3, 0.1, -1.0, *rng.uniform(-0.2, 0.2, 3)])
-    return ImpactCase("patch", np.diag([2.0, 2.0, 2.0, 0.5, 0.5, 0.8]), rows, velocity, 0.0)
+    return ImpactCase(np.diag([2.0, 2.0, 2.0, 0.5, 0.5, 0.8]), rows, velocity, 0.0, "patch")
 
 
 def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
@@ -104,7 +104,7 @@ def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
     velocity = np.zeros(3 * boxes)
     velocity[1::3] = -np.cumsum(rng.uniform(0.5, 1.0, boxes))
     velocity[2::3] = rng.uniform(-0.1, 0.1, boxes)
-    return ImpactCase("pile", np.diag(np.tile([1.0, 1.0, 2.0 / 3.0], boxes)), rows, velocity, 0.0)
+    return ImpactCase(np.diag(np.tile([1.0, 1.0, 2.0 / 3.0], boxes)), rows, velocity, 0.0, "pile")
 
 
 def impact_cost(

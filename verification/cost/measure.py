@@ -15,16 +15,15 @@ from iapb.errors import IapbError, SolverError
 from reference.complementarity import ImpactProblem, solve
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
-from verification.cost.problems import Floats, TimedProblem, timed_problems
 from verification.finding import Failure, attempt
+from verification.impacts import Floats, ImpactCase, timed_problems
 
-TimedMethod = Callable[[TimedProblem], Floats]
+TimedMethod = Callable[[ImpactCase], Floats]
 
 
 def _engine(method: str, budget: int | None = None) -> TimedMethod:
-    def call(problem: TimedProblem) -> Floats:
-        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
-        return resolve_impact(*given, method=method, budget=budget).velocity
+    def call(problem: ImpactCase) -> Floats:
+        return resolve_impact(*problem.arrays, problem.restitution, method=method, budget=budget).velocity
 
     return call
 
@@ -32,9 +31,8 @@ def _engine(method: str, budget: int | None = None) -> TimedMethod:
 def _solver(name: str) -> TimedMethod:
     """The impact as a complementarity problem in p ≥ 0, made and solved anew at each call."""
 
-    def call(problem: TimedProblem) -> Floats:
-        given = problem.mass_matrix, problem.contact_jacobian, problem.velocity, problem.restitution
-        solution = solve(ImpactProblem.from_impact(*given), name)
+    def call(problem: ImpactCase) -> Floats:
+        solution = solve(ImpactProblem.from_impact(*problem.arrays, problem.restitution), name)
         if solution.impulse is None:
             raise SolverError(f"{name} gave no impulse: {solution.note}")
         return solution.velocity_plus
@@ -107,7 +105,7 @@ class Measurement:
 
 
 def work_precision(
-    problems: Iterable[TimedProblem] | None = None,
+    problems: Iterable[ImpactCase] | None = None,
     methods: Iterable[str] | None = None,
     rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
@@ -140,7 +138,7 @@ def work_precision(
 
 
 def _measure(
-    problem: TimedProblem, names: tuple[str, ...], rounds: int, failures: list[Failure] | None
+    problem: ImpactCase, names: tuple[str, ...], rounds: int, failures: list[Failure] | None
 ) -> list[Measurement]:
     tried = {name: attempt(f"{problem.label}, {name}", partial(_try, name, problem), failures) for name in names}
     answers = {name: answer for name, answer in tried.items() if answer is not None}  # trying them warms up, too
@@ -149,13 +147,13 @@ def _measure(
     return [_record(problem, name, answer, times.get(name, [])) for name, answer in answers.items()]
 
 
-def _seconds_to_fail(name: str, problem: TimedProblem) -> float:
+def _seconds_to_fail(name: str, problem: ImpactCase) -> float:
     started = time.perf_counter()
     _try(name, problem)
     return time.perf_counter() - started
 
 
-def _try(name: str, problem: TimedProblem) -> Floats | str:
+def _try(name: str, problem: ImpactCase) -> Floats | str:
     """v⁺, or the reason why there is none."""
     try:
         v_plus = METHODS[name](problem)
@@ -164,7 +162,7 @@ def _try(name: str, problem: TimedProblem) -> Floats | str:
     return v_plus if np.all(np.isfinite(v_plus)) else "the velocity is not finite"
 
 
-def _interleaved(problem: TimedProblem, names: list[str], rounds: int) -> dict[str, list[float]]:
+def _interleaved(problem: ImpactCase, names: list[str], rounds: int) -> dict[str, list[float]]:
     """Times of each method, one call of every method per round: a slow minute of the machine hits all alike.
 
     Each round starts with another method, since the one that follows a large solver finds its caches cold.
@@ -182,7 +180,7 @@ def _interleaved(problem: TimedProblem, names: list[str], rounds: int) -> dict[s
     return times
 
 
-def _record(problem: TimedProblem, name: str, answer: Floats | str, times: list[float]) -> Measurement:
+def _record(problem: ImpactCase, name: str, answer: Floats | str, times: list[float]) -> Measurement:
     failed = isinstance(answer, str)
     error, gain, residual = (np.nan, np.nan, np.nan) if isinstance(answer, str) else _quality(problem, answer)
     lower, median, upper = np.percentile(times, [25, 50, 75]) if times else (np.nan, np.nan, np.nan)
@@ -204,7 +202,7 @@ def _record(problem: TimedProblem, name: str, answer: Floats | str, times: list[
     )
 
 
-def _quality(problem: TimedProblem, v_plus: Floats) -> tuple[float, float, float]:
+def _quality(problem: ImpactCase, v_plus: Floats) -> tuple[float, float, float]:
     """Forward error, energy gain and restitution residual."""
     lower = np.linalg.cholesky(problem.mass_matrix)
     speed = float(np.linalg.norm(lower.T @ problem.velocity))

@@ -6,9 +6,9 @@ import pytest
 from iapb.contact.impact import resolve_impact
 from verification.claims import c03_rows_removed, c04_elastic, c05_complementarity, check_claims, losses
 from verification.claims.exact_pseudo_inverse import pseudo_inverse
-from verification.claims.instances import Family, draw
 from verification.claims.study import Study
 from verification.finding import LIMITED, REPRODUCED
+from verification.impacts import Family, draw_of_rank
 
 
 class Faulty:
@@ -67,7 +67,7 @@ def test_a_planted_fault_is_noticed(monkeypatch, claim, fault):
 
 def test_instances_repeat_and_have_the_rank_they_say():
     family = Family(6, 12, 4, 1e4)
-    first, second = list(draw(family, 3, seed=7)), list(draw(family, 3, seed=7))
+    first, second = list(draw_of_rank(family, 3, seed=7)), list(draw_of_rank(family, 3, seed=7))
     for one, other in zip(first, second, strict=True):
         assert np.array_equal(one.mass_matrix, other.mass_matrix)
         assert np.linalg.matrix_rank(one.contact_jacobian) == one.rank == 4

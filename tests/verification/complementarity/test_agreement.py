@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from iapb.errors import ArgumentError
 from verification.complementarity.agreement import SAME, compare_case, compare_cases, iapb
 from verification.complementarity.agreement_map import agreement_map, contradicts, two_contact_map
-from verification.complementarity.cases import FAMILIES, ImpactCase, random_cases, two_contacts
+from verification.complementarity.cases import FAMILIES, random_cases, two_contacts
+from verification.impacts import ImpactCase
 
 CASES = list(random_cases(6, seed=11))
 FOUND = compare_cases(CASES)

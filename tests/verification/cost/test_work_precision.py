@@ -7,7 +7,7 @@ import pytest
 
 from verification.cost.kernels import kernel_times
 from verification.cost.measure import METHODS, work_precision
-from verification.cost.problems import timed_problems
+from verification.impacts import timed_problems
 
 
 @pytest.mark.parametrize("problem", timed_problems(), ids=lambda problem: problem.label)
