@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.effects import decide_effects
 from iapb.mechanics.energy import energy_of_run
 from iapb.recording import Record, chunk_steps, contact_table, impact_table, joined, make_record
 from iapb.run import EffectRow, Run
@@ -95,6 +94,4 @@ def _energy(run: Run, system: System) -> dict[str, Floats]:
 
 
 def _effects(simulation: Any) -> tuple[EffectRow, ...]:
-    found = decide_effects(simulation.scene, simulation.law.name, simulation.coupling.name,
-                           getattr(simulation.law, "rendering", None))
-    return tuple(EffectRow(effect.name, effect.active, effect.reason) for effect in found)
+    return tuple(EffectRow(effect.name, effect.active, effect.reason) for effect in simulation.effects)

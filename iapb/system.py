@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from iapb.contact.kernels.impact_friction import make_friction_work
 from iapb.contact.kernels.step import advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
+from iapb.contact.laws import ImpulseAugmented
+from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
@@ -90,10 +92,17 @@ class System:
         """The compiled step of one of the engine's laws, to be called again and again (cached)."""
         return self._advances.setdefault(_key(law), Entry(advance))
 
-    def make_port(self, coupling: Coupling, rendering: str = "full", impulses: bool = True,
-                  external: bool = False) -> Port:
-        """Hand, coupling and device at the scene's start; `external`: the device moves by itself."""
-        return make_port(self, coupling, rendering, impulses, external)
+    def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Port:
+        """Hand, coupling and device at the scene's start; `external`: the device moves by itself.
+
+        `effects` is what `decide` gives for the law; default: of ImpulseAugmented().
+        """
+        decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
+        return make_port(self, coupling, active_names(decided), external)
+
+    def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
+        """What is on under a law and a coupling: the world, the port and the record are made from it."""
+        return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
 
 
 def _key(law: Any) -> tuple[Any, ...]:
@@ -122,20 +131,15 @@ def make_world(system: System, law: Any) -> World:
     """Collect the parameters of the scene and the switches of its effects under a law."""
     scene, contact, mechanism = system.scene, system.scene.contact, system.mechanism
     limit = np.full(mechanism.nv, np.inf)
-    scaled = law.impulses and law.rendering in ("scale", "spread") and force_limit(scene) is not None
+    on = active_names(system.decide(law))
+    scaled = "device_limits" in on and law.rendering in ("scale", "spread")
     if scaled:
         limit[slice(*system.tool_dofs)] = force_limit(scene)
     switches = Switches(
-        gravity=bool(np.any(system.gravity)),
-        varying_inertia=not mechanism.has_constant_mass_matrix,
-        velocity_terms=mechanism.has_velocity_terms,
-        impulses=bool(law.impulses) and bool(np.any(system.restitutions > -1.0)),
-        unequal_restitution=law.impulses and len(system.restitutions) > 1,
-        impact_friction=law.impulses and law.friction_in_impacts and slides_in_impacts(scene),
-        clustering=contact.cluster_distance > 0.0,
+        **{name: name in on for name in Switches._fields if name in EFFECT_NAMES},
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
-        contacts=len(system.pairs) > 0,
+        contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions")),
         broad_phase=len(system.pairs) > WORTHWHILE_PAIRS,
     )
     integrator = INTEGRATORS[law.integrator]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, NoCoupling
-from iapb.haptics.kernels import FOUR_CHANNEL, Port
+from iapb.haptics.kernels import Port
 from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.scene import Scene
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def make_port(system: System, coupling: Coupling, rendering: str = "full", impulses: bool = True,
-              external: bool = False) -> Port:
+def make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Port:
     """Allocate the hand's side: the device starts where the tool does, with its velocity.
 
-    `impulses` says whether the law has impulses, which the device's waveform then shapes; `external` that the device
-    moves by itself: it is late and coarse by itself, so the port adds neither delay nor sensors.
+    `on` are the names of the effects that are on; `external` says that the device moves by itself: it is late and
+    coarse by itself, so the port adds neither delay nor sensors.
     """
+    on -= {"delay", "quantisation"} if external else set()
     scene, d = system.scene, system.mechanism.nv
     held = system.tool_tree >= 0
     if not held and not isinstance(coupling, NoCoupling):
@@ -49,8 +49,8 @@ def make_port(system: System, coupling: Coupling, rendering: str = "full", impul
         varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
         device_lower=lower, sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_),
         clock=np.zeros(1, np.int64), **_hand(system, device), **_gains(coupling, v_stop - v_start),
-        **_actuators(scene, rendering, (q_stop - q_start, v_stop - v_start), external),
-        **_pulses(scene, system.dt, v_stop - v_start, impulses and coupling.kind == FOUR_CHANNEL),
+        **_actuators(scene, (q_stop - q_start, v_stop - v_start), on),
+        **_pulses(scene, system.dt, v_stop - v_start, "waveform" in on),
         **zeros, **tool_zeros,
     ))  # fmt: skip
 
@@ -79,16 +79,16 @@ def _gains(coupling: Coupling, size: int) -> dict[str, Any]:
     return {name: _per_coordinate(gains.get(name), size) for name in ("stiffness", "damping")}
 
 
-def _actuators(scene: Scene, rendering: str, sizes: tuple[int, int], external: bool) -> dict[str, Any]:
+def _actuators(scene: Scene, sizes: tuple[int, int], on: frozenset[str]) -> dict[str, Any]:
     """What the device adds: limits, damping, sensors, delay."""
     (nq, size), settings, limit = sizes, scene.device, force_limit(scene)
-    resolution = settings.position_resolution if settings is not None and not external else None
-    damping = settings.damping if settings is not None else None
-    slots = 1 + (settings.delay if settings is not None and not external else 0)
+    damped, limited, quantised = ("device_damping" in on, "device_limits" in on, "quantisation" in on)
+    slots = 1 + (settings.delay if settings is not None and "delay" in on else 0)
     return {
-        "device_damping": _per_coordinate(damping, size), "damped": any(damping or ()),
-        "force_limit": _per_coordinate(limit, size, np.inf), "limited": limit is not None and rendering != "full",
-        "resolution": _per_coordinate(resolution, nq), "quantised": any(resolution or ()),
+        "device_damping": _per_coordinate(settings.damping if settings and damped else None, size), "damped": damped,
+        "force_limit": _per_coordinate(limit, size, np.inf), "limited": limited,
+        "resolution": _per_coordinate(settings.position_resolution if settings and quantised else None, nq),
+        "quantised": quantised,
         "delayed_force": np.zeros((slots, size)), "delayed_q": np.zeros((slots, nq)),
         "delayed_v": np.zeros((slots, size)),
     }  # fmt: skip
@@ -96,7 +96,7 @@ def _actuators(scene: Scene, rendering: str, sizes: tuple[int, int], external: b
 
 def _pulses(scene: Scene, dt: float, size: int, shaped: bool) -> dict[str, Any]:
     """How the device gives an impulse to the hand."""
-    weights = waveform_weights(scene.device.waveform if shaped and scene.device is not None else "step", dt)
+    weights = waveform_weights(scene.device.waveform if shaped and scene.device else "step", dt)
     return {"pulsed": len(weights) > 1, "pulse_weights": weights, "pulse_pending": np.zeros((len(weights), size)),
             "pulse_balance": np.zeros(1), "pulse_held": np.zeros(1, np.int64)}  # fmt: skip
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact.laws import StepResult
+from iapb.contact.laws import OWN_RESTITUTION, StepResult
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
@@ -62,6 +62,7 @@ class RigidConstraints:
     scheme: str = "automatic"
     friction: str = "none"
     name = "rigid constraints"
+    uses = frozenset({OWN_RESTITUTION})
 
     def __post_init__(self) -> None:
         for argument, value, known in (("scheme", self.scheme, SCHEMES), ("friction", self.friction, FRICTION_LAWS)):

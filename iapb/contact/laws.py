@@ -25,6 +25,11 @@ IMPULSE_AUGMENTED = "impulse-augmented penalty"
 WITH_IMPACT_FRICTION = "impulse-augmented penalty with impact friction"
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
+# Parts of a scene's contact section: what a law makes of it is its attribute `uses`.
+PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
+IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
+EVERYTHING = frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION})
+
 
 class StepResult(NamedTuple):
     """What a law returns for one step (d generalized velocities)."""
@@ -57,7 +62,8 @@ class ContactLaw(Protocol):
     """A contact law: the whole step.
 
     A law may also fill ``state.contacts`` (with ``state.contact_count[0]``), for the record. Stateless where possible:
-    what changes lives in `state`.
+    what changes lives in `state`. An attribute `uses` names the parts of the contact section that count, for
+    `iapb.effects`; without it all are taken to.
     """
 
     @property
@@ -134,6 +140,11 @@ class ImpulseAugmented(_EngineLaw):
         return WITH_IMPACT_FRICTION if self.friction_in_impacts else IMPULSE_AUGMENTED
 
     @property
+    def uses(self) -> frozenset[str]:
+        """Parts of the contact section that the law uses."""
+        return EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}
+
+    @property
     def settings(self) -> dict[str, Any]:
         """Integrator, rendering, and whether friction acts in impacts."""
         return {"integrator": self.integrator, "rendering": self.rendering,
@@ -148,8 +159,14 @@ class Penalty(_EngineLaw):
     impulses = False
     friction_in_impacts = False
     rendering = "full"
+    uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS})  # the record says which contacts are new
 
     @property
     def settings(self) -> dict[str, Any]:
         """Integrator."""
         return {"integrator": self.integrator}
+
+
+ENGINE_LAWS: dict[str, ContactLaw] = {
+    law.name: law for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty())
+}

@@ -34,7 +34,7 @@ def effects(
         found = decide_effects(source)
     else:
         chosen = find_world(world, rendering)
-        found = decide_effects(source, chosen.law.name, chosen.coupling_in(source).name, rendering)
+        found = decide_effects(source, chosen.law, chosen.coupling_in(source))
     on = [effect for effect in found if effect.active]
     print(f"Effects of {source.name}" + (f" in {world}" if world else "") + ": what is on, and what it prevents")
     for effect in on:

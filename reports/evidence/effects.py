@@ -44,7 +44,7 @@ def effects_of(
     chosen = find_world(world)
     measured = {one.effect: one for one in measure_effects(scene, world, progress=progress, failures=failures)}
     effects = []
-    for effect in decide_effects(scene, chosen.law.name, chosen.coupling_in(scene).name, "full"):
+    for effect in decide_effects(scene, chosen.law, chosen.coupling_in(scene)):
         one = measured.get(effect.name)
         cost, change = in_words(one) if one is not None else ("", "")
         effects.append(SceneEffect(

@@ -8,8 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.effects import EFFECTS, Effect, decide_effects
+from iapb.compiled import block
+from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented, Penalty
+from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
+from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
+from iapb.simulation import Simulation
+from reference.time_stepping import RigidConstraints
 
 PEG = load_scene(find_scene("peg_corner"))
 ARM = load_scene(find_scene("arm_pushing"))
@@ -51,7 +56,7 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
 }  # fmt: skip
 
 
-def effect(scene: Scene, name: str, *choices: str | None) -> Effect:
+def effect(scene: Scene, name: str, *choices: Any) -> Effect:
     return next(found for found in decide_effects(scene, *choices) if found.name == name)
 
 
@@ -71,18 +76,18 @@ def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: s
     assert switched_on.left_out
 
 
-@pytest.mark.parametrize("law", ["penalty", "rigid constraints"])
-def test_laws_without_impulses_switch_them_off_and_are_named(law: str) -> None:
+@pytest.mark.parametrize("law", [Penalty(), RigidConstraints()])
+def test_laws_without_impulses_switch_them_off_and_are_named(law: Any) -> None:
     found = effect(PEG, "impulses", law)
     assert not found.active
-    assert law in found.reason
+    assert law.name in found.reason
 
 
 def test_rigid_constraints_use_no_penalty_and_no_friction() -> None:
     rough = PEG.with_values({"contact.friction": 0.3})
     for name in ("penalty_stiffness", "contact_damping", "friction"):
         assert effect(rough, name, "penalty").active
-        assert not effect(rough, name, "rigid constraints").active
+        assert not effect(rough, name, RigidConstraints()).active
 
 
 def test_friction_in_impacts_is_on_where_the_law_asks_and_a_contact_can_slip() -> None:
@@ -123,6 +128,49 @@ def test_gravity_needs_mass() -> None:
     assert not effect(PENDULUM.with_values(weightless), "gravity").active
 
 
+def test_gravity_needs_something_that_moves_along_it() -> None:
+    slider = {"bodies": [{"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1}]}
+    across = effect(PENDULUM.with_values(slider), "gravity")
+    assert not across.active
+    assert across.reason == "nothing moves along gravity = [0, -9.81] m/s2"
+    both = slider["bodies"] + [{"name": "lift", "joint": "prismatic", "axis": [0, 1], "mass": 1}]
+    assert effect(PENDULUM.with_values({"bodies": both}), "gravity").left_out == "lift would not fall or sag"
+
+
+def test_a_coupling_with_gains_of_its_own_needs_none_of_the_scene() -> None:
+    bare = PEG.with_values({"couplings": {}})
+    assert not effect(bare, "coupling", None, "four-channel").active
+    found = effect(bare, "coupling", None, FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0)))
+    assert found.active
+    assert "[5, 6, 7]" in found.reason
+
+
+def test_the_record_and_the_switches_are_one_decision() -> None:
+    scene = PEG.with_values({"contact.friction": 0.3, "gravity": [0.0, 1.0], "contact.cluster_distance": 1e-4})
+    for law in ENGINE_LAWS.values():
+        simulation = Simulation(scene, law)
+        on = {found.name for found in simulation.effects if found.active}
+        for name in ("gravity", "varying_inertia", "velocity_terms", "impulses", "unequal_restitution",
+                     "impact_friction", "clustering"):
+            assert getattr(simulation.world.switches, name) == (name in on), (law, name)
+
+
+@pytest.mark.parametrize("name", ["gravity", "velocity_terms", "clustering"])
+def test_an_effect_that_is_off_would_change_no_bit(name: str) -> None:
+    plain = PEG.with_values({"contact.cluster_distance": 0})
+    off, on = Simulation(plain), Simulation(plain)
+    assert not getattr(off.world.switches, name)
+    switches = on.world.switches._content._replace(**{name: True})
+    on.world = block(on.world._content._replace(switches=switches))
+    on.stepper = type(on.stepper)(on.world, on.state, on.port, None)
+    for _ in range(300):
+        off.step()
+        on.step()
+    assert off.state.contact_count[0] > 0
+    assert (off.state.q == on.state.q).all()
+    assert (off.state.v == on.state.v).all()
+
+
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_gets_a_reason_for_every_effect(name: str) -> None:
     for found in decide_effects(load_scene(find_scene(name))):
@@ -142,12 +190,8 @@ def test_a_number_of_the_contact_section_is_on_exactly_where_it_is_not_zero(fiel
     )
 
 
-def test_the_laws_that_are_known_go_by_their_own_names() -> None:
-    from iapb.contact.laws import ImpulseAugmented, Penalty
-    from iapb.effects.question import COUPLING_FIELDS, LAW_USES
-    from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-    from reference.time_stepping import RigidConstraints
-
-    laws = (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty(), RigidConstraints())
-    assert {law.name for law in laws} == set(LAW_USES)
+def test_the_engines_laws_and_couplings_are_known_by_their_own_names() -> None:
+    laws = (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty())
+    for law in laws:
+        assert decide_effects(PEG, law.name, None, "full") == decide_effects(PEG, law)
     assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)

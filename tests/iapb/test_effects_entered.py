@@ -17,12 +17,12 @@ import json, linecache, sys
 from collections import Counter
 from pathlib import Path
 
-import iapb.simulation
-from iapb import Simulation, decide_effects, find_scene, load_scene
+import iapb
+from iapb import Simulation, find_scene, load_scene
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.system import coupling_of
 
-PACKAGE = str(Path(iapb.simulation.__file__).parent)
+PACKAGE = str(Path(iapb.__file__).parent)
 LAWS = {"penalty": Penalty, "impulses": ImpulseAugmented}
 
 
@@ -44,8 +44,7 @@ def lines_of_steps(scene, values, law, coupling, steps=6):
     for _ in range(steps):
         simulation.step()
     sys.settrace(None)
-    rendering = getattr(law, "rendering", None)
-    on = {effect.name for effect in decide_effects(scene, law.name, coupling, rendering) if effect.active}
+    on = {effect.name for effect in simulation.effects if effect.active}
     return {"counted": counted, "on": sorted(on)}
 
 

@@ -99,7 +99,7 @@ def measure_effects(
     `failures` receives the effects that raise anything but an `IapbError`; without it that passes through.
     """
     chosen = find_world(world)
-    on = [effect.name for effect in decide_effects(scene, chosen.law.name, chosen.coupling_in(scene).name, "full")
+    on = [effect.name for effect in decide_effects(scene, chosen.law, chosen.coupling_in(scene))
           if effect.active and effect.name in LEFT_OUT]  # fmt: skip
     whole = _Loop(scene, chosen, Variant())
     whole.sample()

@@ -29,7 +29,8 @@ triple = st.tuples(number, number, number)
 
 
 def started(system, coupling, law=None, rendering="full"):
-    return system.world_under(law or Penalty()), system.make_state(), system.make_port(coupling, rendering)
+    port = system.make_port(coupling, system.decide(ImpulseAugmented(rendering=rendering), coupling))
+    return system.world_under(law or Penalty()), system.make_state(), port
 
 
 def step(world, state, port):

@@ -37,7 +37,8 @@ device: {{force_limit: [3.0, 2.0, 0.1]{device}}}
 def started(device: str = "", coupling: Any = None, rendering: str = "full", rate: int = 1000) -> Any:
     """World, state and port; state and device somewhere at random."""
     system = System(planar_scene(device, rate))
-    port = system.make_port(coupling or FourChannel(*GAINS), rendering)
+    law, coupling = ImpulseAugmented(rendering=rendering), coupling or FourChannel(*GAINS)
+    port = system.make_port(coupling, system.decide(law, coupling))
     world, state, rng = system.world_under(ImpulseAugmented()), system.make_state(), np.random.default_rng(0)
     state.q[3:], port.device_q[:] = rng.uniform(-0.5, 0.5, 3), rng.uniform(-0.5, 0.5, 3)
     state.v[:], port.device_v[:] = rng.uniform(-0.5, 0.5, 6), rng.uniform(-0.5, 0.5, 3)

@@ -1,0 +1,456 @@
+"""Which effects a scene calls for, and why (paper: all of (1)-(26) that the scene needs, and no more).
+
+The decision is made once, here: the engine's switches are made from it (`iapb.system.make_world`, `make_port`), every
+run records it, and `iapb effects` prints it. An effect is a function of a `Question`; to add one, write it and name it
+in `EFFECTS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.geometry import Shapes
+from iapb.contact.laws import (
+    CLUSTERS,
+    ENGINE_LAWS,
+    EVERYTHING,
+    FRICTION,
+    IMPACT_FRICTION,
+    IMPULSES,
+    NEWNESS,
+    OWN_RESTITUTION,
+    PENALTY,
+    ContactLaw,
+)
+from iapb.haptics.coupling import Coupling
+from iapb.mechanics.mechanism import Mechanism
+from iapb.scene import Scene
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+
+COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
+TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
+_POSES = 4  # at which gravity is looked for
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect of a scene: on or off, why, and what leaving it out would change.
+
+    `reason` and `left_out` are sentences for readers; `reason` carries the scene's own values.
+    """
+
+    name: str
+    active: bool
+    reason: str
+    left_out: str
+
+
+@dataclass(frozen=True)
+class Question:
+    """A scene and the caller's law, coupling and rendering; None = not chosen yet, so the scene decides alone."""
+
+    scene: Scene
+    mechanism: Mechanism
+    wall_pairs: int  # candidate pairs of a moving shape and a static one
+    body_pairs: int  # of shapes of two trees
+    tree_pairs: int  # of shapes of one tree
+    restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
+    law: str | None
+    uses: frozenset[str]  # what the law makes of the contact section
+    coupling: str | None
+    logs_impulses: bool  # the law says what its impulses take, which the observer of pulses asks
+    own_gains: Any  # of a coupling that the caller made; None: the scene's count
+    rendering: str | None
+
+    @property
+    def pairs(self) -> int:
+        """All candidate pairs of shapes."""
+        return self.wall_pairs + self.body_pairs + self.tree_pairs
+
+    def unused(self, part: str) -> str | None:
+        """Return why no contact needs a part of the contact section; None if one does."""
+        if self.pairs == 0:
+            return "nothing can touch: the scene has no pair of shapes"
+        return None if part in self.uses else f"the law '{self.law}' does not use it"
+
+    def without_device(self) -> str | None:
+        """Return why no device takes part; None if one does."""
+        if self.scene.hand is None:
+            return "the scene has no hand"
+        if self.coupling == "none":
+            return "no coupling was asked for: the hand holds the tool itself"
+        if self.gains() is None:
+            wanted = COUPLING_FIELDS.get(self.coupling or "", "")
+            return f"the scene gives no gains under couplings{'.' + wanted if wanted else ''}"
+        return None
+
+    def gains(self) -> Any:
+        """Return the gains of the chosen coupling, those of any coupling where none is chosen; None without."""
+        couplings = self.scene.couplings
+        if self.own_gains is not None:
+            return self.own_gains
+        if self.coupling is None:
+            return couplings.four_channel or couplings.unilateral
+        return getattr(couplings, COUPLING_FIELDS.get(self.coupling, "four_channel"))
+
+
+def number(value: float) -> str:
+    """Return a number as a sentence shows it."""
+    return f"{value:g}"
+
+
+def numbers(values: Any) -> str:
+    """Return a list of numbers as a sentence shows it."""
+    return "[" + ", ".join(number(value) for value in values) + "]"
+
+
+def gravity(question: Question) -> Effect:
+    """G of (1)."""
+    field = question.scene.gravity
+    sinking = _sinking(question, field) if field is not None and any(field) else []
+    if sinking:
+        reason = f"gravity is on: gravity = {numbers(field or ())} m/s2"
+    elif field is None or not any(field):
+        reason = "the scene gives no gravity"
+    elif not any(body.mass > 0.0 for body in question.scene.bodies):
+        reason = "no body has mass"
+    else:
+        reason = f"nothing moves along gravity = {numbers(field)} m/s2"
+    left_out = f"{', '.join(sinking) or 'bodies'} would not fall or sag"
+    return Effect("gravity", bool(sinking), reason, left_out)
+
+
+def _sinking(question: Question, field: Sequence[float]) -> list[str]:
+    """Names of the bodies whose joints feel gravity: whose generalized force is not exactly zero at poses by chance."""
+    mechanism, numbers_by_chance = question.mechanism, np.random.default_rng(0)
+    q = np.array([x for body in question.scene.bodies for x in body.position], np.float64)
+    felt = np.zeros(mechanism.nv, np.bool_)
+    for _ in range(_POSES):
+        felt |= mechanism.gravity(q, [*field, 0.0][:3]) != 0.0
+        q = mechanism.integrate(q, numbers_by_chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
+    return [mechanism.names[b] for b in dict.fromkeys(mechanism.arrays.dof_body[felt].tolist())]
+
+
+def varying_inertia(question: Question) -> Effect:
+    """M(q) of (1), where it is not constant."""
+    active = not question.mechanism.has_constant_mass_matrix
+    reason = (
+        f"the mass matrix depends on the configuration: {_turning(question)} carries mass off its axis or other links"
+        if active
+        else "the mass matrix is constant: it is factored once, before the first step"
+    )
+    return Effect("varying_inertia", active, reason, "links would keep the inertia of their first pose")
+
+
+def velocity_terms(question: Question) -> Effect:
+    """B of (1): Coriolis and centripetal forces."""
+    active = question.mechanism.has_velocity_terms
+    reason = (
+        f"bodies carried by {_turning(question)} feel Coriolis or centripetal forces"
+        if active
+        else "no joint feels the velocity of another: B(q, v) is zero for every motion"
+    )
+    return Effect("velocity_terms", active, reason, "swinging links would gain or lose energy in free motion")
+
+
+def hand_force(question: Question) -> Effect:
+    """J_h^T F_h of (1)."""
+    hand = question.scene.hand
+    active = hand is not None and any(hand.force)
+    if hand is None:
+        reason = "the scene has no hand"
+    elif active:
+        units = "N, N, N m" if len(hand.force) == 3 else "N, N, N, N m, N m, N m"
+        reason = f"the hand pushes {hand.body} with hand.force = {numbers(hand.force)} {units}"
+    else:
+        reason = "the hand holds still: hand.force is zero"
+    return Effect("hand_force", active, reason, "the tool would not be pushed")
+
+
+def _turning(question: Question) -> str:
+    """Name the joints that turn something."""
+    turning = [body.name for body in question.scene.bodies if body.joint in TURNING_JOINTS]
+    return f"the joint{'' if len(turning) == 1 else 's'} of {', '.join(turning)}"
+
+
+def wall_contacts(question: Question) -> Effect:
+    """Contacts with the static world."""
+    count = question.wall_pairs
+    reason = f"{_pairs(count)} of a moving shape and a static one can touch"
+    reason = reason if count else "no moving shape has a static one to touch"
+    return Effect("wall_contacts", count > 0, reason, "bodies would pass through walls")
+
+
+def body_contacts(question: Question) -> Effect:
+    """Contacts between bodies of different trees."""
+    count = question.body_pairs
+    reason = f"{_pairs(count)} of shapes of separate bodies can touch"
+    reason = reason if count else "no two separate moving bodies have shapes"
+    return Effect("body_contacts", count > 0, reason, "moving bodies would pass through each other")
+
+
+def self_collisions(question: Question) -> Effect:
+    """Contacts between links of one tree."""
+    asked, count = question.scene.contact.self_collisions, question.tree_pairs
+    if not asked:
+        reason = "contact.self_collisions = false"
+    elif count:
+        reason = (
+            f"contact.self_collisions = true, and {_pairs(count)} of links that are not neighbours can touch"
+        )
+    else:
+        reason = "contact.self_collisions = true, but no two links with shapes are more than one joint apart"
+    return Effect("self_collisions", count > 0, reason, "links of one tree would pass through each other")
+
+
+def impulses(question: Question) -> Effect:
+    """Impulses (20)-(21) when a contact is new."""
+    unused = question.unused(IMPULSES)
+    if unused is None and question.restitutions[-1] == -1.0:
+        unused = f"{_restitution(question)}: an impulse would be zero"
+    reason = unused or f"new contacts collide: {_restitution(question)}"
+    return Effect(
+        "impulses", unused is None, reason, "bodies would be stopped by springs alone and sink in further"
+    )
+
+
+def _restitution(question: Question) -> str:
+    """Say the restitution of the pairs that can touch."""
+    smallest, largest = question.restitutions[0], question.restitutions[-1]
+    if smallest < largest:
+        return f"restitution {number(smallest)} to {number(largest)}, the smaller that body or wall of a pair gives"
+    own = smallest != question.scene.contact.restitution
+    return f"{'all pairs have restitution' if own else 'contact.restitution ='} {number(smallest)}"
+
+
+def unequal_restitution(question: Question) -> Effect:
+    """Contacts of one impact that differ in restitution: a future extension in the paper.
+
+    The engine's impulses follow Poisson's law there; rigid constraints Newton's for each contact while that has a
+    solution that gains nothing, else Poisson's.
+    """
+    unused = question.unused(OWN_RESTITUTION)
+    if unused is None and len(question.restitutions) == 1:
+        unused = f"alike everywhere: {_restitution(question)}"
+    reason = unused or f"pairs that can touch differ: {_restitution(question)}"
+    return Effect("unequal_restitution", unused is None, reason, "all contacts of a collision would bounce alike")
+
+
+def impact_friction(question: Question) -> Effect:
+    """Coulomb friction in the impacts themselves: a future extension in the paper."""
+    contact = question.scene.contact
+    active, reason = _valued(question, IMPACT_FRICTION, "friction", contact.friction, "")
+    if active and contact.self_collision_rows == "per_body":
+        active, reason = False, "contact.self_collision_rows = per_body: rows of one body alone have no slip"
+    return Effect("impact_friction", active, reason, "bodies would bounce without losing tangential speed")
+
+
+def penalty_stiffness(question: Question) -> Effect:
+    """K of (5)."""
+    value = question.scene.contact.stiffness
+    active, reason = _valued(question, PENALTY, "stiffness", value, "N/m")
+    return Effect("penalty_stiffness", active, reason, "nothing would hold a body that rests on another")
+
+
+def contact_damping(question: Question) -> Effect:
+    """B of (5)."""
+    value = question.scene.contact.damping
+    active, reason = _valued(question, PENALTY, "damping", value, "N s/m")
+    return Effect("contact_damping", active, reason, "resting contacts would swing on their springs")
+
+
+def friction(question: Question) -> Effect:
+    """Modified Coulomb friction (6)."""
+    value = question.scene.contact.friction
+    active, reason = _valued(question, FRICTION, "friction", value, "")
+    return Effect("friction", active, reason, "bodies would slide along each other without loss")
+
+
+def clustering(question: Question) -> Effect:
+    """Contacts close together count as one (section III)."""
+    value = question.scene.contact.cluster_distance
+    active, reason = _valued(question, CLUSTERS, "cluster_distance", value, "m")
+    return Effect("clustering", active, reason, "contacts that a fine mesh repeats would count several times")
+
+
+def coherence(question: Question) -> Effect:
+    """A contact near one of the step before is not new (section III)."""
+    value = question.scene.contact.coherence_distance
+    active, reason = _valued(question, NEWNESS, "coherence_distance", value, "m")
+    return Effect("coherence", active, reason, "contacts that move from facet to facet would collide again")
+
+
+def _valued(question: Question, part: str, field: str, value: float, unit: str) -> tuple[bool, str]:
+    """Decide an effect that is on where its number is not zero and a contact needs it."""
+    unused = question.unused(part)
+    if unused is None and value == 0.0:
+        unused = f"contact.{field} = 0"
+    return unused is None, unused or f"contact.{field} = {number(value)}{' ' + unit if unit else ''}"
+
+
+def _pairs(count: int) -> str:
+    return "1 pair" if count == 1 else f"{count} pairs"
+
+
+def coupling(question: Question) -> Effect:
+    """A device coordinated with the tool (section VI)."""
+    absent = question.without_device()
+    gains = question.gains()
+    name = question.coupling or "a coupling"
+    reason = (
+        absent or f"{name} holds tool and device together, stiffness {numbers(gains.stiffness)} N/m, N m/rad"
+    )
+    return Effect(
+        "coupling", absent is None, reason, "the hand would hold the tool itself, without a device between"
+    )
+
+
+def device_limits(question: Question) -> Effect:
+    """Largest forces that the device renders, and what is done about larger ones (section VI)."""
+    limit = question.scene.device.force_limit if question.scene.device else None
+    scaled = question.rendering in ("scale", "spread")  # the tool's impulse is scaled, device or not
+    absent = None if scaled else question.without_device()
+    if absent is None and limit is None:
+        absent = "the scene gives no device.force_limit"
+    if absent is None and question.rendering == "full":
+        absent = "the rendering 'full' ignores the limits"
+    how = f", rendering '{question.rendering}'" if question.rendering else ""
+    reason = absent or f"device.force_limit = {numbers(limit or ())} N, N m{how}"
+    return Effect(
+        "device_limits", absent is None, reason, "the hand would feel impulses that no motor can give"
+    )
+
+
+def delay(question: Question) -> Effect:
+    """Steps that pass between world and device."""
+    steps = question.scene.device.delay if question.scene.device else 0
+    absent = question.without_device() or ("device.delay = 0" if steps == 0 else None)
+    reason = absent or f"device.delay = {steps} steps, {number(1e3 * steps * question.scene.step)} ms"
+    return Effect(
+        "delay", absent is None, reason, "the coupling would look more stable than over a real line"
+    )
+
+
+def quantisation(question: Question) -> Effect:
+    """Positions as the device's sensors see them."""
+    resolution = question.scene.device.position_resolution if question.scene.device else None
+    active, reason = _listed(question, "position_resolution", resolution, "m, rad")
+    return Effect("quantisation", active, reason, "the coupling would be fed exact positions and velocities")
+
+
+def device_damping(question: Question) -> Effect:
+    """Physical damping of the device: it bounds the virtual damping (C20)."""
+    damping = question.scene.device.damping if question.scene.device else None
+    active, reason = _listed(question, "damping", damping, "N s/m, N m s/rad")
+    return Effect(
+        "device_damping", active, reason, "the device would be a pure inertia, the worst case for stability"
+    )
+
+
+def waveform(question: Question) -> Effect:
+    """An impulse handed out to the device over many steps."""
+    name = question.scene.device.waveform if question.scene.device else "step"
+    absent = question.without_device() or question.unused(IMPULSES)
+    if absent is None and question.coupling == "unilateral":
+        absent = "a unilateral coupler gives the hand no impulse"
+    if absent is None and not question.logs_impulses:
+        absent = f"the law '{question.law}' does not say what its impulses take"
+    if absent is None and name == "step":
+        absent = "device.waveform = step: an impulse is given in one step"
+    reason = absent or f"device.waveform = {name}: an impulse is given over many steps, watched by the observer"
+    return Effect("waveform", absent is None, reason, "the hand would get each impulse as a blow of one step")
+
+
+def _listed(question: Question, field: str, values: Sequence[float] | None, unit: str) -> tuple[bool, str]:
+    """Decide an effect that is on where a device takes part and any of its numbers is not zero."""
+    absent = question.without_device()
+    if absent is None and not any(values or ()):
+        absent = f"the scene gives no device.{field}"
+    return absent is None, absent or f"device.{field} = {numbers(values or ())} {unit}"
+
+
+EFFECTS: tuple[Callable[[Question], Effect], ...] = (
+    gravity,
+    varying_inertia,
+    velocity_terms,
+    hand_force,
+    wall_contacts,
+    body_contacts,
+    self_collisions,
+    impulses,
+    unequal_restitution,
+    impact_friction,
+    penalty_stiffness,
+    contact_damping,
+    friction,
+    clustering,
+    coherence,
+    coupling,
+    device_limits,
+    delay,
+    quantisation,
+    device_damping,
+    waveform,
+)
+
+EFFECT_NAMES = tuple(effect.__name__ for effect in EFFECTS)
+
+
+def decide_effects(
+    scene: Scene, law: ContactLaw | str | None = None, coupling: Coupling | str | None = None,
+    rendering: str | None = None,
+) -> tuple[Effect, ...]:
+    """Decide every effect for a scene, and for the caller's choices where they are made.
+
+    Parameters
+    ----------
+    scene
+        a checked scene.
+    law, coupling
+        the objects, or names as they stand in a run, such as "penalty" and "four-channel". None leaves the choice
+        open: an effect is then on if some choice would need it. A law says by its attribute ``uses`` which parts of
+        the contact section it uses (`iapb.contact.laws`); one that does not is taken to use all of it.
+    rendering
+        such as "scale"; default: the law's own.
+
+    Returns
+    -------
+    tuple of Effect
+        every effect in a fixed order: `active`, the reason, and what leaving it out would change.
+    """
+    mechanism, shapes = mechanism_of(scene), shapes_of(scene)
+    return decide_for(scene, mechanism, shapes, pairs_of(scene, shapes), law, coupling, rendering)
+
+
+def decide_for(
+    scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32], law: ContactLaw | str | None,
+    coupling: Coupling | str | None, rendering: str | None = None,
+) -> tuple[Effect, ...]:
+    """`decide_effects` for a scene whose mechanism, shapes and candidate pairs exist already."""
+    counts = {"wall": 0, "body": 0, "tree": 0}
+    for a, b in pairs:
+        tree_a, body_b = mechanism.tree_of_body[shapes.body[a]], shapes.body[b]
+        same = body_b >= 0 and mechanism.tree_of_body[body_b] == tree_a
+        counts["wall" if body_b < 0 else "tree" if same else "body"] += 1
+    values = tuple(float(e) for e in np.unique(restitution_by_pair(scene, pairs)))
+    known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
+    if rendering is None and law is not None and not isinstance(law, str):
+        rendering = getattr(law, "rendering", "full")
+    question = Question(
+        scene, mechanism, counts["wall"], counts["body"], counts["tree"], values,
+        law=law if law is None or isinstance(law, str) else law.name, uses=getattr(known, "uses", EVERYTHING),
+        coupling=coupling if coupling is None or isinstance(coupling, str) else coupling.name,
+        logs_impulses=law is None or isinstance(law, str) or getattr(law, "impulses", False),
+        own_gains=coupling if hasattr(coupling, "stiffness") else None, rendering=rendering,
+    )
+    return tuple(decide(question) for decide in EFFECTS)
+
+
+def active_names(effects: Sequence[Effect]) -> frozenset[str]:
+    """Return the names of the effects that are on."""
+    return frozenset(effect.name for effect in effects if effect.active)
