@@ -5,8 +5,9 @@ The names below are loaded when first used, so that ``import iapb`` costs next t
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
     from iapb.contact.impact import Impact as Impact
@@ -53,23 +54,15 @@ _HOME = {
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
 }
-_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
-__all__ = sorted([*_MODULE_OF, "__version__"])
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+_load, __dir__, _names = lazy_names(__name__, _MODULE_OF)
+__all__ = sorted([*_names, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
+    if name != "__version__":
+        return _load(name)
+    from importlib.metadata import version
 
-        value: Any = version("iapb")
-    elif name in _MODULE_OF:
-        value = getattr(import_module(_MODULE_OF[name]), name)
-    else:
-        raise AttributeError(f"module 'iapb' has no attribute {name!r}")
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return version("iapb")

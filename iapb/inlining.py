@@ -124,7 +124,7 @@ def compile_as_whole(function: Any, **options: Any) -> Any:
     """What numba's `njit` would make of a function, with a version for Python and one for kernels that call it."""
     compiled = jit(nopython=True, pipeline_class=WholeCompiler, **options)(function)
     inner = jit(nopython=True, pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True,
-                **options)(function)  # fmt: skip
+                **options)(function)
 
     def add_overload(result: Any) -> None:
         inner.overloads[tuple(result.signature.args)] = result

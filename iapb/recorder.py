@@ -80,7 +80,7 @@ class Recorder:
             energy={}, effects=_effects(simulation),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped,
-        )  # fmt: skip
+        )
         return replace(run, energy=_energy(run, system))
 
 

@@ -42,7 +42,7 @@ class Record(NamedTuple):
     contact_friction: np.ndarray  # (m, 3)
     contact_impulse: np.ndarray
     is_new: np.ndarray
-    impact_step: np.ndarray  # (n t,) impacts, one line per group and step
+    impact_step: np.ndarray  # (n t,) impacts, one line per island and step
     impact_group: np.ndarray
     impact_rows: np.ndarray
     impact_rank: np.ndarray
@@ -76,11 +76,11 @@ def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: in
         **dict.fromkeys(("gap", "normal_velocity", "normal_force", "contact_impulse"), (m,)),
         **dict.fromkeys(("impact_scale", "impact_clamp", "impact_energy", "impact_friction_share"), (k,)),
         **dict.fromkeys(("impact_v_minus", "impact_v_plus", "impact_impulse"), (k, d)),
-    }  # fmt: skip
+    }
     integers = {
         **dict.fromkeys(("body_a", "body_b"), (m,)), "contact_count": (steps,), "used": (2,),
         **dict.fromkeys(("impact_step", "impact_group", "impact_rows", "impact_rank", "impact_approaching"), (k,)),
-    }  # fmt: skip
+    }
     arrays: dict[str, Any] = {name: np.zeros(shape) for name, shape in floats.items()}
     arrays |= {name: np.zeros(shape, np.int64) for name, shape in integers.items()}
     arrays |= {"state": np.zeros(steps, np.int8), "is_new": np.zeros(m, np.bool_),
@@ -156,7 +156,7 @@ def contact_table(records: Sequence[Record], steps: Sequence[int]) -> ContactTab
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     names = {"impulse": "contact_impulse", "friction_force": "contact_friction"}
     fields = ("body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
-              "impulse", "is_new")  # fmt: skip
+              "impulse", "is_new")
     columns = {field: joined(records, steps, names.get(field, field), used=0) for field in fields}
     return ContactTable(offsets=offsets, **columns)
 
@@ -166,5 +166,5 @@ def impact_table(records: Sequence[Record], steps: Sequence[int]) -> ImpactTable
     names = {"step": "impact_step", "group": "impact_group", "rows": "impact_rows", "rank": "impact_rank",
              "scale": "impact_scale", "clamp": "impact_clamp", "energy_lost": "impact_energy",
              "friction_share": "impact_friction_share", "approaching": "impact_approaching", "solved": "impact_solved",
-             "v_minus": "impact_v_minus", "v_plus": "impact_v_plus", "impulse": "impact_impulse"}  # fmt: skip
+             "v_minus": "impact_v_minus", "v_plus": "impact_v_plus", "impulse": "impact_impulse"}
     return ImpactTable(**{field: joined(records, steps, name, used=1) for field, name in names.items()})

@@ -1,4 +1,4 @@
-"""System: a scene turned into the arrays that the compiled step reads and writes."""
+"""System: a scene turned into the arrays that the compiled step and the hand's side read and write."""
 
 from __future__ import annotations
 
@@ -21,12 +21,19 @@ from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
+from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, SpatialScene
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, restitution_by_shape, shapes_of
-from iapb.system_port import force_limit, make_port
+from iapb.scene.mechanism import (
+    mechanism_of,
+    pairs_of,
+    restitution_by_pair,
+    restitution_by_shape,
+    shapes_of,
+    start_of,
+)
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +62,7 @@ class System:
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
+        self._device: Mechanism | None = None
         self._worlds: dict[Any, World] = {}
         self._advances: dict[Any, Entry] = {}
 
@@ -74,8 +82,10 @@ class System:
 
     def device_mechanism(self) -> Mechanism:
         """The device: kinematically and inertially the hand-held tree, alone (paper VI)."""
-        bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
-        return Mechanism([self.mechanism.bodies[b] for b in bodies])
+        if self._device is None:
+            bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
+            self._device = Mechanism([self.mechanism.bodies[b] for b in bodies])
+        return self._device
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""
@@ -98,7 +108,7 @@ class System:
         `effects` is what `decide` gives for the law; default: of ImpulseAugmented().
         """
         decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
-        return make_port(self, coupling, active_names(decided), external)
+        return _make_port(self, coupling, active_names(decided), external)
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """What is on under a law and a coupling: the world, the port and the record are made from it."""
@@ -134,7 +144,7 @@ def make_world(system: System, law: Any) -> World:
     on = active_names(system.decide(law))
     scaled = "device_limits" in on and law.rendering in ("scale", "spread")
     if scaled:
-        limit[slice(*system.tool_dofs)] = force_limit(scene)
+        limit[slice(*system.tool_dofs)] = _force_limit(scene)
     switches = Switches(
         **{name: name in on for name in Switches._fields if name in EFFECT_NAMES},
         impulse_limit=scaled,
@@ -158,7 +168,7 @@ def make_world(system: System, law: Any) -> World:
         per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
         stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
         semi_implicit=integrator.semi_implicit,
-    ))  # fmt: skip
+    ))
 
 
 def slides_in_impacts(scene: Scene) -> bool:
@@ -171,8 +181,7 @@ def make_state(system: System) -> State:
     mechanism, capacity = system.mechanism, system.capacity
     d, nq, trees = mechanism.nv, mechanism.nq, len(mechanism.tree_dofs)
     rows = capacity * (2 if system.scene.contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
-    q = np.array([x for body in system.scene.bodies for x in body.position], dtype=np.float64)
-    v = np.array([x for body in system.scene.bodies for x in body.velocity], dtype=np.float64)
+    q, v = start_of(system.scene)
     mass = mechanism.mass_matrix(q)
     lower = np.zeros((d, d))
     if cholesky(mass, lower):
@@ -195,7 +204,7 @@ def make_state(system: System) -> State:
         push_work=make_push_work(d * pushing, rows * pushing),
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents), impacts=_make_log(trees, d),
         **vectors, **squares,
-    ))  # fmt: skip
+    ))
 
 
 def _make_log(trees: int, d: int) -> ImpactLog:
@@ -206,4 +215,88 @@ def _make_log(trees: int, d: int) -> ImpactLog:
     return ImpactLog(
         logged=np.zeros(1, np.int64), energy_lost=np.zeros(trees), approaching=np.full(trees, -1, np.int64),
         solved=np.ones(trees, np.bool_), **counts, **numbers, **vectors,
-    )  # fmt: skip
+    )
+
+
+def _make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Port:
+    """Allocate the hand's side: the device starts where the tool does, with its velocity.
+
+    `on` are the names of the effects that are on; `external` says that the device moves by itself: it is late and
+    coarse by itself, so the port adds neither delay nor sensors.
+    """
+    on -= {"delay", "quantisation"} if external else set()
+    scene, d = system.scene, system.mechanism.nv
+    held = system.tool_tree >= 0
+    if not held and not isinstance(coupling, NoCoupling):
+        raise ArgumentError("coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device")
+    device = system.device_mechanism() if held else system.mechanism
+    (v_start, v_stop), (q_start, q_stop) = system.tool_dofs, system.tool_coordinates
+    q, v = (start[first:last].copy() for start, first, last in zip(
+        start_of(scene), (q_start, v_start), (q_stop, v_stop), strict=True))
+    mass = device.mass_matrix(q) if held else np.zeros((0, 0))
+    lower = np.zeros_like(mass)
+    cholesky(mass, lower)
+    zeros: dict[str, Any] = {name: np.zeros(d) for name in (
+        "hand_force", "coupling_force", "environment_force", "applied")}
+    tool_zeros: dict[str, Any] = {name: np.zeros(v_stop - v_start) for name in (
+        "device_hand_force", "device_force", "pulse_force", "error", "acceleration", "measured_v")}
+    return block(Port(
+        coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
+        v_stop=v_stop, mechanism=device.arrays, body=device.workspace(),
+        varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
+        device_lower=lower, sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_),
+        clock=np.zeros(1, np.int64), **_hand(system, device), **_gains(coupling, v_stop - v_start),
+        **_actuators(scene, (q_stop - q_start, v_stop - v_start), on),
+        **_pulses(scene, system.dt, v_stop - v_start, "waveform" in on),
+        **zeros, **tool_zeros,
+    ))
+
+
+def _force_limit(scene: Scene) -> tuple[float, ...] | None:
+    """The device's limits [N, N m], None where the scene gives none."""
+    return scene.device.force_limit if scene.device is not None else None
+
+
+def _hand(system: System, device: Any) -> dict[str, Any]:
+    """Which body is held, where, and how it is pushed."""
+    hand, wrench, point = system.scene.hand, np.zeros(6), np.zeros(3)
+    if hand is None:
+        return {"hand_body": -1, "device_body": -1, "hand_point": point, "wrench": wrench}
+    wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
+    point[: len(hand.point)] = hand.point
+    return {"hand_body": system.mechanism.index(hand.body), "device_body": device.index(hand.body),
+            "hand_point": point, "wrench": wrench}
+
+
+def _gains(coupling: Coupling, size: int) -> dict[str, Any]:
+    gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
+    for name, values in gains.items():
+        if len(values) != size:  # the kernels would read past the end
+            raise ArgumentError(f"coupling {name}", values, f"{size} values, one for each coordinate of the tool")
+    return {name: _per_coordinate(gains.get(name), size) for name in ("stiffness", "damping")}
+
+
+def _actuators(scene: Scene, sizes: tuple[int, int], on: frozenset[str]) -> dict[str, Any]:
+    """What the device adds: limits, damping, sensors, delay."""
+    (nq, size), settings, limit = sizes, scene.device, _force_limit(scene)
+    damped, limited, quantised = ("device_damping" in on, "device_limits" in on, "quantisation" in on)
+    slots = 1 + (settings.delay if settings is not None and "delay" in on else 0)
+    return {
+        "device_damping": _per_coordinate(settings.damping if settings and damped else None, size), "damped": damped,
+        "force_limit": _per_coordinate(limit, size, np.inf), "limited": limited,
+        "resolution": _per_coordinate(settings.position_resolution if settings and quantised else None, nq),
+        "quantised": quantised,
+        "delayed_force": np.zeros((slots, size)), "delayed_q": np.zeros((slots, nq)),
+        "delayed_v": np.zeros((slots, size)),
+    }
+
+
+def _pulses(scene: Scene, dt: float, size: int, shaped: bool) -> dict[str, Any]:
+    """How the device gives an impulse to the hand."""
+    weights = waveform_weights(scene.device.waveform if shaped and scene.device else "step", dt)
+    return {"pulsed": len(weights) > 1, "pulse_weights": weights, "pulse_pending": np.zeros((len(weights), size)),
+            "pulse_balance": np.zeros(1), "pulse_held": np.zeros(1, np.int64)}
+
+
+def _per_coordinate(values: Any, size: int, default: float = 0.0) -> Floats:
+    return np.full(size, default) if values is None else np.array(values, dtype=np.float64)

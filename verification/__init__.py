@@ -5,8 +5,9 @@ The names below are loaded when first used, so that ``import verification`` cost
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
     from verification.cost.measure import work_precision as work_precision
@@ -21,16 +22,4 @@ _HOME = {
     "work_precision": "verification.cost.measure",
 }
 
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'verification' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

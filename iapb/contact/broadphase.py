@@ -52,13 +52,13 @@ def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
     k = len(moving)
     capacity = max(1, min(len(pairs), PAIRS_PER_SHAPE * n))
     wholes = {name: np.zeros(size, np.int64) for name, size in (
-        ("bucket", k), ("start", (1 << (2 * k).bit_length()) + 1), ("sorted", k), ("key", capacity))}  # fmt: skip
+        ("bucket", k), ("start", (1 << (2 * k).bit_length()) + 1), ("sorted", k), ("key", capacity))}
     return BroadPhase(
         moving=moving, static=static, body=shapes.body[:n].copy(), allowed=allowed, local_center=local,
         radius=radius, cell_size=float(2.0 * radius[moving].max(initial=0.0)) or 1.0, center=local.copy(),
         neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9,
         cell=np.zeros((k, 3), np.int64), pairs=np.zeros((capacity, 2), np.int32), **wholes,
-    )  # fmt: skip
+    )
 
 
 def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:

@@ -6,11 +6,12 @@ The same kernels as the compiled step, for users who look at one configuration a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.compiled import block
 from iapb.contact.geometry import (
     ContactBuffer,
     Floats,
@@ -19,11 +20,13 @@ from iapb.contact.geometry import (
     contact_capacity,
     make_contact_buffer,
 )
+from iapb.contact.kernels.contact_set import classify, cluster, mark_new
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.rows import body_row, contact_row, contact_velocities
 from iapb.errors import ArgumentError
+from iapb.mechanics.kernels import forward_kinematics, make_workspace
+from iapb.mechanics.mechanism import Mechanism
 from iapb.run import STATE_NAMES
-
-if TYPE_CHECKING:
-    from iapb.mechanics.mechanism import Mechanism
 
 # A contact approaches when v_n < −v_approach. Resting contacts hover around zero by rounding (1e-16 m/s) and by
 # the velocity that one step of a penalty force gives; 1e-6 m/s is far below any impact that can be felt, and far
@@ -124,12 +127,6 @@ def find_contacts(
     ArgumentError
         A distance or velocity below zero, q or v of the wrong length or not finite.
     """
-    from iapb.compiled import block
-    from iapb.contact.kernels.contact_set import classify, cluster, mark_new
-    from iapb.contact.kernels.narrow_phase import detect
-    from iapb.contact.kernels.rows import contact_velocities
-    from iapb.mechanics.kernels import forward_kinematics, make_workspace
-
     require_not_negative(
         cluster_distance=cluster_distance,
         coherence_distance=coherence_distance,
@@ -173,10 +170,6 @@ def contact_rows(
         Between two moving bodies: one row nᵀ(J_a − J_b), equation (12); or the paper's own nᵀJ_a and nᵀJ_b,
         (13)-(14), which do not conserve momentum (each body rebounds as from a wall).
     """
-    from iapb.compiled import block
-    from iapb.contact.kernels.rows import body_row, contact_row
-    from iapb.mechanics.kernels import forward_kinematics, make_workspace
-
     if self_collision_rows not in ("relative", "per_body"):
         raise ArgumentError("self_collision_rows", self_collision_rows, "'relative' or 'per_body'")
     arrays, workspace = block(mechanism.arrays), block(make_workspace(len(mechanism.names), mechanism.nv))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.geometry import ContactBuffer, Integers, Shapes
+from iapb.contact.kernels.narrow_phase import detect
 from iapb.errors import ArgumentError
 
 Floats = NDArray[np.float64]
@@ -23,8 +24,6 @@ def detect_contacts(
     ArgumentError
         The buffer is too small (`contact_capacity` says how large it must be), or the margin is not a number.
     """
-    from iapb.contact.kernels.narrow_phase import detect
-
     if np.isnan(margin):
         raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
     count = int(detect(shapes, pairs, placements[0], placements[1], float(margin), buffer))

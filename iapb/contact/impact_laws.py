@@ -116,7 +116,7 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
     found = FrictionalImpact(
         problem.unscale_velocity(v_plus), problem.unscale_momentum(momentum), scale * impulses, scale * p_t,
         problem.unscale_energy(energy), share, clamp, "complete" if met else "reduced",
-    )  # fmt: skip
+    )
     for name in ("velocity", "generalized_impulse", "impulses", "tangential_impulses"):
         if not np.all(np.isfinite(getattr(found, name))):
             raise RangeError(name, "the impact of these magnitudes is above 1.8e308")

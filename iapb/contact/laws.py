@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.kernels.step import STATUS_TEXT
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
@@ -48,7 +49,7 @@ def copied_step(system: Any, state: State) -> StepResult:
         q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
         friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
         state=_contact_state(state.state_of_tree, system.tool_tree),
-    )  # fmt: skip
+    )
 
 
 def _contact_state(states: NDArray[np.int8], tool_tree: int) -> int:
@@ -93,8 +94,6 @@ class _EngineLaw:
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
         """One step by the compiled kernel, from Python (see `ContactLaw`)."""
-        from iapb.contact.kernels.step import STATUS_TEXT
-
         world = system.world_under(self)
         if dt != world.dt:
             raise ArgumentError("dt", dt, f"the scene's step {world.dt!r} s: the engine's laws keep a fixed step")

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from iapb.compiled import block
 from iapb.contact.contacts import ContactSet, finite_vector, require_not_negative
 from iapb.contact.geometry import Floats
+from iapb.contact.kernels.resting import resting_forces as kernel
 from iapb.errors import ArgumentError
-
-if TYPE_CHECKING:
-    from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.kernels import forward_kinematics, make_workspace
+from iapb.mechanics.mechanism import Mechanism
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,6 @@ def resting_forces(
     ArgumentError
         A constant below zero or not finite, v_threshold = 0 with friction.
     """
-    from iapb.compiled import block
-    from iapb.contact.kernels.resting import resting_forces as kernel
-    from iapb.mechanics.kernels import forward_kinematics, make_workspace
-
     require_not_negative(
         stiffness=stiffness, damping=damping, friction=friction, friction_velocity=friction_velocity
     )

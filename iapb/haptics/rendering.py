@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.contact.kernels.device_limit import largest_share
 from iapb.contact.laws import RENDERINGS
 from iapb.errors import ArgumentError
 from iapb.names import one_of
@@ -61,8 +62,6 @@ def render_impulse(
     ArgumentError
         Shapes that differ, dt or a limit that is not positive, an impulse that is not finite, an unknown rendering.
     """
-    from iapb.contact.kernels.device_limit import largest_share
-
     p = np.ascontiguousarray(impulse, np.float64)
     limit = np.full(p.shape, np.inf) if force_limit is None else np.ascontiguousarray(force_limit, np.float64)
     _check(p, dt, limit, rendering)

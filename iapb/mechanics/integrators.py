@@ -3,7 +3,8 @@
 All are explicit, start a step from (q, v) alone (an impulse may have changed v just before), and evaluate the
 acceleration at given stages: stage i stands `fraction[i]` of the step after its start, on the line that the
 stage before it points along, and carries the weight `weight[i]`. The compiled step reads these numbers;
-`Integrator.step` is the same in Python, for any acceleration.
+`Integrator.step` is a Python step for any acceleration. With vector coordinates the two do the same; where rotations do
+not commute, the step of four stages here is a commutator-free method of fourth order, the compiled one is of second.
 
 On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
@@ -43,7 +44,7 @@ class Integrator(NamedTuple):
     ) -> tuple[Floats, Floats]:
         """Return (q, v) after one step of dt [s], at the declared order on every configuration space."""
         if len(self.weight) == 4:
-            return _runge_kutta_4(integrate, acceleration, q, v, dt)
+            return _commutator_free_4(integrate, acceleration, q, v, dt)
         rate, change = v, acceleration(q, v)
         mean_rate, mean_change = self.weight[0] * rate, self.weight[0] * change
         for fraction, weight in zip(self.fraction[1:], self.weight[1:], strict=True):
@@ -55,7 +56,7 @@ class Integrator(NamedTuple):
         return integrate(q, v_next if self.semi_implicit else mean_rate, dt), v_next
 
 
-def _runge_kutta_4(
+def _commutator_free_4(
     integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
 ) -> tuple[Floats, Floats]:
     """Commutator-free fourth-order method (Celledoni, Marthinsen and Owren, 2003).

@@ -19,7 +19,7 @@ def rotation_of(rpy: Any) -> Floats:
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
+    ])
 
 
 def angles_of(rotation: Floats) -> tuple[float, float, float]:

@@ -20,7 +20,7 @@ _CHILDREN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "joint": (("origin", "parent", "child", "axis"),
               ("calibration", "dynamics", "limit", "mimic", "safety_controller", "hardwareInterface")),
     "collision": (("origin", "geometry"), ("material", "verbose")),
-}  # fmt: skip
+}
 _ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "origin": ("xyz", "rpy", "quat_xyzw"),
     "mass": ("value",),

@@ -334,5 +334,5 @@ def _least_eigenvalue_reaches(matrix: list[list[float]], least: float) -> bool:
     (a, b, c), (_, d, e), (_, _, f) = [[Exact(x) for x in row] for row in matrix]
     a, d, f = (x - Exact(least) for x in (a, d, f))
     minors = (a, d, f, a * d - b * b, a * f - c * c, d * f - e * e,
-              a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))  # fmt: skip
+              a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))
     return min(minors) >= 0

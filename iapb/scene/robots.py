@@ -45,7 +45,7 @@ class Robot(Part):
     collisions: Literal["none", "urdf"] = Field(
         "none", description="urdf: boxes and spheres of the file's <collision> elements can touch, where shapes says "
         "nothing about the link; none: shapes alone"
-    )  # fmt: skip
+    )
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(
         default_factory=dict, description="what can touch, by link; link axes; [] for nothing"
     )

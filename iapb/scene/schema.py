@@ -26,7 +26,7 @@ def scene_schema() -> dict[str, Any]:
         "if": {"required": ["dimensions"]},
         "then": {"$ref": f"{_HERE}SpatialScene"}, "else": {"$ref": f"{_HERE}Scene"},
         "$defs": parts,
-    }  # fmt: skip
+    }
 
 
 def _with_robots(space: dict[str, Any]) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def _with_robots(space: dict[str, Any]) -> dict[str, Any]:
     A scene needs a body or a robot; where there are robots, `bodies` may be empty or left out.
     """
     robots = {"type": "array", "items": {"$ref": f"{_HERE}Robot"},
-              "description": "URDF files that become bodies; default: none"}  # fmt: skip
+              "description": "URDF files that become bodies; default: none"}
     bodies = {name: value for name, value in space["properties"]["bodies"].items() if name != "minItems"}
     return space | {
         "properties": space["properties"] | {"bodies": bodies, "robots": robots},

@@ -173,7 +173,7 @@ def outer(count=3, flag=True, weight=0.5, shape=(2, 3), mask=(True, False, True)
 
 
 @given(st.integers(-(2**62), 2**62), st.booleans(), st.floats(allow_nan=False), st.tuples(*[st.integers(1, 4)] * 2),
-       st.lists(st.booleans(), min_size=1, max_size=5))  # fmt: skip
+       st.lists(st.booleans(), min_size=1, max_size=5))
 def test_a_kernel_reads_from_a_block_what_python_reads(count, flag, weight, shape, mask):
     made, out = block(outer(count, flag, weight, shape, mask)), np.zeros(9)
     read(made, out)

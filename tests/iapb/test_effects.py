@@ -26,7 +26,7 @@ CHAIN = {
         for name, parent in (("one", "world"), ("two", "one"), ("three", "two"))
     ],
     "hand": None, "device": None, "couplings": {}, "contact.self_collisions": True,
-}  # fmt: skip
+}
 ONE_LINK = {"bodies": [{"name": "upper", "joint": "revolute", "mass": 1, "center_of_mass": [0.25, 0]}]}
 NO_SHAPES = {"bodies.peg.shapes": []}
 
@@ -53,7 +53,7 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
     "quantisation": (PEG, {"device.position_resolution": [1e-5, 1e-5, 0]}, {}, "[1e-05, 1e-05, 0]"),
     "device_damping": (PEG, {"device.damping": [0.5, 0.5, 0]}, {"device.damping": [0, 0, 0]}, "[0.5, 0.5, 0]"),
     "waveform": (PEG, {"device.waveform": "brake"}, {"device.waveform": "step"}, "device.waveform = brake"),
-}  # fmt: skip
+}
 
 
 def effect(scene: Scene, name: str, *choices: Any) -> Effect:
@@ -184,7 +184,7 @@ def test_every_scene_gets_a_reason_for_every_effect(name: str) -> None:
 )
 def test_a_number_of_the_contact_section_is_on_exactly_where_it_is_not_zero(field: str, value: float) -> None:
     names = {"stiffness": "penalty_stiffness", "damping": "contact_damping", "cluster_distance": "clustering",
-             "coherence_distance": "coherence"}  # fmt: skip
+             "coherence_distance": "coherence"}
     assert effect(PEG.with_values({f"contact.{field}": value}), names.get(field, field)).active == (
         value > 0.0
     )

@@ -57,7 +57,7 @@ NEAR = {"bodies.peg.position": [0.05, -0.0062, 0.0], "bodies.peg.velocity": [0.1
 FULL = {
     **NEAR, "gravity": [0.0, 1.0], "device.position_resolution": [1e-5, 1e-5, 1e-5], "device.damping": [1, 1, 1],
     "device.force_limit": [300, 300, 300], "contact.cluster_distance": 1e-4, "contact.coherence_distance": 1e-2,
-}  # fmt: skip
+}
 IAPB, SPREAD, PENALTY = ("impulses", {}), ("impulses", {"rendering": "spread"}), ("penalty", {})
 RUBBING = ("impulses", {"friction_in_impacts": True})
 
@@ -96,7 +96,7 @@ CASES = {
     "pendulum": ("double_pendulum", {}, IAPB, "none"),
     "one link": ("double_pendulum", ONE_LINK, IAPB, "none"),
     "arm with device": ("arm_pushing", {}, IAPB, "four-channel"),
-}  # fmt: skip
+}
 
 # effect -> text of what only it executes, a case with it and cases without
 ONLY = {
@@ -125,14 +125,14 @@ ONLY = {
     "hand_force": (["def press(", "def add_point_force("], "no friction", ["hand holds still", "pendulum"]),
     "varying_inertia": (["def mass_matrix(", "def cholesky_tree_blocks("], "pendulum", ["one link", "everything"]),
     "velocity_terms": (["def bias("], "pendulum", ["one link", "everything"]),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
 def found():
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", COUNTER], input=json.dumps(CASES), env=environment, text=True,
-                          capture_output=True, check=False)  # fmt: skip
+                          capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

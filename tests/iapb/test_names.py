@@ -12,7 +12,7 @@ SCENES = ("peg_corner", "peg_hole", "two_discs")
 @pytest.mark.parametrize(("wrong", "right"), [
     ("peg_cornr", "peg_corner"), ("PEG_HOLE", "peg_hole"), ("twodiscs", "two_discs"), ("submarine", ""), ("", ""),
     (3, ""), (None, ""),
-])  # fmt: skip
+])
 def test_the_nearest_name_is_found_whatever_its_capitals(wrong, right):
     assert nearest(wrong, SCENES) == right
 

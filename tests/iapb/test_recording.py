@@ -15,7 +15,7 @@ from iapb.system import coupling_of
 
 STEPS = 300
 CONTACT_FIELDS = ("body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
-                  "is_new")  # fmt: skip
+                  "is_new")
 
 
 @given(st.integers(0, 10_000_000), st.integers(1, 100_000))

@@ -21,7 +21,7 @@ from iapb.system import coupling_of
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
     "device.delay": 2, "device.position_resolution": [1e-5, 1e-5, 0], "device.damping": [0.5, 0.5, 0],
-})  # fmt: skip
+})
 ARM = load_scene(find_scene("arm_pushing"))  # inertia that varies, velocity terms, a group of two trees
 STEPS = 350  # past the fourth collision of the peg
 COUPLINGS = ("none", "four-channel", "unilateral")

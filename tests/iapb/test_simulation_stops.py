@@ -109,7 +109,7 @@ def test_ctrl_c_after_the_last_step_leaves_a_complete_run():
 # Between two walls each stroke multiplies the speed by K dt² / m = 2000: the doubles end after a hundred strokes.
 ABSURD = PEG.with_values({"contact.stiffness": 1e9, "contact.damping": 0, "contact.friction": 0, "walls": [
     {"name": f"wall_{side}", "kind": "half_plane", "point": [0.05 * side, 0], "normal": [-side, 0]} for side in (1, -1)
-]})  # fmt: skip
+]})
 
 
 def test_motion_that_leaves_the_range_of_numbers_stops_the_run_and_says_why():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
     from verification.hard_cases.case import CaseAbsent as CaseAbsent
@@ -15,21 +16,13 @@ if TYPE_CHECKING:
     from verification.hard_cases.verdict import HardCaseVerdict as HardCaseVerdict
 
 _HOME = {
-    "CaseAbsent": "case",
-    "HardCase": "case",
-    "TrajectoryCase": "case",
-    "HARD_CASES": "catalogue",
-    "HardCaseVerdict": "verdict",
-    "judge_hard_case": "judge",
-    "judge_hard_cases": "judge",
+    "CaseAbsent": ".case",
+    "HardCase": ".case",
+    "TrajectoryCase": ".case",
+    "HARD_CASES": ".catalogue",
+    "HardCaseVerdict": ".verdict",
+    "judge_hard_case": ".judge",
+    "judge_hard_cases": ".judge",
 }
 
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'verification.hard_cases' has no attribute {name!r}")
-    value = getattr(import_module(f"verification.hard_cases.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

@@ -49,7 +49,7 @@ def make_friction_work(coordinates: int, contacts: int, tangents: int) -> Fricti
     return FrictionWork(
         free=np.zeros((c * m, d)), normal_part=np.zeros((c * m, d)), slip=np.zeros(c * m), p=np.zeros(c * m),
         response=np.zeros(c * m), velocity=np.zeros(m), **per_contact, **per_coordinate,
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -233,7 +233,7 @@ def test_naming_the_pairs_finds_their_contacts_alone():
     for pairs in ([[0, 1], [0, 2], [0, 3], [1, 2]], [[0, 1], [0, 2]], [[0, 2]], []):
         some = find_contacts(mechanism, shapes, q, v, pairs=pairs)
         chosen = [(a, b) in {tuple(sorted(pair)) for pair in pairs} for a, b in zip(
-            everything.shape_a, everything.shape_b, strict=True)]  # fmt: skip
+            everything.shape_a, everything.shape_b, strict=True)]
         assert np.array_equal(some.gap, everything.gap[chosen])
         assert np.array_equal(some.point, everything.point[chosen])
 

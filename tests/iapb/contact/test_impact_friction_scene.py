@@ -95,7 +95,7 @@ def test_a_flat_bounce_takes_friction_times_the_blow_of_the_tangential_speed() -
 def test_no_impact_gains_energy_and_restitution_is_met(e: float, mu: float, angle: float, spin: float) -> None:
     run = simulate(PLANE.with_values({
         "contact.restitution": e, "contact.friction": mu, "bodies.box.position.2": angle, "bodies.box.velocity.2": spin,
-    }), LAW, steps=400)  # fmt: skip
+    }), LAW, steps=400)
     kinetic = 0.5 * run.impacts.v_minus**2 @ [0.5, 0.5, 1e-3]
     assert np.all(run.impacts.energy_lost >= -1e-13 * kinetic)
     assert not run.impacts.approaching.any()

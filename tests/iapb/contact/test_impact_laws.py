@@ -127,10 +127,10 @@ def test_the_reduction_is_what_prevents_the_gain() -> None:
      ("friction", {"friction": [0.1, 0.2]}),
      ("restitution", {"restitution": -0.5}), ("restitution", {"restitution": [0.1]}),
      ("tangents", {"tangents": [[np.nan, 0.0]]})],
-)  # fmt: skip
+)
 def test_wrong_arguments_are_named(argument: str, change: dict[str, Any]) -> None:
     given = {"mass_matrix": np.eye(2), "contact_jacobian": [[0.0, 1.0]], "tangents": [[1.0, 0.0]],
-             "velocity": [1.0, -1.0], "restitution": 0.5, "friction": 0.3} | change  # fmt: skip
+             "velocity": [1.0, -1.0], "restitution": 0.5, "friction": 0.3} | change
     with pytest.raises(ArgumentError, match=argument):
         resolve_frictional_impact(**given)
 

@@ -16,14 +16,14 @@ from iapb.system import System
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
     "duration": 1.5,
-})  # fmt: skip
+})
 LIMIT = np.array([3.0, 3.0, 0.05])
 SCENES = {
     "peg_plastic": PEG,
     "peg_elastic": PEG.with_values({"contact.restitution": 0.7}),
     **{name: load_scene(find_scene(name))
        for name in ("peg_hole", "arm_pushing", "newton_cradle", "two_discs", "three_link_arm_elastic")},
-}  # fmt: skip
+}
 # Each quantity is a sum of a dozen products of doubles; the arm's inertia has a condition number of some hundreds.
 ROUNDING = 1e-11
 

@@ -14,7 +14,7 @@ from iapb.system import coupling_of
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "duration": 1.5,
     "contact.coherence_distance": 1e-3,
-})  # fmt: skip
+})
 PENDULUM = load_scene(find_scene("double_pendulum")).with_values({"duration": 0.5})
 
 

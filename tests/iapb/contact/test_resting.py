@@ -103,7 +103,7 @@ def test_without_friction_its_code_is_not_entered(monkeypatch):
         kernels.resting_forces.py_func(
             MECHANISM.arrays, workspace, found._buffer, len(found), STIFFNESS, DAMPING, True, friction, 1e-3,
             np.zeros(6), np.zeros(6),
-        )  # fmt: skip
+        )
         assert len(entered) == entries and len(found) > 0
 
 

@@ -92,7 +92,7 @@ def _effect(scene: Scene) -> Any:
 )
 def test_the_smaller_of_two_counts_and_silence_takes_the_others(one: Any, other: Any, pair: float) -> None:
     scene = DISCS.with_values({"contact.restitution": 0.4, "bodies.striker.restitution": one,
-                               f"bodies.{DISCS.bodies[1].name}.restitution": other})  # fmt: skip
+                               f"bodies.{DISCS.bodies[1].name}.restitution": other})
     assert restitution_by_pair(scene, pairs_of(scene, shapes_of(scene))) == [pair]
     assert not _effect(scene).active
     run = simulate(scene)
@@ -104,7 +104,7 @@ def test_the_smaller_of_two_counts_and_silence_takes_the_others(one: Any, other:
 @given(st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(-0.02, 0.02), st.floats(-3.0, 3.0))
 def test_a_bar_on_any_two_posts_never_gains(e: tuple[float, float], tilt: float, spin: float) -> None:
     values = {"walls.near.restitution": e[0], "walls.far.restitution": e[1], "bodies.bar.position.2": tilt,
-              "bodies.bar.velocity.2": spin, "contact.stiffness": 0, "contact.damping": 0}  # fmt: skip
+              "bodies.bar.velocity.2": spin, "contact.stiffness": 0, "contact.damping": 0}
     run = simulate(BAR.with_values(values))
     before = run.energy["kinetic"][0]
     assert np.diff(run.energy["kinetic"]).max() <= 1e-13 * before

@@ -17,7 +17,7 @@ from reports.live.measure import simulated_device
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
     "device.damping": [0.5, 0.5, 0],
-})  # fmt: skip
+})
 STEPS = 350  # past the fourth collision
 LAW = ImpulseAugmented(rendering="saturate")
 

@@ -22,7 +22,7 @@ def arm(joints: Sequence[str] = ("revolute", "fixed", "revolute")) -> Mechanism:
     parents = [None, *names][: len(joints)]
     place = (np.eye(3), (1.0, 0.0, 0.0))
     return Mechanism([Body(name, parent, Joint(kind), place, 1.0, (0.5, 0, 0), np.eye(3))
-                      for name, parent, kind in zip(names, parents, joints, strict=True)])  # fmt: skip
+                      for name, parent, kind in zip(names, parents, joints, strict=True)])
 
 
 def test_bodies_are_placed_again_when_a_coordinate_has_changed_and_only_then() -> None:

@@ -112,7 +112,7 @@ def test_what_the_scene_cannot_hold_is_a_mistake_with_its_place_until_shapes_rep
     ("collisions: mesh", 9, "robots[0].collisions"),
     ("shapes: {arm: [{kind: sphere, radius: -1}]}", 9, "robots[0].shapes.arm"),
     ("floating: false\n    position: {leg: [0]}", 10, "robots[0].position of robot rob"),
-])  # fmt: skip
+])
 def test_mistakes_of_a_robot_say_line_and_column(tmp_path: Path, lines: str, line: int, path: str) -> None:
     with pytest.raises(SceneError) as caught:
         load_scene(write(tmp_path, BALL, lines=lines))

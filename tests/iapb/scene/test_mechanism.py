@@ -115,7 +115,7 @@ def test_moving_shapes_meet_walls_and_other_trees_neighbours_never_meet() -> Non
         *({link, PUCK} for link in (BRACKET, ONE, TWO, THREE, TOOL)),
         # one tree: more than one joint apart; the tool is welded to link three
         {BRACKET, TWO}, {BRACKET, THREE}, {BRACKET, TOOL}, {ONE, THREE}, {ONE, TOOL},
-    )  # fmt: skip
+    )
     assert pairs(CHAIN) == {frozenset(pair) for pair in expected}
 
 
@@ -175,7 +175,7 @@ def test_inertia_as_three_six_or_nine_numbers(written: str, matrix: np.ndarray) 
 @pytest.mark.parametrize(("inertia", "read"), [
     ("[1, 2, 1e-12]", True), ("[1, 2, 9.9e-13]", False), ("[1, 1, 1, 0.9999999, 0, 0]", True),
     ("[1, 1, 1, 1, 0, 0]", False), ("[1, 1, 1, 0.8, 0.8, -0.8]", False), ("[3, 3, 3, -1, -1, -1]", True),
-])  # fmt: skip
+])
 def test_a_body_that_turns_freely_has_inertia_about_every_axis(inertia: str, read: bool) -> None:
     text = (BODY % "").replace("[1, 2, 3]", inertia)
     if read:

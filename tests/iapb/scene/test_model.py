@@ -115,7 +115,7 @@ REFUSED: list[tuple[str, list[Any]]] = [
     ("couplings.four_channel.damping", NOT_A_PAIR_OF_GAINS),
     ("couplings.unilateral.stiffness", NOT_A_PAIR_OF_GAINS),
     ("couplings.unilateral.damping", NOT_A_PAIR_OF_GAINS),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("path", "values"), REFUSED, ids=[path for path, _ in REFUSED])
@@ -215,7 +215,7 @@ def test_points_on_a_circle_in_order_are_convex_and_stored_counterclockwise(
         [[0, 0, 0], [1, 0], [0, 1]],
         3,
     ],
-)  # fmt: skip
+)
 def test_polygons_that_are_not_convex_are_refused(vertices: Any) -> None:
     with pytest.raises(SceneError, match="vertices"):
         FULL.with_values({"walls.wedge.vertices": vertices})
@@ -289,7 +289,7 @@ junk = st.recursive(
 )
 PATHS = ["name", "rate", "bodies", "bodies.peg", "bodies.peg.shapes", "bodies.peg.shapes.0", "bodies.peg.shapes.0.kind",
          "bodies.peg.position", "walls", "walls.floor", "walls.floor.kind", "contact", "hand", "device", "couplings",
-         "couplings.four_channel", "gravity"]  # fmt: skip
+         "couplings.four_channel", "gravity"]
 
 
 @given(st.dictionaries(st.sampled_from(PATHS), junk, min_size=1, max_size=2))

@@ -115,7 +115,7 @@ def test_repeated_keys_are_refused_beside_other_mistakes() -> None:
         ("a: &a [" + "1, " * 400 + "1]\nb: &b [" + "*a, " * 400 + "*a]\nc: [" + "*b, " * 9 + "*b]\n", 2, "smaller"),
         ("#" * 1_000_001, 1, "at most 1000000"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_document_is_one_mistake_with_its_line(text: str, line: int, word: str) -> None:
     found = mistakes(text)
     assert list(found) == ["(file)"]
@@ -168,7 +168,7 @@ TOKENS = [
     "!!python/object/apply:os.abort []", "!!binary aGk=", "|", ">", "|9", "%YAML 1.1", "---", "...", "#", "@", "`",
     "\t", "\r", "\n", "\n\n  ", "\x00", "\x85", "\u2028", "\ufeff", "\ud7ff", "é", "\U0001f600", '"\\x"', '"\\uD800"',
     "2001-01-01", "1:30", "world", "peg", "kind", "name", "box", "planar", "e" * 3000,
-]  # fmt: skip
+]
 
 place = st.floats(0.0, 1.0)
 mutation = st.one_of(

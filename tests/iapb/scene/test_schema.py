@@ -70,7 +70,7 @@ def test_robots_alone_make_a_scene() -> None:
 _TYPES: dict[str, Any] = {
     "object": dict, "array": list, "string": str, "boolean": bool, "null": type(None), "number": (int, float),
     "integer": int,
-}  # fmt: skip
+}
 _SAYS_NOTHING = {"$schema", "$defs", "title", "description", "default", "discriminator", "then", "else"}
 
 

@@ -41,7 +41,7 @@ def crowd(rng: np.random.Generator, n: int, spatial: bool) -> Shapes:
     balls = [Sphere(rng.uniform(0.05, 0.2), rng.uniform(-0.2, 0.2, 3), k) for k in body]
     return make_spatial_shapes([
         *balls[:2], SpatialBox([0.3, 0.2, 0.4], [0.1, 0.0, -0.2]), HalfSpace([0, 0, -1], [0, 0, 1]), *balls[2:]
-    ])  # fmt: skip
+    ])
 
 
 def meeting(broad: Any, R: np.ndarray, p: np.ndarray, pairs: np.ndarray, margin: float) -> list[list[int]]:
@@ -69,7 +69,7 @@ def test_near_pairs_of_turned_bodies_in_either_order_and_exact_capacity(
         shapes = crowd(rng, n, spatial)
         total = len(shapes.kind)
         pairs = np.array([(i, j) if rng.random() < 0.5 else (j, i) for i in range(total) for j in range(i)
-                          if shapes.body[i] != shapes.body[j] and rng.random() < 0.9], np.int32)  # fmt: skip
+                          if shapes.body[i] != shapes.body[j] and rng.random() < 0.9], np.int32)
         made = make_broad_phase(shapes, pairs)
         R = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)])
         p = rng.uniform(-spread, spread, (n, 3))

@@ -149,7 +149,7 @@ def test_states_of_groups_are_what_section_iii_says(seed: int) -> None:
     spreads = {g: any(spreading[t] for t in range(5) if group[t] == g) for g in group}
     touching, collides = contacts.gap[:count] <= 0.0, np.zeros(count, bool)
     of_contact = [max(tree_of(int(a)), -1) if tree_of(int(a)) >= 0 else tree_of(int(b))
-                  for a, b in zip(contacts.body_a[:count], contacts.body_b[:count], strict=True)]  # fmt: skip
+                  for a, b in zip(contacts.body_a[:count], contacts.body_b[:count], strict=True)]
     approaching = touching & (contacts.normal_velocity[:count] < -approach)
     for t in range(5):
         members = [i for i in range(count) if of_contact[i] >= 0 and group[of_contact[i]] == group[t]]

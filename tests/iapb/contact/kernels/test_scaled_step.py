@@ -104,7 +104,7 @@ def test_rows_that_agree_in_restitution_are_no_case_for_poisson(shapes: tuple[in
         f"name: unlike\nrate: 100\nduration: 0.1\nbodies:\n{bodies}  - {{name: b2, {DISC}}}\n"
         "walls: [{name: floor, kind: half_plane, point: [0, -9], normal: [0, 1]}]\n"
         f"contact: {{stiffness: 0, restitution: {E}}}\n"
-    ))  # fmt: skip
+    ))
     world, state = system.world_under(ImpulseAugmented()), system.make_state()
     for row, shape in enumerate(shapes):  # each against the floor
         state.rows[row] = row

@@ -19,7 +19,7 @@ BALL, BOX = "{kind: sphere, radius: 0.1, center: [0.02, 0, 0.01]}", "{kind: box,
 
 def body(k: int) -> str:
     return (f"  - {{name: b{k}, joint: free_flyer, mass: {0.5 + 0.3 * k}, inertia: [{1 + k}e-3, 2e-3, 3e-3], "
-            f"shapes: [{BOX if k == 2 else BALL}]}}\n")  # fmt: skip
+            f"shapes: [{BOX if k == 2 else BALL}]}}\n")
 
 
 def crowd(rows: str) -> System:
