@@ -23,6 +23,8 @@ Row = Mapping[str, Any]
 REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
     "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
+# What fails in more trials than it holds in is not "true with exceptions".
+LEAST_SHARE = 0.5
 _WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
@@ -224,6 +226,21 @@ def check_depth(depth: str) -> None:
 def worst(verdicts: Iterable[str]) -> str:
     """Return the worst of some verdicts; NOT_COMPUTED for none."""
     return min(verdicts, key=_WORST_FIRST.index, default=NOT_COMPUTED)
+
+
+def verdict_of_trials(holds: Iterable[bool | None]) -> str:
+    """Return the verdict on something that was tried many times, from the outcomes of its trials.
+
+    All that can tell hold: reproduced. At least LEAST_SHARE of them: reproduced within stated limits. Fewer:
+    refuted. None can tell: not testable here.
+    """
+    decided = [outcome for outcome in holds if outcome is not None]
+    if not decided:
+        return NOT_TESTABLE
+    share = sum(decided) / len(decided)
+    if share == 1.0:
+        return REPRODUCED
+    return LIMITED if share >= LEAST_SHARE else REFUTED
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:

@@ -91,7 +91,7 @@ def _printed(study: Any) -> Iterator[Finding]:
 
 def _solvers(study: Any) -> Iterator[Finding]:
     """One sentence per way of calling: faster everywhere, or where not."""
-    from verification.complementarity.step_cost import rivals
+    from verification.cost.step_cost import rivals
 
     for called in ("compiled", "from Python"):
         pairs = [pair for pair in rivals(study.solvers) if pair.called == called and pair.solver.verdict == "solved"]
@@ -116,7 +116,7 @@ def _solvers(study: Any) -> Iterator[Finding]:
 
 def _checks(rows: Any) -> str:
     """What of a call from Python is the impact itself."""
-    from verification.complementarity.step_cost import IAPB, KERNEL
+    from verification.cost.step_cost import IAPB, KERNEL
 
     shares = [kernel.median / whole.median for kernel in rows for whole in rows if
               (kernel.solver, whole.solver) == (KERNEL, IAPB) and (kernel.family, kernel.contacts) ==

@@ -22,9 +22,9 @@ from verification.complementarity.cases import random_cases
 from verification.complementarity.convergence import ConvergenceRow
 from verification.complementarity.extensions import compare_friction, compare_unequal, struck_bar
 from verification.complementarity.problem_study import study_read
-from verification.complementarity.step_cost import LEMKE_KERNEL, CostRow, impact_cost
 from verification.complementarity.study import OWN, ComparisonStudy
-from verification.complementarity.world_cost import WAYS, StepCostRow
+from verification.cost.step_cost import LEMKE_KERNEL, CostRow, impact_cost
+from verification.cost.world_cost import WAYS, StepCostRow
 from verification.finding import VERDICTS
 
 NAN = float("nan")

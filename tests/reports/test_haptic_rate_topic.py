@@ -12,7 +12,6 @@ from reports.evidence.effects import summary
 from reports.evidence.haptic_rate import topic_of
 from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
 from reports.pages.records import SceneEffect
-from verification.complementarity.step_cost import IAPB, KERNEL, CostRow
 from verification.cost.against_mujoco import PartTime, StepRace
 from verification.cost.anytime import BudgetRow
 from verification.cost.haptic_rate import FACTORED, PRINTED, RateTrial
@@ -20,6 +19,7 @@ from verification.cost.kernels import KernelTime, quartiles
 from verification.cost.many_bodies import StepCost
 from verification.cost.scaling import Timing
 from verification.cost.start_up import StartUp
+from verification.cost.step_cost import IAPB, KERNEL, CostRow
 from verification.cost.study import HapticStudy
 from verification.cost.trajectories import TrajectoryRun
 from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED

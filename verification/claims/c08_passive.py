@@ -16,9 +16,9 @@ from verification.claims.algebraic import (
     worst,
 )
 from verification.claims.claim import Claim
-from verification.claims.trace import Trace
 from verification.finding import Table, table_of
 from verification.impacts import Family, draw_of_rank
+from verification.scenes.trace import Trace
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import comparison_window, momentum_distance, peak_force, resting_force
-from verification.claims.trace import COORDINATES
 from verification.finding import Column, Row, Table, table_of
+from verification.scenes.measures import comparison_window, momentum_distance, peak_force, resting_force
+from verification.scenes.trace import COORDINATES
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

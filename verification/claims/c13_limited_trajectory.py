@@ -12,8 +12,8 @@ from verification.claims.claim import Claim
 from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
 from verification.claims.closeness import by_coordinate, closest, count, distances
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import deepest_penetration
 from verification.finding import Row, Table, table_of
+from verification.scenes.measures import deepest_penetration
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -11,9 +11,9 @@ import numpy as np
 from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import peak_force
-from verification.claims.trace import COORDINATES
 from verification.finding import Column, Row, Table, table_of
+from verification.scenes.measures import peak_force
+from verification.scenes.trace import COORDINATES
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

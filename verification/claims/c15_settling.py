@@ -11,12 +11,12 @@ import numpy as np
 from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import bounces, settling_time
 from verification.finding import Column, Row, Table, table_of
+from verification.scenes.measures import bounces, settling_time
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
-    from verification.claims.trace import Trace
+    from verification.scenes.trace import Trace
 
 BOUNCES, SETTLES = "bounces less", "settles sooner"
 COLUMNS = (

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from verification.claims.claim import Claim
 from verification.claims.closeness import count
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import largest_separation, share_limited
 from verification.finding import Column, Row, Table, table_of
+from verification.scenes.measures import largest_separation, share_limited
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -13,7 +13,7 @@ from verification.finding import Column, Row, Table, table_of
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
-    from verification.claims.trace import Trace
+    from verification.scenes.trace import Trace
 
 COLUMNS = (
     *columns("tilt", "stiffness", "damping"),

@@ -38,7 +38,7 @@ def measure(study: Study) -> Table:
 
 
 def _impacts(study: Study) -> Iterator[dict[str, Any]]:
-    from verification.complementarity.step_cost import impact_cost, rivals
+    from verification.cost.step_cost import impact_cost, rivals
 
     depth = study.depth
     rows = impact_cost(CONTACTS[depth], SOLVERS[depth], REPEATS[depth], study.seed, LONGEST)
@@ -50,7 +50,7 @@ def _impacts(study: Study) -> Iterator[dict[str, Any]]:
 
 
 def _steps(study: Study) -> Iterator[dict[str, Any]]:
-    from verification.complementarity.world_cost import IDEAL, STEPPED, step_rivals, world_cost
+    from verification.cost.world_cost import IDEAL, STEPPED, step_rivals, world_cost
 
     rows = world_cost(SCENES, REPEATS[study.depth], STEPS[study.depth], (STEPPED, IDEAL))
     for theirs, ours in step_rivals(rows):

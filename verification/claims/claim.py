@@ -1,6 +1,6 @@
 """Claim and ClaimResult: what is claimed, how a trial decides, and what came of it.
 
-The verdict follows from the trials by one rule, for every claim alike (`verdict_of` and `overall`): nobody types
+The verdict follows from the trials by one rule, for every claim alike (`verdict_of_trials` and `overall`): nobody types
 it in.
 """
 
@@ -10,13 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Row, Table
+from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, Failure, Row, Table, verdict_of_trials
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
-
-# A claim that fails in more trials than it holds in is not "true with exceptions".
-LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -123,7 +120,7 @@ def overall(parts: Sequence[Part]) -> str:
 def parts_of(table: Table) -> tuple[Part, ...]:
     """Return the parts of a claim with their verdicts."""
     return tuple(
-        Part(name, verdict_of(trials.holds), sum(h is True for h in trials.holds),
+        Part(name, verdict_of_trials(trials.holds), sum(h is True for h in trials.holds),
              sum(h is not None for h in trials.holds))
         for name, trials in _by_part(table).items()
     )  # fmt: skip
@@ -134,21 +131,6 @@ def _by_part(table: Table) -> dict[str, Table]:
     if not names:
         return {"": table}
     return {part: table.where(**{names[0]: part}) for part in dict.fromkeys(table.column(names[0]))}
-
-
-def verdict_of(holds: Sequence[bool | None]) -> str:
-    """Return the verdict on one part of a claim from the outcomes of its trials.
-
-    All that can tell hold: reproduced. At least LEAST_SHARE of them: reproduced within stated limits. Fewer:
-    refuted. None can tell: not testable here.
-    """
-    decided = [outcome for outcome in holds if outcome is not None]
-    if not decided:
-        return NOT_TESTABLE
-    share = sum(decided) / len(decided)
-    if share == 1.0:
-        return REPRODUCED
-    return LIMITED if share >= LEAST_SHARE else REFUTED
 
 
 def ranges(table: Table) -> str:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from verification.claims.conditions import Condition, columns
-from verification.claims.measures import comparison_window, largest_distance, root_mean_square
-from verification.claims.trace import COORDINATES
 from verification.finding import Column, Row, Table
+from verification.scenes.measures import comparison_window, largest_distance, root_mean_square
+from verification.scenes.trace import COORDINATES
 
 if TYPE_CHECKING:
     from verification.claims.study import Study

@@ -13,9 +13,9 @@ import numpy as np
 
 from iapb.scene import Scene
 from verification.finding import Column
+from verification.scenes.trace import HALF_SIZE
 
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
-HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
 
 # What the worlds do not see: one run of theirs serves all values.
 _RIGID_IGNORES = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")

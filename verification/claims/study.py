@@ -25,8 +25,8 @@ from verification.claims.conditions import (
     start_conditions,
     wall_conditions,
 )
-from verification.claims.trace import Trace, trace_of
 from verification.finding import Failure, attempt, of_each
+from verification.scenes.trace import Trace, trace_of
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")

@@ -7,17 +7,25 @@ from functools import partial
 
 import numpy as np
 
-from verification.claims.claim import verdict_of
 from verification.complementarity.agreement import REPRODUCED as CONE_TOLERANCE
 from verification.complementarity.agreement import SAME
 from verification.complementarity.agreement_map import MapCell
 from verification.complementarity.convergence import CASES, WITHOUT_TRUTH
 from verification.complementarity.extensions import GAIN
 from verification.complementarity.problem_study import ProblemStudy
-from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
 from verification.complementarity.study import ComparisonStudy
-from verification.complementarity.world_cost import costs_more, step_rivals
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Part, attempt
+from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
+from verification.cost.world_cost import costs_more, step_rivals
+from verification.finding import (
+    LIMITED,
+    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Part,
+    attempt,
+    verdict_of_trials,
+)
 
 C05_TOLERANCE = 1e-12
 # Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
@@ -174,7 +182,7 @@ def ideal_world(study: ComparisonStudy) -> Part | None:
         f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes{more} (positions "
         f"in the sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
         f"{np.median(orders):.2f}); without a truth: {', '.join(WITHOUT_TRUTH)}.",
-        verdict_of([row.first_order for row in rows]), "ideal world")  # fmt: skip
+        verdict_of_trials([row.first_order for row in rows]), "ideal world")  # fmt: skip
 
 
 def cost(study: ComparisonStudy) -> Part | None:
@@ -190,7 +198,8 @@ def cost(study: ComparisonStudy) -> Part | None:
     parts = [_cost_part(rows, family, contacts) for family in dict.fromkeys(row.family for row in rows)
              for contacts in sorted({least, most})]  # fmt: skip
     return Part(f"C22, time per impact: {'; '.join(found)}. Medians: {'; '.join(parts)}.",
-                verdict_of([pair.costs_more for pair in rivals(study.impact_costs)]), "cost", timed=True)  # fmt: skip
+                verdict_of_trials([pair.costs_more for pair in rivals(study.impact_costs)]),
+                "cost", timed=True)  # fmt: skip
 
 
 def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
@@ -216,7 +225,7 @@ def steps(study: ComparisonStudy) -> Part | None:
     if not parts:
         return None
     return Part("C22, time per step: " + "; ".join(parts) + ".",
-                verdict_of([costs_more(*pair) for pair in step_rivals(study.step_costs)]), "steps",
+                verdict_of_trials([costs_more(*pair) for pair in step_rivals(study.step_costs)]), "steps",
                 timed=True)  # fmt: skip
 
 

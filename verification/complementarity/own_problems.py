@@ -14,7 +14,7 @@ from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
 from verification.complementarity.cases import random_cases
 from verification.complementarity.scene_cases import scene_impacts
-from verification.complementarity.step_cost import patch, pile
+from verification.cost.step_cost import patch, pile
 from verification.finding import Failure, attempt
 from verification.hard_cases import HARD_CASES, HardCase
 from verification.impacts import Floats, ImpactCase
@@ -87,7 +87,7 @@ def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
     return ImpactProblem.from_impact(case.mass_matrix, rows, case.velocity, 0.0, mu, name=name)
 
 
-def _with_tangents(normals: Floats) -> Floats:
+def _with_tangents(normals: np.ndarray) -> Floats:
     """Rows n, t, s of every contact at the patch's points: rows (k, 6) -> (3k, 6)."""
     rows = []
     for normal in normals:

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 from iapb.errors import MissingDependencyError
-from verification.complementarity.step_cost import CostRow, impact_cost
 from verification.cost.against_mujoco import PartTime, StepRace, profile_step, race_mujoco
 from verification.cost.anytime import BudgetRow, anytime
 from verification.cost.haptic_rate import RateTrial, haptic_rate
@@ -17,6 +16,7 @@ from verification.cost.many_bodies import StepCost, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.scaling import Timing, scaling
 from verification.cost.start_up import StartUp, start_up
+from verification.cost.step_cost import CostRow, impact_cost
 from verification.cost.trajectories import TrajectoryRun, trajectory_precision
 from verification.finding import Failure, attempt
 from verification.mechanics.own_robots import SHIPPED

@@ -9,9 +9,9 @@ from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.claims.measures import bounces, deepest_penetration, settling_time
-from verification.claims.trace import trace_of
 from verification.finding import Failure, attempt
+from verification.scenes.measures import bounces, deepest_penetration, settling_time
+from verification.scenes.trace import trace_of
 
 Runner = Callable[[Scene, str], Run]
 

@@ -11,9 +11,9 @@ import numpy as np
 from iapb.haptics.waveforms import WAVEFORMS
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.claims.measures import bounces, deepest_penetration, settling_time
-from verification.claims.trace import trace_of
 from verification.finding import Failure, attempt
+from verification.scenes.measures import bounces, deepest_penetration, settling_time
+from verification.scenes.trace import trace_of
 
 RATE = 1000.0  # [Hz]: aluminium rings at 300 Hz
 

@@ -77,11 +77,11 @@ def test_every_claim_has_planted_trials():
 
 @pytest.mark.parametrize("name", sorted(PLANTED))
 def test_judge_confirms_and_refutes(name):
-    from verification.claims.claim import verdict_of
+    from verification.finding import verdict_of_trials
 
     agrees, contradicts = PLANTED[name]
-    assert verdict_of(judged(CLAIMS[name], agrees).holds) == REPRODUCED
-    assert verdict_of(judged(CLAIMS[name], contradicts).holds) == REFUTED
+    assert verdict_of_trials(judged(CLAIMS[name], agrees).holds) == REPRODUCED
+    assert verdict_of_trials(judged(CLAIMS[name], contradicts).holds) == REFUTED
 
 
 @pytest.mark.parametrize(

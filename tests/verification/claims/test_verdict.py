@@ -2,8 +2,16 @@
 
 import pytest
 
-from verification.claims.claim import Claim, Part, overall, verdict_of
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Column, table_of
+from verification.claims.claim import Claim, Part, overall
+from verification.finding import (
+    LIMITED,
+    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
+    Column,
+    table_of,
+    verdict_of_trials,
+)
 
 
 @pytest.mark.parametrize(
@@ -19,7 +27,7 @@ from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Col
     ],
 )
 def test_verdict_follows_from_the_trials(holds, verdict):
-    assert verdict_of(holds) == verdict
+    assert verdict_of_trials(holds) == verdict
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from verification.complementarity.cases import random_cases
 from verification.complementarity.findings import PARTS, problems
 from verification.complementarity.own_problems import own_problems
 from verification.complementarity.problem_study import study_read
-from verification.complementarity.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
+from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
 from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 FOUND = compare_cases(random_cases(3, seed=12))

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.claims.conditions import HALF_SIZE
-from verification.claims.trace import Trace
+from verification.scenes.trace import HALF_SIZE, Trace
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError
 from reference.one_thread import one_thread
-from verification.complementarity.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
+from verification.cost.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
 from verification.finding import Failure, attempt, failure_of
 from verification.impacts import ImpactCase
 

@@ -13,6 +13,7 @@ from iapb.run import Run
 Floats = NDArray[np.float64]
 
 COORDINATES = ("x", "y", "theta")
+HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
 UNITS = {"x": "m", "y": "m", "theta": "rad"}
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from verification.claims.conditions import TIGHT, Condition, limited_conditions, start_conditions
-from verification.claims.measures import (
+from verification.claims.study import conditions
+from verification.scenes.measures import (
     bounces,
     comparison_window,
     corner_gaps,
@@ -16,8 +17,7 @@ from verification.claims.measures import (
     root_mean_square,
     settling_time,
 )
-from verification.claims.study import conditions
-from verification.claims.trace import Trace
+from verification.scenes.trace import Trace
 
 STEPS, DT = 100, 0.01
 

@@ -60,7 +60,7 @@ class LemkeCall:
 
     def repeated(self, times: int) -> Floats:
         """Resolve the impact `times` times; v⁺ of the last."""
-        from verification.complementarity.lemke_kernel import repeat_lemke
+        from verification.cost.lemke_kernel import repeat_lemke
 
         case = self.case
         found: Floats = repeat_lemke(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution, times)
