@@ -13,7 +13,6 @@ from iapb import find_scene, load_scene
 from reports.evidence import engines, haptic_rate, scenes, stability
 from reports.pages.records import Topic
 from reports.runner import Runner
-from verification.complementarity import step_cost
 from verification.cost import (
     against_mujoco,
     anytime,
@@ -22,6 +21,7 @@ from verification.cost import (
     resting_scenes,
     scaling,
     start_up,
+    step_cost,
     study,
     trajectories,
 )

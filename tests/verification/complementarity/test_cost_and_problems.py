@@ -10,9 +10,9 @@ import pytest
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.fclib import write_fclib
-from verification.complementarity import step_cost
 from verification.complementarity.findings import problems
 from verification.complementarity.problem_study import FACTORS, study_problems
+from verification.cost import step_cost
 from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
 
 

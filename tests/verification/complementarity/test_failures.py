@@ -16,10 +16,9 @@ from verification.complementarity import (
     extensions,
     findings,
     own_problems,
-    step_cost,
     study,
-    world_cost,
 )
+from verification.cost import step_cost, world_cost
 from verification.finding import NOT_TESTABLE, Failure
 
 
