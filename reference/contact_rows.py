@@ -1,36 +1,46 @@
 """Contacts of a system as rows, gaps and velocities, and back into the record of a step.
 
-Rows nᵀ(J_a − J_b), (11)-(12), are built from the frame Jacobians of the bodies.
+Rows nᵀ(J_a − J_b), (11)-(12), are built from Pinocchio's frame Jacobians of the bodies and the contacts of
+`reference.contact_finding`: nothing here calls the engine's mechanics or its narrow phase.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact.detection import detect_contacts
-from iapb.contact.geometry import WORLD, ContactBuffer, make_contact_buffer
+from reference.contact_finding import Contacts, find_contacts
+from reference.rigid_body import PinocchioMechanism, model_of
 
 Floats = NDArray[np.float64]
 
 # nᵀJ smaller than this share of what it is summed from is rounding, not a lever arm of the contact.
 ROW_NOISE = 1e-13
 Z = np.array([0.0, 0.0, 1.0])
-_GEOMETRY = ("shape_a", "shape_b", "body_a", "body_b", "feature", "point", "normal", "gap")
+
+_mechanics: WeakKeyDictionary[Any, PinocchioMechanism] = WeakKeyDictionary()
+
+
+def mechanics_of(system: Any) -> PinocchioMechanism:
+    """Pinocchio's model of the system's mechanism, built once."""
+    if system not in _mechanics:
+        _mechanics[system] = model_of(system.mechanism)
+    return _mechanics[system]
 
 
 @dataclass(frozen=True)
 class ContactRows:
     """c contacts of one configuration.
 
-    geometry : ContactBuffer, its first c rows in use
+    geometry : Contacts, c of each
     jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma : (c,) J v [m/s]
     """
 
-    geometry: ContactBuffer
+    geometry: Contacts
     jacobian: Floats
     gap: Floats
     gamma: Floats
@@ -38,20 +48,29 @@ class ContactRows:
 
 def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     """Return the contacts of `system` at q (nq,) with gap <= margin [m]."""
-    geometry = make_contact_buffer(system.capacity)
-    placements = system.mechanism.placements(q)
-    count = (
-        detect_contacts(system.shapes, system.pairs, placements, margin, geometry) if len(system.pairs) else 0
-    )
-    rows = contact_jacobian(system.mechanism, q, placements[1], geometry, count)
-    return ContactRows(geometry, rows, geometry.gap[:count].copy(), rows @ v)
+    axes, origins, frames = mechanics_of(system).bodies(q)
+    geometry = find_contacts(system.shapes, system.pairs, axes, origins, margin)
+    rows = contact_jacobian(geometry.normal, geometry, origins, frames)
+    return ContactRows(geometry, rows, geometry.gap, rows @ v)
 
 
-def contact_jacobian(
-    mechanism: Any, q: Floats, origins: Floats, geometry: ContactBuffer, count: int
-) -> Floats:
-    """Rows nᵀ(J_a − J_b) (c, d), zero where they are only rounding; `origins` (nb, 3) of the bodies."""
-    return _rows_along(geometry.normal[:count], mechanism, q, origins, geometry)
+def contact_jacobian(directions: Floats, geometry: Contacts, origins: Floats, frames: Floats) -> Floats:
+    """Velocity (c, d) of a against b at each contact along its direction n (c, 3), zero where it is only rounding.
+
+    With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
+    origins (n + 1, 3), frames (n + 1, 6, d) : of the bodies, the world's last
+    """
+    count = len(directions)
+    rows, sizes = np.zeros((count, frames.shape[2])), np.zeros(count)
+    norms = np.linalg.norm(frames.reshape(-1, 2, 3 * frames.shape[2]), axis=2)
+    for bodies, sign in ((geometry.body_a, 1.0), (geometry.body_b, -1.0)):
+        arms = geometry.point - origins[bodies]
+        along = np.concatenate([directions, cross(arms, directions)], axis=1)
+        rows += sign * np.einsum("cx,cxd->cd", along, frames[bodies])
+        reach = np.linalg.norm(arms, axis=1) + np.linalg.norm(geometry.point, axis=1)
+        sizes += norms[bodies, 0] + reach * norms[bodies, 1]
+    rows[np.linalg.norm(rows, axis=1) <= ROW_NOISE * sizes] = 0.0
+    return rows
 
 
 def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Floats]:
@@ -59,12 +78,10 @@ def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Fl
 
     s = 1 in the plane, t = z × n; s = 2 in space, so that (n, t_1, t_2) is right-handed.
     """
-    normals = found.geometry.normal[: len(found.gap)]
+    normals = found.geometry.normal
     tangents = _tangents(normals) if getattr(system.scene, "dimensions", 2) == 3 else cross(Z, normals)[:, None]
-    origins = system.mechanism.placements(q)[1]
-    rows = [
-        _rows_along(tangents[:, k], system.mechanism, q, origins, found.geometry) for k in range(tangents.shape[1])
-    ]
+    _, origins, frames = mechanics_of(system).bodies(q)
+    rows = [contact_jacobian(tangents[:, k], found.geometry, origins, frames) for k in range(tangents.shape[1])]
     return tangents, np.stack(rows, axis=1)
 
 
@@ -85,28 +102,6 @@ def cross(a: Floats, b: Floats) -> Floats:
     return found
 
 
-def _rows_along(
-    directions: Floats, mechanism: Any, q: Floats, origins: Floats, geometry: ContactBuffer
-) -> Floats:
-    """Velocity of a against b at each contact along its direction n (c, 3).
-
-    With the body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
-    """
-    count = len(directions)
-    rows, sizes = np.zeros((count, mechanism.nv)), np.zeros(count)
-    for bodies, sign in ((geometry.body_a[:count], 1.0), (geometry.body_b[:count], -1.0)):
-        for body in {int(b) for b in bodies} - {WORLD}:
-            mine = np.flatnonzero(bodies == body)
-            frame, normals = mechanism.frame_jacobian(q, body), directions[mine]
-            arms = geometry.point[mine] - origins[body]
-            rows[mine] += sign * (normals @ frame[:3] + cross(arms, normals) @ frame[3:])
-            reach = np.linalg.norm(arms, axis=1) + np.linalg.norm(geometry.point[mine], axis=1)
-            sizes[mine] += np.linalg.norm(frame[:3]) + reach * np.linalg.norm(frame[3:])
-    noise = np.linalg.norm(rows, axis=1) <= ROW_NOISE * sizes
-    rows[noise] = 0.0
-    return rows
-
-
 def write_contacts(
     state: Any, found: ContactRows, impulse: Floats, friction: Floats, forced: NDArray[np.bool_], dt: float
 ) -> None:
@@ -117,7 +112,7 @@ def write_contacts(
     kept = np.flatnonzero((found.gap <= 0.0) | (impulse > 0.0))
     was = identities(state.contacts, range(int(state.contact_count[0])))
     identity = identities(found.geometry, kept)
-    for name in _GEOMETRY:
+    for name in Contacts._fields:
         getattr(state.contacts, name)[: len(kept)] = getattr(found.geometry, name)[kept]
     state.contacts.normal_velocity[: len(kept)] = found.gamma[kept]
     state.contacts.normal_force[: len(kept)] = np.where(forced, impulse, 0.0)[kept] / dt
@@ -140,6 +135,6 @@ def write_impact(state: Any, system: Any, v: Floats, change: Floats, impulse: Fl
     log.logged[0] = 1
 
 
-def identities(contacts: ContactBuffer, rows: Any) -> list[tuple[int, int, int]]:
+def identities(contacts: Any, rows: Any) -> list[tuple[int, int, int]]:
     """Which contact each row is: its two shapes and their features."""
     return [(int(contacts.shape_a[i]), int(contacts.shape_b[i]), int(contacts.feature[i])) for i in rows]

@@ -1,4 +1,4 @@
-"""Rigid-body dynamics by Pinocchio, for comparison with the engine's own. The only file that imports it for this.
+"""Rigid-body dynamics by Pinocchio: the mechanics of the rigid worlds, and for comparison with the engine's own.
 
 A Pinocchio model comes from a Mechanism (`model_of`) or, independently of the engine's reading, from the URDF
 file by Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` answers in the engine's conventions.
@@ -41,6 +41,7 @@ class PinocchioMechanism:
     def __init__(self, model: Any) -> None:
         self.model, self.data = model, model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
+        self._bodies: list[int] | None = None  # frames of the bodies, in the mechanism's order
 
     def mass_matrix(self, q: Floats) -> Floats:
         """M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
@@ -83,6 +84,29 @@ class PinocchioMechanism:
         _pinocchio().framesForwardKinematics(self.model, self.data, q)
         frame = self.data.oMf[self._frame(body)]
         return np.array(frame.rotation), np.array(frame.translation)
+
+    def inner_forces(self, q: Floats, v: Floats, g: ArrayLike) -> Floats:
+        """B + G (d,)."""
+        return self._under(g, q, v, np.zeros(self.nv))
+
+    def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        """Axes (n + 1, 3, 3), origins (n + 1, 3), frame Jacobians (n + 1, 6, d) of n bodies, and last of the world."""
+        pinocchio, frames = _pinocchio(), self.model.frames
+        pinocchio.computeJointJacobians(self.model, self.data, q)
+        pinocchio.updateFramePlacements(self.model, self.data)
+        if self._bodies is None:
+            body = pinocchio.FrameType.BODY
+            self._bodies = [k for k in range(1, len(frames)) if frames[k].type == body]
+        n = len(self._bodies)
+        axes, origins, rows = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 6, self.nv))
+        axes[n] = np.eye(3)
+        for b, frame in enumerate(self._bodies):
+            placed = self.data.oMf[frame]
+            axes[b], origins[b] = placed.rotation, placed.translation
+            rows[b] = pinocchio.getFrameJacobian(
+                self.model, self.data, frame, pinocchio.LOCAL_WORLD_ALIGNED
+            ).reshape(6, self.nv)
+        return axes, origins, rows
 
     def kinetic_energy(self, q: Floats, v: Floats) -> float:
         """Kinetic energy [J]."""

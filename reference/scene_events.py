@@ -38,7 +38,8 @@ from iapb.system import System
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.configurations import configuration_rate, of_length_one
-from reference.contact_rows import find_rows, identities
+from reference.contact_rows import find_rows, identities, mechanics_of
+from reference.rigid_body import PinocchioMechanism, model_of
 from reference.rigid_step import nearest_velocity
 
 Floats = NDArray[np.float64]
@@ -147,12 +148,13 @@ class _Motion:
     def __post_init__(self) -> None:
         self.system = System(self.scene)
         mechanism = self.system.mechanism
+        self.mechanics = mechanics_of(self.system)
         if self.coupled and mechanism.nq != mechanism.nv:
             raise ArgumentError("scene", self.scene.name, "with a coupling, a scene whose coordinates may be added")
         self.d, self.nq = mechanism.nv, mechanism.nq
         self.restitution = one_restitution(self.scene, self.system.pairs)
         self.tool = slice(*self.system.tool_dofs)
-        self.device = self.system.device_mechanism() if self.coupled else None
+        self.device = model_of(self.system.device_mechanism()) if self.coupled else None
         settings = self.scene.device
         self.drag = np.asarray(settings.damping if settings is not None and settings.damping else 0.0)
 
@@ -171,25 +173,22 @@ class _Motion:
 
     def force(self, state: Floats) -> Floats:
         """Applied − B − G (d,), the coupling included."""
-        mechanism, (q, v, device_q, device_v) = self.system.mechanism, self.split(state)
-        force = -mechanism.bias(q, v) - mechanism.gravity(q, self.system.gravity)
-        if self.scene.hand is not None:
-            force += self._hand(mechanism, q, self.d)
+        q, v, device_q, device_v = self.split(state)
+        force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
         if self.coupled:
             force[self.tool] += self._pull(device_q - q[self.tool], device_v - v[self.tool])
         return force
 
-    def _hand(self, mechanism: Any, q: Floats, size: int) -> Floats:
+    def _hand(self, mechanics: PinocchioMechanism, q: Floats, size: int) -> Floats:
         hand = self.scene.hand
         if hand is None:
             return np.zeros(size)
-        body = mechanism.index(hand.body)
-        rotations, origins = mechanism.placements(q)
-        point = origins[body] + rotations[body] @ np.array([*hand.point, 0.0])[:3]
+        rotation, origin = mechanics.placement(q, hand.body)
+        point = origin + rotation @ np.array([*hand.point, 0.0])[:3]
         wrench = np.zeros(6)
         wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
-        turning = mechanism.frame_jacobian(q, body)[3:].T @ wrench[3:]
-        return np.asarray(mechanism.point_jacobian(q, body, point).T @ wrench[:3] + turning, np.float64)
+        turning = mechanics.frame_jacobian(q, hand.body)[3:].T @ wrench[3:]
+        return np.asarray(mechanics.point_jacobian(q, hand.body, point).T @ wrench[:3] + turning, np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:
         gains = self.scene.couplings.four_channel
@@ -200,14 +199,13 @@ class _Motion:
     def _here(self, state: Floats, names: list[Contact]) -> _Here:
         """What contacts of these names meet in a state; J̇v by differences of fourth order along the motion."""
         q, v, _, _ = self.split(state)
-        mechanism = self.system.mechanism
-        mass = mechanism.mass_matrix(q)
+        mass = self.mechanics.mass_matrix(q)
         free = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
         if not names:
             return _Here(v, mass, free, np.zeros((0, self.d)), np.zeros(0))
 
         def turning(h: float) -> Floats:
-            ahead, behind = (self.rows(mechanism.integrate(q, v, s * h), v) for s in (1.0, -1.0))
+            ahead, behind = (self.rows(self.mechanics.integrate(q, v, s * h), v) for s in (1.0, -1.0))
             return np.array([(ahead[n][1] - behind[n][1]) @ v / (2.0 * h) for n in names])
 
         found = self.rows(q, v)
@@ -225,7 +223,7 @@ class _Motion:
         q, v, device_q, device_v = self.split(state)
         acceleration, contact = self.acceleration(state)
         if self.device is None:
-            return np.concatenate([configuration_rate(self.system.mechanism, q, v), acceleration])
+            return np.concatenate([configuration_rate(self.mechanics, q, v), acceleration])
         force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
         force -= self.drag * device_v
@@ -239,7 +237,7 @@ class _Motion:
         names = [n for n, (gap, _) in found.items() if gap <= self.tolerances.closed or n in self.held]
         rows = np.array([found[n][1] for n in names]).reshape(len(names), self.d)
         self.widest = max([self.widest, *(found[n][0] for n in names)])
-        mass, impacts = self.system.mechanism.mass_matrix(q), 0
+        mass, impacts = self.mechanics.mass_matrix(q), 0
         while (rows @ v < -self.tolerances.at_rest).any():
             impacts += 1
             if impacts > _AT_ONCE:

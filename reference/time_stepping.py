@@ -17,7 +17,14 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene.mechanism import restitution_by_pair
-from reference.contact_rows import ContactRows, find_rows, tangent_rows, write_contacts, write_impact
+from reference.contact_rows import (
+    ContactRows,
+    find_rows,
+    mechanics_of,
+    tangent_rows,
+    write_contacts,
+    write_impact,
+)
 from reference.one_thread import one_thread
 from reference.rigid_friction import FRICTION_LAWS, friction_step
 from reference.rigid_step import SCHEMES, nearest_velocity, rigid_step, velocity_bounds
@@ -91,10 +98,10 @@ class RigidConstraints:
             return self._advance(system, state, applied_force, dt)
 
     def _advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
-        mechanism, q, v = system.mechanism, state.q.copy(), state.v.copy()
-        mass = mechanism.mass_matrix(q)
+        mechanics, q, v = mechanics_of(system), state.q.copy(), state.v.copy()
+        mass = mechanics.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
-        force = applied_force - _inner_forces(system, q, v)
+        force = applied_force - mechanics.inner_forces(q, v, system.gravity)
         step = self._solve(system, mass, q, v, force, dt, found)
         blows = _blows(mass, found, step.normal, system.scene.contact.approach_velocity)
         normal = found.jacobian.T * step.normal
@@ -102,7 +109,7 @@ class RigidConstraints:
         pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
         write_contacts(state, found, step.normal, step.tangential, ~blows, dt)
         write_impact(state, system, v, np.linalg.solve(mass, impulse), impulse, found.jacobian[blows])
-        q_plus = mechanism.integrate(q, step.velocity, dt)
+        q_plus = mechanics.integrate(q, step.velocity, dt)
         contact_state = _contact_state(found, step.normal, blows)
         return StepResult(q_plus, step.velocity, pressing, dragging, impulse, contact_state)
 
@@ -129,8 +136,7 @@ def _restitution(system: Any, found: ContactRows) -> float | Floats:
     values = system.restitutions
     if len(values) <= 1:
         return float(values[0]) if len(values) else float(system.scene.contact.restitution)
-    count = len(found.gap)
-    pairs = np.stack([found.geometry.shape_a[:count], found.geometry.shape_b[:count]], axis=1)
+    pairs = np.stack([found.geometry.shape_a, found.geometry.shape_b], axis=1)
     return restitution_by_pair(system.scene, pairs)
 
 
@@ -149,16 +155,6 @@ def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity:
     _, island = connected_components(rows @ np.linalg.solve(mass, rows.T) != 0.0, directed=False)
     struck[pushes] = np.isin(island, island[struck[pushes]])
     return struck
-
-
-def _inner_forces(system: Any, q: Floats, v: Floats) -> Floats:
-    """B + G (d,), each left out where it is zero for good."""
-    forces = np.zeros_like(v)
-    if system.mechanism.has_velocity_terms:
-        forces += system.mechanism.bias(q, v)
-    if np.any(system.gravity):
-        forces += system.mechanism.gravity(q, system.gravity)
-    return forces
 
 
 def _contact_state(found: ContactRows, impulse: Floats, blows: NDArray[np.bool_]) -> int:

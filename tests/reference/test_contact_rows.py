@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.contact.geometry import make_contact_buffer
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.simulation import Simulation
+from reference.contact_finding import Contacts
 from reference.contact_rows import contact_jacobian
+from reference.rigid_body import model_of
 from reference.time_stepping import RigidConstraints
 
 SCENE = Path(__file__).parents[2] / "scenes" / "peg_corner.yaml"
@@ -30,33 +31,34 @@ def linkage() -> Mechanism:
     )
 
 
-def test_rows_are_those_of_the_point_jacobians() -> None:
+def contacts(bodies: list[tuple[int, int]], points: np.ndarray, normals: np.ndarray) -> Contacts:
+    """Contacts of these bodies, of no shape in particular."""
+    a, b = np.array(bodies, np.int32).T
+    nothing = np.zeros(len(a), np.int32)
+    return Contacts(nothing, nothing, a, b, nothing.astype(np.int64), points, normals, np.zeros(len(a)))
+
+
+def test_rows_are_those_of_the_engines_point_jacobians() -> None:
     rng, mechanism = np.random.default_rng(0), linkage()
-    q, geometry = rng.normal(size=mechanism.nq), make_contact_buffer(4)
-    geometry.body_a[:], geometry.body_b[:] = [0, 1, 2, 1], [-1, -1, 1, 2]
-    angles = rng.uniform(0.0, 6.0, size=4)
-    geometry.normal[:] = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(4)])
-    geometry.point[:] = rng.normal(size=(4, 3))
-    rows = contact_jacobian(mechanism, q, mechanism.placements(q)[1], geometry, 4)
+    q, angles = rng.normal(size=mechanism.nq), rng.uniform(0.0, 6.0, size=4)
+    normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(4)])
+    found = contacts([(0, -1), (1, -1), (2, 1), (1, 2)], rng.normal(size=(4, 3)), normals)
+    _, origins, frames = model_of(mechanism).bodies(q)
+    rows = contact_jacobian(found.normal, found, origins, frames)
     for i in range(4):
-        expected = geometry.normal[i] @ mechanism.point_jacobian(
-            q, int(geometry.body_a[i]), geometry.point[i]
-        )
-        if geometry.body_b[i] >= 0:
-            at_b = mechanism.point_jacobian(q, int(geometry.body_b[i]), geometry.point[i])
-            expected = expected - geometry.normal[i] @ at_b
+        expected = normals[i] @ mechanism.point_jacobian(q, int(found.body_a[i]), found.point[i])
+        if found.body_b[i] >= 0:
+            expected = expected - normals[i] @ mechanism.point_jacobian(q, int(found.body_b[i]), found.point[i])
         assert rows[i] == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_straight_arm_struck_along_itself_has_no_row() -> None:
     """Rounding leaves 1e-16 of a lever arm; as a row of its own it would take half the energy."""
-    mechanism, geometry = linkage(), make_contact_buffer(1)
     angle = 0.7
-    q = np.array([angle, 0.0, 0.0, 0.0, 0.0])
-    axis = np.array([np.cos(angle), np.sin(angle), 0.0])
-    geometry.body_a[0], geometry.body_b[0] = 1, -1
-    geometry.normal[0], geometry.point[0] = -axis, 1.7 * axis
-    assert not contact_jacobian(mechanism, q, mechanism.placements(q)[1], geometry, 1).any()
+    q, axis = np.array([angle, 0.0, 0.0, 0.0, 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
+    found = contacts([(1, -1)], 1.7 * axis[None], -axis[None])
+    _, origins, frames = model_of(linkage()).bodies(q)
+    assert not contact_jacobian(found.normal, found, origins, frames).any()
 
 
 @pytest.mark.skipif(not SCENE.exists(), reason="the scene of the corner is not here")

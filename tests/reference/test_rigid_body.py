@@ -15,7 +15,7 @@ from iapb.errors import ArgumentError
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference import rigid_body
-from reference.mechanism_comparison import compare
+from reference.engine_differences import compare
 from reference.random_mechanisms import random_mechanism, random_state
 
 AGREEMENT = 1e-11  # relative to the largest entry; two algorithms of 30 links, each exact to some 1e-14

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from iapb.mechanics.mechanism import Mechanism
-from reference.mechanism_comparison import compare
+from reference.engine_differences import compare
 from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
 from verification.finding import Column, Failure, Table, check_depth, of_each, table_of

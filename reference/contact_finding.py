@@ -1,0 +1,451 @@
+"""Contacts of the rigid worlds in closed form: circles, convex polygons and half-planes; balls, boxes and half-spaces.
+
+The engine's conventions (unit normal from b into a, gap along it, point midway, its choice of points where a face lies
+on a face), but none of its code: everything is computed in the world frame, a polygon's nearest point is sought on all
+edges, faces of boxes are clipped by Sutherland and Hodgman. So is every sum in another order, and a fault of one shows
+beside the other (`reference.engine_differences`).
+
+Two polygons, or boxes, meet along the axis of largest separation; axes of a flush pair agree to rounding, so what
+differs by less than TIE of the size counts as equal, and one of them goes first: b's edge, or a's face.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.geometry import BOX, CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE, Shapes
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int32]
+
+ROUNDING = 1e-12  # share of the size within which points coincide
+TIE = 1e-14  # share of the size within which separations are equal: a tilt of 1e-6 already tells two faces apart
+# The engine's conventions for boxes: two edges decide only where they overlap this share less than faces do; directions
+# whose sine is below that have no common normal of their own; four points of a patch stay.
+EDGE_SHARE, PARALLEL, MOST_POINTS = 0.05, 1e-6, 4
+
+
+class Contacts(NamedTuple):
+    """c contacts: shapes, bodies (-1: the world), feature (c,); point, normal (c, 3); gap (c,) [m]."""
+
+    shape_a: Integers
+    shape_b: Integers
+    body_a: Integers
+    body_b: Integers
+    feature: NDArray[np.int64]
+    point: Floats
+    normal: Floats
+    gap: Floats
+
+
+def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float) -> Contacts:
+    """The contacts with gap <= margin [m]; axes (n + 1, 3, 3), origins (n + 1, 3) of bodies, the world's last."""
+    ids, values = np.empty((_room(shapes, pairs), 3), np.int64), np.empty((_room(shapes, pairs), 7))
+    turned = axes[shapes.body]
+    center = np.einsum("kij,kj->ki", turned, shapes.center) + origins[shapes.body]
+    frames = turned @ shapes.axes
+    owner = np.repeat(shapes.body, shapes.count)
+    flat = np.zeros((len(owner), 3))
+    flat[:, :2] = shapes.vertices
+    corners = np.einsum("kij,kj->ki", axes[owner], flat) + origins[owner]
+    for plane in np.flatnonzero(shapes.kind == HALF_PLANE):  # its second row is a direction
+        corners[shapes.first[plane] + 1] -= origins[shapes.body[plane]]
+    count = _find(shapes.kind, shapes.radius, shapes.first, shapes.count, corners, center, frames, shapes.half_size,
+                  pairs, float(margin), ids, values)  # fmt: skip
+    a, b = ids[:count, 0].astype(np.int32), ids[:count, 1].astype(np.int32)
+    return Contacts(a, b, shapes.body[a], shapes.body[b], ids[:count, 2], values[:count, :3], values[:count, 3:6],
+                    values[:count, 6])  # fmt: skip
+
+
+def _room(shapes: Shapes, pairs: NDArray[np.int32]) -> int:
+    """Largest number of contacts, with room for a clipped face."""
+    most = np.where(shapes.kind == BOX, 8, np.maximum(shapes.count, 2))
+    return int(most[pairs[:, 0]].sum()) + 16 if len(pairs) else 1
+
+
+@numba.njit(cache=True, fastmath=False)
+def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin, ids, values):  # type: ignore[no-untyped-def]
+    """Write the contacts of all pairs; return how many."""
+    n = 0
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        ka, kb = kind[a], kind[b]
+        pa, pb = corners[first[a] : first[a] + count[a]], corners[first[b] : first[b] + count[b]]
+        if kb == HALF_PLANE:
+            n = _points_on_plane(pa, radius[a], pb[0], pb[1], margin, ids, values, n)
+        elif kb == HALF_SPACE:
+            spread = np.zeros((1, 3)) if ka == SPHERE else _box_corners(axes[a], half[a])
+            n = _points_on_plane(center[a] + spread, radius[a], center[b], axes[b, :, 2].copy(), margin, ids, values, n)
+        elif ka == CIRCLE and kb == CIRCLE:
+            n = _balls(pa[0], radius[a], pb[0], radius[b], np.array([0.0, 1.0 if a < b else -1.0, 0.0]), margin, ids,
+                       values, n)  # fmt: skip
+        elif ka == SPHERE and kb == SPHERE:
+            n = _balls(center[a], radius[a], center[b], radius[b], np.array([0.0, 0.0, 1.0 if a < b else -1.0]), margin,
+                       ids, values, n)  # fmt: skip
+        elif ka == CIRCLE:
+            n = _ball_on(_nearest_on_polygon(pb, pa[0]), pa[0], radius[a], 1.0, margin, ids, values, n)
+        elif kb == CIRCLE:
+            n = _ball_on(_nearest_on_polygon(pa, pb[0]), pb[0], radius[b], -1.0, margin, ids, values, n)
+        elif ka == SPHERE:
+            nearest = _nearest_on_box(center[b], axes[b], half[b], center[a])
+            n = _ball_on(nearest, center[a], radius[a], 1.0, margin, ids, values, n)
+        elif kb == SPHERE:
+            nearest = _nearest_on_box(center[a], axes[a], half[a], center[b])
+            n = _ball_on(nearest, center[b], radius[b], -1.0, margin, ids, values, n)
+        elif ka == BOX:
+            n = _boxes(center[a], axes[a], half[a], center[b], axes[b], half[b], margin, ids, values, n)
+        else:
+            n = _polygons(pa, pb, margin, ids, values, n)
+        for i in range(n - 1, -1, -1):
+            if ids[i, 0] >= 0:
+                break
+            ids[i, 0], ids[i, 1] = a, b
+    return n
+
+
+@numba.njit(cache=True, fastmath=False)
+def _store(ids, values, n, feature, point, normal, gap):  # type: ignore[no-untyped-def]
+    """Write a contact, its shapes still open."""
+    ids[n, 0], ids[n, 2] = -1, feature
+    values[n, :3], values[n, 3:6], values[n, 6] = point, normal, gap
+    return n + 1
+
+
+@numba.njit(cache=True, fastmath=False)
+def _feature(kind, one, other):  # type: ignore[no-untyped-def]
+    """Number of two features; kind 0: corner of a on a face of b, 1: the other way round, 2: two corners or edges."""
+    return (kind * 100_000 + one) * 100_000 + other
+
+
+@numba.njit(cache=True, fastmath=False)
+def _points_on_plane(points, radius, origin, normal, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Corners (or the middle of a ball) over a half-plane or half-space."""
+    for i in range(len(points)):
+        gap = np.sum((points[i] - origin) * normal) - radius
+        if gap <= margin:
+            n = _store(ids, values, n, _feature(0, i, 0), points[i] - (radius + 0.5 * gap) * normal, normal, gap)
+    return n
+
+
+@numba.njit(cache=True, fastmath=False)
+def _balls(x, radius_x, y, radius_y, otherwise, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Two circles or balls; `otherwise` is the normal where the middles coincide."""
+    apart = x - y
+    distance = np.sqrt(np.sum(apart * apart))
+    gap = distance - (radius_x + radius_y)
+    if gap > margin:
+        return n
+    normal = apart / distance if distance > 0.0 else otherwise
+    return _store(ids, values, n, 0, y + 0.5 * (distance + radius_y - radius_x) * normal, normal, gap)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _ball_on(nearest, middle, radius, sign, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """A circle or ball at a signed distance from a polygon or box; sign −1 where the ball is b."""
+    normal, distance, feature = nearest
+    gap = distance - radius
+    if gap > margin:
+        return n
+    return _store(ids, values, n, feature, middle - (radius + 0.5 * gap) * normal, sign * normal, gap)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _edges(polygon):  # type: ignore[no-untyped-def]
+    """Outward unit normals (k, 3) and lengths (k,) of a counterclockwise polygon's edges."""
+    normals, lengths = np.zeros((len(polygon), 3)), np.empty(len(polygon))
+    for i in range(len(polygon)):
+        edge = polygon[(i + 1) % len(polygon)] - polygon[i]
+        lengths[i] = np.sqrt(np.sum(edge * edge))
+        normals[i, 0], normals[i, 1] = edge[1] / lengths[i], -edge[0] / lengths[i]
+    return normals, lengths
+
+
+@numba.njit(cache=True, fastmath=False)
+def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
+    """Direction from the polygon to a point, signed distance and feature; inside, by the nearest edge."""
+    normals, lengths = _edges(polygon)
+    inner, edge = -np.inf, 0
+    for i in range(len(polygon)):
+        height = np.sum((x - polygon[i]) * normals[i])
+        if height > inner:
+            inner, edge = height, i
+    if inner <= 0.0:
+        return normals[edge], inner, _feature(1, 0, edge)
+    best, normal, feature = np.inf, normals[edge], 0
+    for i in range(len(polygon)):
+        from_start, height = x - polygon[i], np.sum((x - polygon[i]) * normals[i])
+        along = -normals[i, 1] * from_start[0] + normals[i, 0] * from_start[1]
+        if 0.0 <= along <= lengths[i]:
+            if 0.0 < height < best:
+                best, normal, feature = height, normals[i], _feature(1, 0, i)
+        elif along < 0.0:
+            distance = np.sqrt(np.sum(from_start * from_start))
+            if distance < best:
+                best, normal, feature = distance, from_start / distance, _feature(2, i, 0)
+    return normal, best, feature
+
+
+@numba.njit(cache=True, fastmath=False)
+def _along(axes, x):  # type: ignore[no-untyped-def]
+    """Components (3,) of x along the axes, without BLAS."""
+    found = np.empty(3)
+    for k in range(3):
+        found[k] = axes[0, k] * x[0] + axes[1, k] * x[1] + axes[2, k] * x[2]
+    return found
+
+
+@numba.njit(cache=True, fastmath=False)
+def _nearest_on_box(center, axes, half, x):  # type: ignore[no-untyped-def]
+    """Direction from the box to a point, signed distance and feature; inside, by the nearest face."""
+    local = _along(axes, x - center)
+    beyond = np.abs(local) - half
+    if beyond.max() <= 0.0:
+        face = int(np.argmax(beyond))
+        sign = 1.0 if local[face] >= 0.0 else -1.0
+        return sign * axes[:, face].copy(), beyond[face], _feature(1, face, int(sign > 0.0))
+    out, region = np.zeros(3), 0
+    for k in range(3):
+        if beyond[k] > 0.0:
+            out += np.sign(local[k]) * beyond[k] * axes[:, k]
+            region += (1 if local[k] > 0.0 else 2) * 3**k
+    distance = np.sqrt(np.sum(out * out))
+    return out / distance, distance, _feature(2, region, 0)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _box_corners(axes, half):  # type: ignore[no-untyped-def]
+    """Corners (8, 3) about the middle."""
+    corners = np.empty((8, 3))
+    for i in range(8):
+        for x in range(3):
+            corners[i, x] = (
+                (1 - 2 * (i & 1)) * half[0] * axes[x, 0]
+                + (1 - (i & 2)) * half[1] * axes[x, 1]
+                + (1 - (i & 4) // 2) * half[2] * axes[x, 2]
+            )
+    return corners
+
+
+@numba.njit(cache=True, fastmath=False)
+def _best_edge(onto, normals, other):  # type: ignore[no-untyped-def]
+    """Largest separation of `other` over the edges of `onto`, and the edge."""
+    best, edge = -np.inf, 0
+    for i in range(len(onto)):
+        lowest = np.inf
+        for x in other:
+            lowest = min(lowest, np.sum((x - onto[i]) * normals[i]))
+        if lowest > best:
+            best, edge = lowest, i
+    return best, edge
+
+
+@numba.njit(cache=True, fastmath=False)
+def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Two convex polygons: the incident edge over the reference edge, or two corners."""
+    (normals_a, lengths_a), (normals_b, lengths_b) = _edges(a), _edges(b)
+    size = lengths_a.max() + lengths_b.max()
+    (over_a, edge_a), (over_b, edge_b) = _best_edge(a, normals_a, b), _best_edge(b, normals_b, a)
+    if max(over_a, over_b) > margin:
+        return n
+    if over_a > over_b + TIE * size:
+        return _over_edge(a, normals_a, lengths_a, edge_a, over_a, b, normals_b, -1.0, size, margin, ids, values, n)
+    return _over_edge(b, normals_b, lengths_b, edge_b, over_b, a, normals_a, 1.0, size, margin, ids, values, n)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, sign, size, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Contacts over the reference edge; sign 1 where it is b's."""
+    m, length, k = normals[edge], lengths[edge], len(other)
+    t = np.array([-m[1], m[0], 0.0])
+    incident = 0
+    for i in range(1, k):
+        if np.sum(normals_other[i] * m) < np.sum(normals_other[incident] * m):
+            incident = i
+    vertex = np.array([incident, (incident + 1) % k])
+    s, h, cut = np.empty(2), np.empty(2), np.zeros(2, np.bool_)
+    for e in range(2):  # the incident edge runs against the reference edge: s[0] >= s[1]
+        s[e], h[e] = np.sum((other[vertex[e]] - ref[edge]) * t), np.sum((other[vertex[e]] - ref[edge]) * m)
+    missed, lowest = s[0] < 0.0 or s[1] > length, 0 if h[0] < h[1] else 1
+    slope = (h[1] - h[0]) / (s[1] - s[0]) if s[0] != s[1] else 0.0
+    low_s = s[lowest]
+    for e, end in ((0, length), (1, 0.0)):
+        cut[e] = s[e] > length if e == 0 else s[e] < 0.0
+        if cut[e]:
+            s[e], h[e] = end, h[e] + slope * (end - s[e])
+    if missed or min(h[0], h[1]) - separation > ROUNDING * size:
+        if separation > 0.0:
+            return _corners(ref, other, sign, margin, ids, values, n)
+        s[lowest], h[lowest], h[1 - lowest], cut[lowest] = low_s, separation, np.inf, False
+    for e in range(2):
+        if h[e] <= margin:
+            feature = _feature(0 if sign > 0.0 else 1, vertex[e], edge)
+            if cut[e]:
+                corner = (edge + 1) % len(ref) if e == 0 else edge
+                feature = _feature(1 if sign > 0.0 else 0, corner, incident)
+            n = _store(ids, values, n, feature, ref[edge] + s[e] * t + 0.5 * h[e] * m, sign * m, h[e])
+    return n
+
+
+@numba.njit(cache=True, fastmath=False)
+def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """One contact between the closest corners of polygons that are apart."""
+    best, i, j = np.inf, 0, 0
+    for k in range(len(ref)):
+        for m in range(len(other)):
+            apart = other[m] - ref[k]
+            distance = np.sqrt(np.sum(apart * apart))
+            if distance < best:
+                best, i, j = distance, k, m
+    if best > margin:
+        return n
+    feature = _feature(2, j, i) if sign > 0.0 else _feature(2, i, j)
+    return _store(ids, values, n, feature, 0.5 * (ref[i] + other[j]), sign * (other[j] - ref[i]) / best, best)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Two boxes: the axis of largest separation among 15, then a clipped face or two edges."""
+    apart, size = center_a - center_b, half_a.sum() + half_b.sum()
+    face, best, edge_i, edge_j, edge_best = -1, -np.inf, 0, 0, -np.inf
+    for k in range(6):
+        m = A[:, k].copy() if k < 3 else B[:, k - 3].copy()
+        separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
+        if separation > best + (TIE * size if face >= 0 else 0.0):
+            face, best = k, separation
+    for i in range(3):
+        for j in range(3):
+            m = np.cross(A[:, i].copy(), B[:, j].copy())
+            length = np.sqrt(np.sum(m * m))
+            if length >= PARALLEL:
+                m = m / length
+                separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
+                if separation > edge_best:
+                    edge_i, edge_j, edge_best = i, j, separation
+    if max(best, edge_best) > margin:
+        return n
+    if edge_best > best + EDGE_SHARE * abs(best) + ROUNDING * size:
+        return _two_edges(center_a, A, half_a, edge_i, center_b, B, half_b, edge_j, edge_best, ids, values, n)
+    if face < 3:
+        return _clipped_face(center_a, A, half_a, face, center_b, B, half_b, -1.0, best, margin, ids, values, n)
+    return _clipped_face(center_b, B, half_b, face - 3, center_a, A, half_a, 1.0, best, margin, ids, values, n)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _reach(axes, half, m):  # type: ignore[no-untyped-def]
+    """Half the extent of a box along m."""
+    return np.sum(half * np.abs(_along(axes, m)))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _two_edges(center_a, A, half_a, i, center_b, B, half_b, j, gap, ids, values, n):  # type: ignore[no-untyped-def]
+    """One contact midway between the closest points of two edges."""
+    u, w = A[:, i].copy(), B[:, j].copy()
+    m = np.cross(u, w)
+    m = m / np.sqrt(np.sum(m * m))
+    if np.sum(m * (center_a - center_b)) < 0.0:
+        m = -m
+    x, y, number_a, number_b = center_a.copy(), center_b.copy(), 0, 0
+    for k in range(3):
+        if k != i:
+            side = np.sum(A[:, k] * m) < 0.0
+            x, number_a = x + (half_a[k] if side else -half_a[k]) * A[:, k], 2 * number_a + int(side)
+        if k != j:
+            side = np.sum(B[:, k] * m) > 0.0
+            y, number_b = y + (half_b[k] if side else -half_b[k]) * B[:, k], 2 * number_b + int(side)
+    cosine, along_u, along_w = np.sum(u * w), np.sum((x - y) * u), np.sum((x - y) * w)
+    s = (cosine * along_w - along_u) / (1.0 - cosine**2)
+    t = (along_w - cosine * along_u) / (1.0 - cosine**2)
+    s, t = min(max(s, -half_a[i]), half_a[i]), min(max(t, -half_b[j]), half_b[j])
+    point = 0.5 * (x + s * u + y + t * w)
+    return _store(ids, values, n, _feature(2, 4 * i + number_a, 4 * j + number_b), point, m, gap)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, separation, margin, ids, values, n):  # type: ignore[no-untyped-def]
+    """Corners of the incident face clipped to the reference face (four at most); sign 1 where that is b's."""
+    apart, k1, k2 = center_o - center, (face + 1) % 3, (face + 2) % 3
+    m, u, w = axes[:, face].copy(), axes[:, k1].copy(), axes[:, k2].copy()
+    outward = np.sum(apart * m) >= 0.0
+    if not outward:
+        m = -m
+    over = _along(axes_o, m)
+    facing = int(np.argmax(np.abs(over)))
+    i1, i2, side = (facing + 1) % 3, (facing + 2) % 3, -1.0 if over[facing] > 0.0 else 1.0
+    middle = apart + side * half_o[facing] * axes_o[:, facing] - half[face] * m
+    patch, lines, length = np.empty((16, 3)), np.empty((16, 2), np.int64), 4
+    for c in range(4):  # around the incident face; a corner lies on two of its edges, numbered 0 to 3
+        along, across = (1.0, 1.0, -1.0, -1.0)[c], (1.0, -1.0, -1.0, 1.0)[c]
+        x = middle + along * half_o[i1] * axes_o[:, i1] + across * half_o[i2] * axes_o[:, i2]
+        patch[c, 0], patch[c, 1], patch[c, 2] = np.sum(x * u), np.sum(x * w), np.sum(x * m)
+        lines[c, 0], lines[c, 1] = (c + 3) % 4, c
+    deepest = patch[int(np.argmin(patch[:4, 2]))].copy()
+    for border in range(4):  # cut off what lies beyond x = ±half[k1], y = ±half[k2]
+        limit = half[k1] if border < 2 else half[k2]
+        length = _cut(patch, lines, length, border // 2, 1.0 - 2.0 * (border % 2), limit, border)
+    start, faces = n, (2 * face + int(outward)) * 6 + 2 * facing + int(side > 0.0)
+    for c in range(length):
+        gap = patch[c, 2]
+        if gap <= margin and not _doubled(patch, c, length, ROUNDING * (half.sum() + half_o.sum())):
+            low, high = min(lines[c, 0], lines[c, 1]), max(lines[c, 0], lines[c, 1])
+            feature = _feature(0 if sign > 0.0 else 1, faces, 10 * low + high)
+            point = center + half[face] * m + patch[c, 0] * u + patch[c, 1] * w + 0.5 * gap * m
+            n = _store(ids, values, n, feature, point, sign * m, gap)
+    if n == start:
+        x, y = min(max(deepest[0], -half[k1]), half[k1]), min(max(deepest[1], -half[k2]), half[k2])
+        point = center + half[face] * m + x * u + y * w + 0.5 * separation * m
+        return _store(ids, values, n, _feature(0 if sign > 0.0 else 1, faces, 99), point, sign * m, separation)
+    return _widest(ids, values, start, n, m) if n - start > MOST_POINTS else n
+
+
+@numba.njit(cache=True, fastmath=False)
+def _cut(patch, lines, length, axis, sign, limit, border):  # type: ignore[no-untyped-def]
+    """Clip a polygon in place to sign x[axis] <= limit; return its number of corners. The border is line 4 + border."""
+    old, tags, found = patch[:length].copy(), lines[:length].copy(), 0
+    for c in range(length):
+        d = (c + 1) % length
+        before, after = sign * old[c, axis] - limit, sign * old[d, axis] - limit
+        if before <= 0.0:
+            patch[found], lines[found] = old[c], tags[c]
+            found += 1
+        if (before < 0.0 < after) or (after < 0.0 < before):
+            shared = tags[c, 1]  # the edge from corner c to the next
+            patch[found] = old[c] + before / (before - after) * (old[d] - old[c])
+            patch[found, axis] = sign * limit
+            lines[found, 0], lines[found, 1] = (shared, 4 + border) if before < 0.0 else (4 + border, shared)
+            found += 1
+    return found
+
+
+@numba.njit(cache=True, fastmath=False)
+def _doubled(patch, c, length, share):  # type: ignore[no-untyped-def]
+    """Whether an earlier corner lies at the same place."""
+    nearest = np.inf
+    for i in range(c):
+        nearest = min(nearest, np.abs(patch[i] - patch[c]).max())
+    return nearest <= share
+
+
+@numba.njit(cache=True, fastmath=False)
+def _widest(ids, values, start, n, m):  # type: ignore[no-untyped-def]
+    """Keep the deepest, the one farthest from it, and the widest on each side of the line through both."""
+    chosen = np.empty(MOST_POINTS, np.int64)
+    chosen[0] = start + int(np.argmin(values[start:n, 6]))
+    x, best = values[chosen[0], :3].copy(), -1.0
+    for i in range(start, n):
+        distance = np.sum((values[i, :3] - x) ** 2)
+        if distance > best:
+            chosen[1], best = i, distance
+    line = np.cross(m, values[chosen[1], :3] - x)
+    for rank, side in ((2, 1.0), (3, -1.0)):
+        best = -np.inf
+        for i in range(start, n):
+            reach = side * np.sum(line * (values[i, :3] - x))
+            if reach > best and i != chosen[0] and i != chosen[1] and (rank == 2 or i != chosen[2]):
+                chosen[rank], best = i, reach
+    kept, numbers = values[chosen].copy(), ids[chosen].copy()
+    values[start : start + MOST_POINTS], ids[start : start + MOST_POINTS] = kept, numbers
+    return start + MOST_POINTS
