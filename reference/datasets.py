@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import gzip
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
+from reference.fclib import LARGEST_SIZE, DatasetError, StoredProblem, read_fclib
 
 Floats = NDArray[np.float64]
 
-LARGEST_SIZE = 10_000  # a dense W of 0.8 GB; a larger number in a header is damage, not a problem
 _LARGEST_TEXT = 64 << 20  # bytes, unpacked: 2,500 unknowns with all their digits; a few packed bytes can ask for any
 
 # Rows that each constraint type of an MLCP file brings: True for a two-sided one.
@@ -27,28 +26,6 @@ _MLCP_ROWS = {
     **{f"MLCP_BILATERAL_{n}D_CONSTRAINT": (True,) * n for n in (1, 2, 3)},
     "MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT": (False,),
 }
-
-
-class DatasetError(IapbError, ValueError):
-    """A problem file is damaged or of a kind that is not known here."""
-
-    def __init__(self, path: Path | str, problem: str) -> None:
-        self.path = Path(path)
-        super().__init__(f"{self.path.name}: {problem}")
-
-
-@dataclass(frozen=True)
-class StoredProblem:
-    """A problem file as read.
-
-    problem : the ImpactProblem; stored_impulse : (n,) what the file gives as multipliers, or None
-    remark : text that the file carries; format : name of the format
-    """
-
-    problem: ImpactProblem
-    stored_impulse: Floats | None = None
-    remark: str = ""
-    format: str = ""
 
 
 def read_problem(path: Path | str) -> StoredProblem:
@@ -66,8 +43,6 @@ def read_problem(path: Path | str) -> StoredProblem:
     path = Path(path)
     name = path.name.lower()
     if name.endswith((".hdf5", ".h5")):
-        from reference.fclib import read_fclib
-
         return read_fclib(path)
     if name.endswith(".dat"):
         return read_siconos_lcp(path)

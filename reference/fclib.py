@@ -7,6 +7,7 @@ Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,33 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.complementarity.problem import ImpactProblem
-from reference.datasets import LARGEST_SIZE, DatasetError, StoredProblem
 
 Floats = NDArray[np.float64]
+
+LARGEST_SIZE = 10_000  # a dense W of 0.8 GB; a larger number in a header is damage, not a problem
+
+
+class DatasetError(IapbError, ValueError):
+    """A problem file is damaged or of a kind that is not known here."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        self.path = Path(path)
+        super().__init__(f"{self.path.name}: {problem}")
+
+
+@dataclass(frozen=True)
+class StoredProblem:
+    """A problem file as read.
+
+    problem : the ImpactProblem; stored_impulse : (n,) what the file gives as multipliers, or None
+    remark : text that the file carries; format : name of the format
+    """
+
+    problem: ImpactProblem
+    stored_impulse: Floats | None = None
+    remark: str = ""
+    format: str = ""
+
 
 _COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
 
