@@ -1,7 +1,7 @@
 """Two reports compared number by number: what agrees exactly, what within a tolerance, what differs.
 
 Measured times are never judged: they belong to a machine and an hour. Nor are sentences: their numbers stand in tables,
-and are compared there. Each table says itself which of its columns hold them (`Numbers.timed`, `Numbers.prose`).
+and are compared there. Each table says itself which of its columns hold them (`Table.timed`, `Table.prose`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from reports.figures.figure import Numbers
 from reports.numbers_file import ReportNumbers
+from verification.finding import Table
 
 EXACT, CLOSE, DIFFERS = "exact", "close", "differs"
 TIMING, PROSE, ONLY_OLD, ONLY_NEW = "timing", "prose", "only old", "only new"
@@ -86,7 +86,7 @@ def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...
     return tuple(name for name in first if name not in second)
 
 
-def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator[Cell]:
+def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cell]:
     old_rows, new_rows = _rows(old, new)
     timed, prose = {*old.timed, *new.timed}, {*old.prose, *new.prose}
     timed_rows = old.timed_rows or new.timed_rows
@@ -103,7 +103,7 @@ def _cells(table: str, old: Numbers, new: Numbers, tolerance: float) -> Iterator
             yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
 
 
-def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+def _rows(old: Table, new: Table) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Rows of both by name: their number where there are equally many, else their first cell and which of those.
 
     Where times decide which rows there are, a row is known by all that is not timed.
@@ -111,18 +111,18 @@ def _rows(old: Numbers, new: Numbers) -> tuple[dict[str, dict[str, Any]], dict[s
     if old.timed_rows or new.timed_rows:
         return _named(_distinct(_untimed_cells(old)), old), _named(_distinct(_untimed_cells(new)), new)
     if len(old.rows) == len(new.rows):
-        names = [f"{number}: {row[0]}" if row else str(number) for number, row in enumerate(old.rows, 1)]
+        names = [f"{number}: {row[0]}" if row else str(number) for number, row in enumerate(old.cells, 1)]
         return _named(names, old), _named(names, new)
     return _named(_distinct(_first_cells(old)), old), _named(_distinct(_first_cells(new)), new)
 
 
-def _first_cells(table: Numbers) -> list[str]:
-    return [str(row[0]) if row else "" for row in table.rows]
+def _first_cells(table: Table) -> list[str]:
+    return [str(row[0]) if row else "" for row in table.cells]
 
 
-def _untimed_cells(table: Numbers) -> list[str]:
-    kept = [index for index, column in enumerate(table.columns) if column not in table.timed]
-    return [", ".join(str(row[index]) for index in kept) for row in table.rows]
+def _untimed_cells(table: Table) -> list[str]:
+    kept = [index for index, column in enumerate(table.titles) if column not in table.timed]
+    return [", ".join(str(row[index]) for index in kept) for row in table.cells]
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
@@ -135,9 +135,9 @@ def _distinct(names: Sequence[str]) -> list[str]:
     return found
 
 
-def _named(names: Sequence[str], table: Numbers) -> dict[str, dict[str, Any]]:
-    columns = _distinct(table.columns)
-    return {name: dict(zip(columns, row, strict=True)) for name, row in zip(names, table.rows, strict=True)}
+def _named(names: Sequence[str], table: Table) -> dict[str, dict[str, Any]]:
+    columns = _distinct(table.titles)
+    return {name: dict(zip(columns, row, strict=True)) for name, row in zip(names, table.cells, strict=True)}
 
 
 def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
-from reports.figures.figure import Figure, Numbers
+from reports.figures.figure import Figure
 from reports.pages.records import Evidence
 from reports.store.keys import plain
+from verification.finding import Table, titled
 
 NUMBERS_NAME = "numbers.json"
 FORMAT, FORMAT_VERSION = "iapb numbers", 2
@@ -30,7 +31,7 @@ class ReportNumbers:
     depth : "quick" or "full"
     """
 
-    tables: Mapping[str, Numbers]
+    tables: Mapping[str, Table]
     runs: Mapping[str, str]
     provenance: Mapping[str, str]
     depth: str
@@ -46,54 +47,54 @@ def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: st
     return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
 
 
-def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
+def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     yield from _outcomes("verdicts", ((one.topic, one.outcome, one.sentence, one.timed) for one in evidence.verdicts))
     yield from _outcomes("claims", ((one.id, one.outcome, one.headline, one.timed) for one in evidence.claims))
     for claim in evidence.claims:
         if claim.numbers is not None:
             yield f"claims/{claim.id}", claim.numbers
     yield from _checks(evidence)
-    yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Numbers))
+    yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Table))
     for scene, effects in evidence.effects.items():
         rows = tuple((one.name, one.active, one.change, one.cost) for one in effects)
         columns = ("effect", "active", "change", "cost")
-        yield f"effects/{scene}", Numbers(columns, rows, timed=("cost",), prose=("change",))
+        yield f"effects/{scene}", titled(columns, rows, timed=("cost",), prose=("change",))
     for topic in evidence.topics:
         found = enumerate(topic.findings, 1)
         yield from _outcomes(topic.id, ((number, one.outcome, one.sentence, one.timed) for number, one in found))
         yield from ((f"{topic.id}/{name}", table) for name, table in topic.tables.items())
 
 
-def _checks(evidence: Evidence) -> Iterator[tuple[str, Numbers]]:
-    yield "proofs", Numbers(("statement", "holds", "wrong twins"),
+def _checks(evidence: Evidence) -> Iterator[tuple[str, Table]]:
+    yield "proofs", titled(("statement", "holds", "wrong twins"),
                             tuple((one.name, one.holds, len(one.twins)) for one in evidence.proofs))
-    yield "properties", Numbers(
+    yield "properties", titled(
         ("law", "cases", "worst", "bound", "holds", "fault caught"),
         tuple((one.law, one.cases, one.worst, one.bound, one.holds, one.fault_caught) for one in evidence.properties),
         prose=("worst",))  # fmt: skip
-    yield "counterexamples", Numbers(("who and law", "what happens"),
+    yield "counterexamples", titled(("who and law", "what happens"),
                                      tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples),
                                      prose=("what happens",))  # fmt: skip
-    yield "cross-checks", Numbers(
+    yield "cross-checks", titled(
         ("quantity", "against", "cases", "worst", "tolerance", "agrees"),
         tuple((one.quantity, one.against, one.cases, one.worst, one.tolerance, one.agrees)
               for one in evidence.cross_checks))  # fmt: skip
 
 
-def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Numbers]]:
+def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Table]]:
     """Outcomes with their sentences, as one table; those that rest on measured times as another."""
     columns, kept = ("what", "outcome", "sentence"), tuple(found)
-    yield name, Numbers(columns, tuple(tuple(row) for *row, timed in kept if not timed), prose=("sentence",))
+    yield name, titled(columns, tuple(tuple(row) for *row, timed in kept if not timed), prose=("sentence",))
     if any(timed for *_, timed in kept):
-        yield f"{name}, from times", Numbers(columns, tuple(tuple(row) for *row, timed in kept if timed),
+        yield f"{name}, from times", titled(columns, tuple(tuple(row) for *row, timed in kept if timed),
                                              timed=("outcome", "sentence"), timed_rows=True)  # fmt: skip
 
 
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
     """Write the numbers as JSON, to the last bit; what JSON has no number for is {"number": "nan"}, "inf" or "-inf"."""
-    tables = {name: {"columns": list(table.columns), "timed": list(table.timed), "timed_rows": table.timed_rows,
+    tables = {name: {"columns": list(table.titles), "timed": list(table.timed), "timed_rows": table.timed_rows,
                      "prose": list(table.prose),
-                     "rows": [[_cell(value) for value in row] for row in table.rows]}
+                     "rows": [[_cell(value) for value in row] for row in table.cells]}
               for name, table in numbers.tables.items()}  # fmt: skip
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "depth": numbers.depth,
                "provenance": dict(numbers.provenance), "runs": dict(numbers.runs), "tables": tables}  # fmt: skip
@@ -140,9 +141,9 @@ def _checked(content: Any) -> ReportNumbers:
     return ReportNumbers(tables, runs, facts, str(content["depth"]))
 
 
-def _table(table: Any) -> Numbers:
+def _table(table: Any) -> Table:
     columns, timed, prose = (tuple(str(name) for name in table.get(part, ())) for part in ("columns", "timed", "prose"))
     rows = tuple(tuple(_NOT_FINITE[v["number"]] if isinstance(v, dict) else v for v in row) for row in table["rows"])
     if any(len(row) != len(columns) for row in rows):
         raise ValueError("a row without a cell for each column")
-    return Numbers(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]), prose=prose)
+    return titled(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]), prose=prose)

@@ -30,7 +30,7 @@ DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
 FAILED_CASES = "not computed"  # name of the table of cases that failed
-_UNIT = re.compile(r"^(?P<key>.*\S)\s*\[(?P<unit>[^\[\]]+)\]$")
+_UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Column:
     key : by which code finds it; heading : in words, by default the key; unit : empty where there is none
     condition : chosen, not measured; part : rows with the same value are judged apart
     timed : a measured time, or made from some: it need not repeat
+    prose : sentences, whose numbers stand in other tables and are compared there
     """
 
     key: str
@@ -48,25 +49,13 @@ class Column:
     condition: bool = False
     part: bool = False
     timed: bool = False
+    prose: bool = False
 
     @property
     def title(self) -> str:
         """Heading with its unit."""
         words = self.heading or self.key
         return f"{words} [{self.unit}]" if self.unit else words
-
-
-def columns(*titles: str, timed: Iterable[str] = ()) -> tuple[Column, ...]:
-    """Return columns from titles such as "step [ms]": the unit in brackets, the rest is heading and key.
-
-    `timed` names some of the keys.
-    """
-    found = (_UNIT.match(title) for title in titles)
-    pairs = [(m["key"], m["unit"]) if m else (title, "") for m, title in zip(found, titles, strict=True)]
-    measured = set(timed)
-    if unknown := measured - {key for key, _ in pairs}:
-        raise ValueError(f"timed columns {sorted(unknown)}: expected some of {[key for key, _ in pairs]}")
-    return tuple(Column(key, unit, timed=key in measured) for key, unit in pairs)
 
 
 @dataclass(frozen=True)
@@ -141,6 +130,11 @@ class Table:
         found = tuple(column.title for column in self.columns if column.timed)
         return (*found, HOLDS) if found and self.holds else found
 
+    @property
+    def prose(self) -> tuple[str, ...]:
+        """Titles of the columns of sentences."""
+        return tuple(column.title for column in self.columns if column.prose)
+
     def _only(self, kept: Sequence[bool]) -> Table:
         rows = tuple(row for row, keep in zip(self.rows, kept, strict=True) if keep)
         return replace(self, rows=rows, holds=tuple(h for h, keep in zip(self.holds, kept, strict=False) if keep))
@@ -150,6 +144,26 @@ def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) 
     """Return a table of these columns from dictionaries; what a dictionary lacks is None."""
     rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
     return Table(tuple(columns), rows, **options)
+
+
+def titled(
+    titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
+    timed: Sequence[str] = (), timed_rows: bool = False, prose: Sequence[str] = (),
+) -> Table:
+    """Return a table from titles such as "step [ms]": the unit in brackets, the rest is key and heading.
+
+    `timed` and `prose` name some of the titles.
+    """
+    for kind, names in (("timed", timed), ("prose", prose)):
+        if unknown := [name for name in names if name not in titles]:
+            raise ValueError(f"{kind} columns {unknown}: expected some of {tuple(titles)}")
+    found = [(_UNIT.match(title), title) for title in titles]
+    columns = tuple(
+        Column(match["key"] if match else title, match["unit"] if match else "",
+               timed=title in timed, prose=title in prose)
+        for match, title in found
+    )  # fmt: skip
+    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
 
 
 @dataclass(frozen=True)
@@ -256,7 +270,7 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
     every, count = (*finding.failures, *failures), len(failures)
     said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
     part = Part(f"{said} in no other number: {', '.join(failure.case for failure in failures)}.", NOT_COMPUTED)
-    table = Table(columns("case", "error", "reason"), tuple((one.case, one.error, one.reason) for one in every))
+    table = titled(("case", "error", "reason"), [(one.case, one.error, one.reason) for one in every])
     return replace(
         finding, parts=(*finding.parts, part), tables={**finding.tables, FAILED_CASES: table}, failures=every,
         answer=f"{finding.answer} {count} {'case' if count == 1 else 'cases'} failed.".strip(),

@@ -7,15 +7,14 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as Printed
 
 from reports.commands.progress import stage_progress
 from reports.evidence import accuracy
 from reports.evidence.haptic_rate import topic_of
-from reports.figures.figure import Numbers
 from reports.figures.numbers import format_cell
 from verification.cost.study import haptic_study
-from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Table
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
 
@@ -42,23 +41,23 @@ def bench(
         console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
 
 
-def _print(console: Console, title: str, numbers: Numbers) -> None:
-    table = Table(title=title, caption=numbers.note)
-    for heading in numbers.columns:
+def _print(console: Console, title: str, numbers: Table) -> None:
+    table = Printed(title=title, caption=numbers.note)
+    for heading in numbers.titles:
         table.add_column(heading, overflow="fold")
-    for row in numbers.rows:
+    for row in numbers.cells:
         table.add_row(*(format_cell(value, numbers.digits) for value in row))
     console.print(table)
 
 
-def _methods(numbers: Numbers) -> str:
+def _methods(numbers: Table) -> str:
     """One line per method: worst error, worst residual and median time over the problems, failures counted."""
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    rows = numbers.records()
     lines = ["Impact methods over all problems: worst relative error, median time, failures"]
     for method in dict.fromkeys(row["method"] for row in rows):
         here = [row for row in rows if row["method"] == method]
         done = [row for row in here if row["outcome"] == "ok"]
         worst = max(row["relative error"] for row in done)
-        median = statistics.median(row["time [µs]"] for row in done)
+        median = statistics.median(row["time"] for row in done)
         lines.append(f"  {method:<18} {worst:8.1e}  {median:9.1f} µs  {len(here) - len(done)} of {len(here)} failed")
     return "\n".join(lines)

@@ -52,7 +52,7 @@ def _measure(source: Any, world: str) -> None:
         raise ArgumentError("world", world, "IAPB or PB with --measure: the worlds of the compiled engine")
     with stage_progress() as progress:
         found = effects_of(source, world, lambda done, total: progress("with and without each effect", done, total))
-    best = {row[1]: row[4] for row in summary({source.name: found}).rows}
+    best = {row["effect"]: row["best of its error"] for row in summary({source.name: found}).records()}
     caption = "Best of its error: no other effect saves more time at the cost of no larger error."
     table = Table(title=f"Effects of {source.name} in {world}, measured", show_lines=True, caption=caption)
     for heading in ("effect", "on", "why", "cost", "changes without it", "best of its error"):

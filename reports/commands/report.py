@@ -44,7 +44,7 @@ def report(
 
 def print_difference(found: Difference, tolerance: float) -> None:
     """Print a table by part of the report, what differs most, and the sentences."""
-    by_part = Table("part", *(name for name, _ in PARTS), title="Numbers and words by part of the report")
+    by_part = Table("part", *(name for name, _ in PARTS), title="Table and words by part of the report")
     by_part.columns[0].no_wrap, by_part.columns[0].min_width = True, 15
     for row in parts(found):
         by_part.add_row(*row)

@@ -6,16 +6,15 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from reports.figures.figure import Numbers
-from verification.finding import Failure
+from verification.finding import Failure, Table, titled
 
 
-def compute(progress: Callable[[int, int], None], failures: list[Failure] | None = None) -> Numbers:
+def compute(progress: Callable[[int, int], None], failures: list[Failure] | None = None) -> Table:
     """The table behind the work-precision figure: a row per method and problem."""
     from verification.cost.measure import work_precision
 
     rows = tuple(_row(found) for found in work_precision(progress=progress, failures=failures))
-    return Numbers(
+    return titled(
         ("method", "problem", "time [µs]", "quartiles [µs]", "relative error", "relative energy gain",
          "restitution residual", "failed after [µs]", "outcome"), rows, 3,
         "Medians of warm, interleaved calls from Python; errors against exact rational arithmetic, in the kinetic "

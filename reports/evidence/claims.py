@@ -9,7 +9,7 @@ from typing import Any
 from iapb.run import Run
 from iapb.scene import Scene
 from reports.figures.condition_map import condition_map
-from reports.figures.figure import Figure, Numbers
+from reports.figures.figure import Figure
 from reports.pages.records import Claim
 from reports.runner import Runner
 from verification.finding import NOT_COMPUTED, REPRODUCED, Failure
@@ -52,7 +52,7 @@ def as_record(result: Any) -> Claim:
         id=result.id, statement=result.statement, place=result.place, outcome=outcome,
         headline=f"{result.finding} ({headline})" if headline else result.finding, quantity=result.quantity,
         conditions=result.conditions, tolerance=result.tolerance, fails=result.fails,
-        numbers=Numbers(table.titles, table.cells, timed=table.timed, timed_rows=bool(table.timed)),
+        numbers=replace(table, timed_rows=bool(table.timed)),
         figure=_map(result),
     )  # fmt: skip
 

@@ -9,9 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from reports.evidence.runs import shipped_scene
-from reports.figures.figure import Numbers
 from reports.runner import Runner
-from verification.finding import Failure, attempt
+from verification.finding import Failure, Table, attempt, titled
 
 if TYPE_CHECKING:
     from verification.complementarity.problem_study import ProblemStudy
@@ -21,9 +20,9 @@ WORLD_SCENE = "peg_corner"
 SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
 
 
-def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) -> dict[str, Numbers]:
+def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) -> dict[str, Table]:
     """Every table of the topic but the worlds, by name; `failures` receives those that cannot be made."""
-    makers: dict[str, Callable[[], Numbers]] = {
+    makers: dict[str, Callable[[], Table]] = {
         "map": partial(agreement, study), "two contacts": partial(two_contacts, study),
         "time per impact": partial(impact_costs, study), "time per step": partial(step_costs, study),
         "profile": partial(profile, study.problems), "convergence": partial(convergence, study),
@@ -35,7 +34,7 @@ def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) ->
     return {name: table for name, table in made.items() if table is not None}
 
 
-def agreement(study: ComparisonStudy) -> Numbers:
+def agreement(study: ComparisonStudy) -> Table:
     """The map, random families and then scenes."""
     rows = tuple(
         (c.family, c.restitution, c.redundancy, c.cases, c.agree, c.adhesive, c.artefact, c.adhesive_share,
@@ -43,7 +42,7 @@ def agreement(study: ComparisonStudy) -> Numbers:
          c.left_approaching_law)
         for c in study.cells + study.scenes
     )  # fmt: skip
-    return Numbers(
+    return titled(
         ("impacts", "e", "redundant rows", "cases", "share that agrees", "share that truly pulls",
          "share that pulls as chosen", "negative share of p", "median distance where they differ", "largest distance",
          "largest extra loss of KE⁻", "left approaching by IAPB", "left approaching by the LCP"),
@@ -52,34 +51,34 @@ def agreement(study: ComparisonStudy) -> Numbers:
         "contacts that touch without a row included.")  # fmt: skip
 
 
-def two_contacts(study: ComparisonStudy) -> Numbers:
+def two_contacts(study: ComparisonStudy) -> Table:
     """The exact border of two contacts."""
     rows = tuple((c.cosine, c.speed_ratio, c.predicted, c.found, c.distance) for c in study.two_contacts)
-    return Numbers(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
+    return titled(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
                    "Two contacts whose rows have this cosine in the kinetic metric, closing at speeds 1 and r.")
 
 
-def impact_costs(study: ComparisonStudy) -> Numbers:
+def impact_costs(study: ComparisonStudy) -> Table:
     """A row per solver and size."""
     rows = tuple(
         (r.family, r.contacts, r.coordinates, r.solver, r.verdict, _known(r.median * 1e6), _known(r.least * 1e6),
          _known(r.largest * 1e6), r.repeats, _known(r.distance), r.note)
         for r in study.impact_costs
     )  # fmt: skip
-    return Numbers(
+    return titled(
         ("impacts", "contacts", "coordinates", "solver", "outcome", *SPREAD, "samples", "distance", "note"), rows, 3,
         "From M, J, v to v⁺, one thread, in turns. Kernels are called from compiled code, all others from Python, "
         "their checks included.", timed=(*SPREAD, "note"))  # fmt: skip
 
 
-def step_costs(study: ComparisonStudy) -> Numbers:
+def step_costs(study: ComparisonStudy) -> Table:
     """A row per scene and world."""
     rows = tuple((r.scene, r.way, *(1e6 * value for value in (r.median, r.least, r.largest)), r.repeats)
                  for r in study.step_costs)  # fmt: skip
-    return Numbers(("scene", "world", *SPREAD, "samples"), rows, 3, timed=SPREAD)
+    return titled(("scene", "world", *SPREAD, "samples"), rows, 3, timed=SPREAD)
 
 
-def profile(studies: Iterable[ProblemStudy]) -> Numbers:
+def profile(studies: Iterable[ProblemStudy]) -> Table:
     """Dolan and Moré's profile, in long form."""
     from verification.complementarity.problem_study import FACTORS
 
@@ -88,10 +87,10 @@ def profile(studies: Iterable[ProblemStudy]) -> Numbers:
         for each in studies for kind, solver, shares in each.profile
         for factor, share in zip(FACTORS, shares, strict=True)
     )  # fmt: skip
-    return Numbers(("collection", "kind", "solver", "factor", "share solved"), rows, 3, timed=("share solved",))
+    return titled(("collection", "kind", "solver", "factor", "share solved"), rows, 3, timed=("share solved",))
 
 
-def problems(study: ProblemStudy) -> Numbers:
+def problems(study: ProblemStudy) -> Table:
     """A row per problem, a column per solver."""
     names = study.solvers
     rows: list[tuple[Any, ...]] = []
@@ -100,13 +99,13 @@ def problems(study: ProblemStudy) -> Numbers:
         rows.append((line.problem, line.unknowns, line.rank, line.asymmetry or None,
                      *(by.get(name) for name in names), _known(line.spread), _known(line.stored)))  # fmt: skip
     rows += [(file.file, None, None, None, *("not read" for _ in names), None, None) for file in study.unread]
-    return Numbers(
+    return titled(
         ("problem", "unknowns", "rank", "asymmetry of W", *names, "spread of velocities", "residual as stored"),
         tuple(rows), 2, "Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. "
         "Spread: of contact velocities among those who solved it.", timed=("spread of velocities",))  # fmt: skip
 
 
-def convergence(study: ComparisonStudy) -> Numbers:
+def convergence(study: ComparisonStudy) -> Table:
     """Errors of the rigid world, a row per scene and step."""
     from verification.complementarity.convergence import COARSE, FINE
 
@@ -117,48 +116,48 @@ def convergence(study: ComparisonStudy) -> Numbers:
             step = len(rates) / sum(rates)
             rows.append((r.scene, r.events, 1e3 * step, position * step, velocity * step,
                          _known(r.position_order), _known(r.velocity_order)))  # fmt: skip
-    return Numbers(
+    return titled(
         ("scene", "events", "step [ms]", "error of positions", "error of velocities", "order, positions",
          "order, velocities"), tuple(rows), 3,
         "Largest of three steps near each; positions in the sup norm [m, rad], velocities in L¹ over time [m, rad]. "
         "A dash: the error is rounding alone.")  # fmt: skip
 
 
-def friction(study: ComparisonStudy) -> Numbers:
+def friction(study: ComparisonStudy) -> Table:
     """The extension by dry friction."""
     rows = tuple(
         (c.restitution, c.friction, c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains,
          c.largest_gain, c.largest_gain_ncp, c.largest_gain_ccp, _known(c.typical_distance))
         for c in study.friction
     )  # fmt: skip
-    return Numbers(
+    return titled(
         ("e", "μ", "cases", "all contacts push", "of these as the NCP", "friction reduced", "unsolved", "NCP gains",
          "CCP gains", "largest change of KE, IAPB", "NCP", "CCP", "median distance from the NCP"), rows, 2,
         "Changes of energy as shares of KE⁻: above zero a gain.")  # fmt: skip
 
 
-def unequal(study: ComparisonStudy) -> Numbers:
+def unequal(study: ComparisonStudy) -> Table:
     """The extension by unequal restitution."""
     rows = tuple((c.signs, c.cases, c.distance, c.gain, c.gain_newton_lcp, c.gain_equality) for c in study.unequal)
-    return Numbers(("contacts", "cases", "distance from Poisson's law", "largest change of KE, IAPB", "Newton LCP",
+    return titled(("contacts", "cases", "distance from Poisson's law", "largest change of KE, IAPB", "Newton LCP",
                     "equalities"), rows, 2)  # fmt: skip
 
 
-def bar(study: ComparisonStudy) -> Numbers:
+def bar(study: ComparisonStudy) -> Table:
     """The struck bar."""
-    return Numbers(("law", "kinetic energy [J]"), tuple(study.bar.items()), 5,
+    return titled(("law", "kinetic energy [J]"), tuple(study.bar.items()), 5,
                    "A bar struck at 0.5 and 0.4 of its length with e = 1 and e = 0.")  # fmt: skip
 
 
-def laws() -> Numbers:
+def laws() -> Table:
     """Impact laws by name."""
     from reference.complementarity.laws import LAWS
 
     rows = tuple((law.name, law.statement, law.source, law.hypotheses, law.never_gains_energy) for law in LAWS.values())
-    return Numbers(("law", "statement", "source", "hypotheses", "never gains energy under them"), rows)
+    return titled(("law", "statement", "source", "hypotheses", "never gains energy under them"), rows)
 
 
-def solvers() -> Numbers:
+def solvers() -> Table:
     """Solvers by name."""
     from reference.complementarity.solvers import SOLVERS
 
@@ -166,12 +165,12 @@ def solvers() -> Numbers:
     rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
     note = ("Siconos is a package of the machine, asked through the system's Python; its time is that of its compiled "
             "solve, the others' that of their call.")  # fmt: skip
-    return Numbers(("solver", "method", "package", "takes"), rows, note=note)
+    return titled(("solver", "method", "package", "takes"), rows, note=note)
 
 
 def worlds(
     runner: Runner, values: dict[str, Any] | None = None, failures: list[Failure] | None = None
-) -> Numbers:
+) -> Table:
     """A run of every world, as its own file states its contact law and coupling; `values` change the scene."""
     from reference.worlds import WORLDS
 
@@ -181,7 +180,7 @@ def worlds(
             shipped_scene(WORLD_SCENE, values), world, keep=False), failures)
         if run is not None:
             rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
-    return Numbers(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
+    return titled(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
                    f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip
 
 

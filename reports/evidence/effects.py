@@ -8,9 +8,8 @@ from functools import partial
 from typing import Any
 
 from reports.evidence.runs import shipped_scene
-from reports.figures.figure import Numbers
 from reports.pages.records import SceneEffect
-from verification.finding import Failure, attempt
+from verification.finding import Failure, Table, attempt, titled
 
 SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")
 INPUT = "effect_costs"
@@ -54,12 +53,12 @@ def effects_of(
     return tuple(effects)
 
 
-def summary(effects: Mapping[str, Sequence[SceneEffect]]) -> Numbers:
+def summary(effects: Mapping[str, Sequence[SceneEffect]]) -> Table:
     """The table behind the figure: a row per scene and measured effect."""
     rows = tuple((scene, one.name, 100.0 * one.saved, 1e3 * one.position, _best(one, found))
                  for scene, found in effects.items() for one in found
                  if one.saved is not None and one.position is not None)  # fmt: skip
-    return Numbers(("scene", "effect", "time saved [%]", "error [mm]", "best of its error"), rows, 3,
+    return titled(("scene", "effect", "time saved [%]", "error [mm]", "best of its error"), rows, 3,
                    "Best of its error: no other effect saves more time at the cost of no larger error.",
                    timed=("time saved [%]", "best of its error"))
 

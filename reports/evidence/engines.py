@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from reports.figures.figure import Numbers
 from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED, Failure
+from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED, Failure, Table, titled
 
 if TYPE_CHECKING:
     from verification.engines import EngineRecord
@@ -62,7 +61,7 @@ def verdict_of(records: Sequence[EngineRecord]) -> str:
             f"runs at their own settings and in {met[1]} of {len(matched)} at 1 ms.")  # fmt: skip
 
 
-def errors_table(records: Sequence[EngineRecord]) -> Numbers:
+def errors_table(records: Sequence[EngineRecord]) -> Table:
     """A row per engine, scene and choice of settings; an engine that is not installed keeps its rows."""
     from reference.simulators import fixed_scene
     from verification.engines import verdict
@@ -77,10 +76,10 @@ def errors_table(records: Sequence[EngineRecord]) -> Numbers:
         ))  # fmt: skip
     note = ("Errors are shares of the start's kinetic energy, of the sum of m |v| and of the largest speed; at rest "
             "the rise is a share of m g times the bodies' size. A law is met within 1 %, at rest within 1 mm.")
-    return Numbers(COLUMNS, tuple(rows), 2, note)
+    return titled(COLUMNS, tuple(rows), 2, note)
 
 
-def settings_table(records: Sequence[EngineRecord]) -> Numbers:
+def settings_table(records: Sequence[EngineRecord]) -> Table:
     """What every engine was run with, and where."""
     uses: dict[tuple[str, str, str, str], list[str]] = {}
     for record in records:
@@ -88,7 +87,7 @@ def settings_table(records: Sequence[EngineRecord]) -> Numbers:
         uses.setdefault(key, []).append(f"{record.scene.replace('_', ' ')} ({record.choice})")
     rows = [(title, version, settings, "" if version == "not installed" else ", ".join(used), note)
             for (title, version, settings, note), used in uses.items()]  # fmt: skip
-    return Numbers(SETTINGS_COLUMNS, tuple(rows))
+    return titled(SETTINGS_COLUMNS, tuple(rows))
 
 
 def _groups(records: Sequence[EngineRecord]) -> list[list[EngineRecord]]:

@@ -23,7 +23,6 @@ from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.evidence.verdicts import verdicts
-from reports.figures.figure import Numbers
 from reports.pages.records import (
     Claim,
     Counterexample,
@@ -37,7 +36,7 @@ from reports.pages.records import (
 )
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
-from verification.finding import Failure, attempt
+from verification.finding import Failure, Table, attempt
 
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
@@ -66,10 +65,10 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)
-    bulk = kept.stage("bulk impacts", Numbers, partial(properties.bulk, depth), None)
+    bulk = kept.stage("bulk impacts", Table, partial(properties.bulk, depth), None)
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
     hard = kept.stage("hard cases", tuple[HardCase, ...], partial(hard_cases.compute, runner))
-    timed = kept.stage("accuracy", Numbers, accuracy.compute, None)
+    timed = kept.stage("accuracy", Table, accuracy.compute, None)
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
     inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
     needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute, {})

@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from reports.figures.figure import Numbers
 from reports.figures.hard_cases import CASE, INPUT, KIND
 from reports.pages.records import HardCase
 from reports.runner import Runner
-from verification.finding import Failure, attempt
+from verification.finding import Failure, Table, attempt, titled
 
 __all__ = ["INPUT", "compute", "summary"]
 
@@ -42,11 +41,11 @@ def compute(
     return tuple(record for record in records if record is not None)
 
 
-def summary(cases: Sequence[HardCase]) -> Numbers:
+def summary(cases: Sequence[HardCase]) -> Table:
     """All cases in one table: a row per case and method or world."""
-    shown = len(COLUMNS) - 1  # all but the notes
-    rows = tuple((case.name, case.kind, *row[:shown]) for case in cases for row in case.numbers.rows)
-    return Numbers((CASE, KIND, *COLUMNS[:shown]), rows, 2, timed=(TIME,))
+    shown = [column.key for column in titled(COLUMNS[:-1]).columns]  # all but the notes
+    rows = [(case.name, case.kind, *row) for case in cases for row in case.numbers.select(shown).rows]
+    return titled((CASE, KIND, *COLUMNS[:-1]), rows, 2, timed=(TIME,))
 
 
 def _record(name: str, runner: Runner, failures: list[Failure]) -> HardCase:
@@ -55,12 +54,12 @@ def _record(name: str, runner: Runner, failures: list[Failure]) -> HardCase:
     try:
         case = HARD_CASES[name]()
     except CaseAbsent as absent:
-        title, nothing = name.replace("_", " "), Numbers(COLUMNS, ())
+        title, nothing = name.replace("_", " "), titled(COLUMNS, ())
         return HardCase(name, title, "problems of others", "", "", "", "", nothing, skipped=str(absent))
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
     rows = tuple(_row(found) for found in judge_hard_cases(cases=[name], simulate=runner, failures=failures))
     noted = any(row[-1] for row in rows)
-    numbers = Numbers(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind],
+    numbers = titled(COLUMNS if noted else COLUMNS[:-1], rows if noted else _without_last(rows), 2, _NOTES[kind],
                       timed=(TIME,))
     return HardCase(name, case.name, case.source, kind, case.why_hard, case.law, case.expected, numbers)
 

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from reports.figures.figure import Numbers
 from reports.pages.records import Property
-from verification.finding import Failure, attempt, of_each
+from verification.finding import Failure, Table, attempt, of_each, titled
 
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
 COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
@@ -109,7 +108,7 @@ def _property(law: str, cases: int, worst: Any, holds: bool, fault: str, caught:
                     f"{worst.tolerance:.1e}" if worst else "", holds, fault.replace("_", " "), caught)
 
 
-def bulk(depth: str, progress: Progress, failures: list[Failure]) -> Numbers:
+def bulk(depth: str, progress: Progress, failures: list[Failure]) -> Table:
     """100,000 random impacts: energy gain against 10 d ε √κ(M), with and without the clamp, and the printed formula."""
     studies: tuple[tuple[str, str, bool | None, int], ...] = (
         ("factored", "factored", None, IMPACTS[depth]),
@@ -123,7 +122,7 @@ def bulk(depth: str, progress: Progress, failures: list[Failure]) -> Numbers:
         return _bulk_rows(*study, lambda done, _: progress(base + done, total))
 
     rows = of_each(studies, rows_of, failures, lambda study: study[0])
-    return Numbers(
+    return titled(
         ("method", "condition of M from", "impacts", "largest relative energy gain", "gain / (10 d ε √κ)",
          "gain / (d ε κ)", "above 10 d ε √κ", "largest restitution residual"), tuple(rows), 3,
         "d 1 to 30, c 0 to 100, rank deficient, e in [−1, 1]; velocities N(0, I) in v and in Lᵀv; energies in "

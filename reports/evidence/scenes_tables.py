@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.figures.figure import Numbers
+from verification.finding import Table, titled
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -23,7 +23,7 @@ SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_damp
 
 def all_tables(
     runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks]
-) -> dict[str, Numbers]:
+) -> dict[str, Table]:
     """Return every table of the topic by name."""
     return {CONTACTS: contacts(measures), LEDGER: ledger(measures), OPEN: left_open(books), OVER_TIME: over_time(runs)}
 
@@ -33,7 +33,7 @@ def pace_of(measures: Sequence[SceneMeasure]) -> float | None:
     return next((each.seconds_per_step for each in measures if each.scene == YARDSTICK), None)
 
 
-def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
+def contacts(measures: Sequence[SceneMeasure]) -> Table:
     """How deep, how many collisions, how long a step takes, how it ends."""
     unit = pace_of(measures)
     columns = (
@@ -47,10 +47,10 @@ def contacts(measures: Sequence[SceneMeasure]) -> Numbers:
         for m in measures
     )  # fmt: skip
     note = "Time of the quickest part of each run, measured on this machine: compare the ratios."
-    return Numbers(columns, rows, digits=3, note=note, timed=columns[8:11])
+    return titled(columns, rows, digits=3, note=note, timed=columns[8:11])
 
 
-def ledger(measures: Sequence[SceneMeasure]) -> Numbers:
+def ledger(measures: Sequence[SceneMeasure]) -> Table:
     """Every joule of each run."""
     columns = (
         "scene", "kinetic, start [J]", "potential, start [J]", "kinetic, end [J]", "potential, end [J]",
@@ -71,10 +71,10 @@ def ledger(measures: Sequence[SceneMeasure]) -> Numbers:
         "Shares are of the energy turned over: the largest of kinetic energy, range of the potential, work of hand "
         "and of coupling."
     )
-    return Numbers(columns, rows, digits=3, note=note)
+    return titled(columns, rows, digits=3, note=note)
 
 
-def left_open(books: Sequence[OpenBooks]) -> Numbers:
+def left_open(books: Sequence[OpenBooks]) -> Table:
     """What is open at shorter and shorter steps, and the order at which it falls."""
     refinements = max((each.refinements for each in books), key=len)
     columns = ("scene", *(_heading(factor) for factor in refinements), "order declared", "order measured")
@@ -83,14 +83,14 @@ def left_open(books: Sequence[OpenBooks]) -> Numbers:
          *(None,) * (len(refinements) - len(each.open_shares)), each.declared_order, each.order)
         for each in books
     )  # fmt: skip
-    return Numbers(columns, rows, digits=3, note="No order: what is open is rounding, and no shorter step was tried.")
+    return titled(columns, rows, digits=3, note="No order: what is open is rounding, and no shorter step was tried.")
 
 
 def _heading(factor: int) -> str:
     return "open at the scene's step [%]" if factor == 1 else f"at 1/{factor} of it [%]"
 
 
-def over_time(runs: Sequence[Run]) -> Numbers:
+def over_time(runs: Sequence[Run]) -> Table:
     """The books of each run at some instants, with the impacts since the instant before."""
     from verification.scenes.scene_measures import energy_series
 
@@ -103,4 +103,4 @@ def over_time(runs: Sequence[Run]) -> Numbers:
             values = (float(getattr(series, name)[place]) for name in SERIES)
             rows.append((run.scene_name, float(run.time[place]), *values, int(impacts)))
     columns = ("scene", "time [s]", *(f"{name.replace('_', ' ')} [J]" for name in SERIES), "impacts")
-    return Numbers(columns, tuple(rows))
+    return titled(columns, tuple(rows))

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from reports.evidence.runs import shipped_scene
-from reports.figures.figure import Numbers
 from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, attempt
+from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Table, attempt, titled
 
 LEAD = (
     "A wall in a sampled loop can feed the hand. A mass of 2 kg is pushed against walls of every stiffness and "
@@ -37,7 +36,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     pulses = compare_waveforms(shipped_scene("peg_corner"), lambda scene: runner(scene, "IAPB", keep=False), failures)
     ports = device_port_leaks(depth, failures=failures)
     tables = {
-        "maps": _maps(maps), "dampings": Numbers(("damping [N s/m]",), tuple((float(B),) for B in grid(depth)[1])),
+        "maps": _maps(maps), "dampings": titled(("damping [N s/m]",), tuple((float(B),) for B in grid(depth)[1])),
         "hardness": _hardness(maps), "peg": _pegs(pegs),
         "waveforms": _waveforms(pulses), "hand port": _ports(ports),
     }  # fmt: skip
@@ -54,7 +53,7 @@ def _pairs(maps: Sequence[Any]) -> list[tuple[Any, Any]]:
     return list(zip(maps[::2], maps[1::2], strict=True))
 
 
-def _maps(maps: Sequence[Any]) -> Numbers:
+def _maps(maps: Sequence[Any]) -> Table:
     """A row per loop and stiffness; outcomes as one mark for each damping."""
     rows = []
     for penalty, impulses in _pairs(maps):
@@ -63,7 +62,7 @@ def _maps(maps: Sequence[Any]) -> Numbers:
         for i, K in enumerate(penalty.stiffness):
             marks = ["".join(MARKS[outcome] for outcome in one.outcomes[i::size]) for one in (penalty, impulses)]
             rows.append((loop.rate, _sensors(loop), loop.device_damping, float(K), max(float(bound[i]), 0.0), *marks))
-    return Numbers(
+    return titled(
         ("rate [Hz]", "sensors", "device damping [N s/m]", "stiffness [N/m]", "passive up to [N s/m]", "penalties",
          "impulses"), tuple(rows), 3,
         "A mark for each damping, small to large: + settles, o bounces on, x grows.")  # fmt: skip
@@ -126,7 +125,7 @@ def _at_paper(maps: Sequence[Any]) -> list[tuple[Any, Any, slice]]:
     return found
 
 
-def _hardness(maps: Sequence[Any]) -> Numbers:
+def _hardness(maps: Sequence[Any]) -> Table:
     rows = []
     for theirs, ours, at in _at_paper(maps):
         for one in (theirs, ours):
@@ -136,16 +135,16 @@ def _hardness(maps: Sequence[Any]) -> Numbers:
                 hardness, settling, depth, bounces, peak = (float(value) for value in values)
                 rows.append((loop.rate, _sensors(loop), loop.device_damping, one.law, float(K), hardness,
                              settling if math.isfinite(settling) else None, 1e3 * depth, int(bounces), peak))
-    return Numbers(("rate [Hz]", "sensors", "device damping [N s/m]", "law", "stiffness [N/m]", "rate-hardness [N/m]",
+    return titled(("rate [Hz]", "sensors", "device damping [N s/m]", "law", "stiffness [N/m]", "rate-hardness [N/m]",
                     "settles after [s]", "penetration [mm]", "bounces", "peak force [N]"), tuple(rows), 3,
                    "At the paper's damping, 50 N s/m. Rate-hardness: the first rise of the force over one step, per "
                    "speed on touching (Lawrence and others, 2000).")  # fmt: skip
 
 
-def _pegs(pegs: Sequence[Any]) -> Numbers:
+def _pegs(pegs: Sequence[Any]) -> Table:
     rows = tuple((p.device, p.stiffness, p.damping, p.world, p.settling_time, p.bounces, 1e3 * p.penetration, p.note)
                  for p in pegs)
-    return Numbers(("device", "stiffness [N/m]", "damping [N s/m]", "world", "settles after [s]", "bounces",
+    return titled(("device", "stiffness [N/m]", "damping [N s/m]", "world", "settles after [s]", "bounces",
                     "penetration [mm]", "stopped"), rows, 3, "A dash: it never came to rest.")
 
 
@@ -163,10 +162,10 @@ def _peg(pegs: Sequence[Any]) -> Finding:
         outcome)
 
 
-def _waveforms(pulses: Sequence[Any]) -> Numbers:
+def _waveforms(pulses: Sequence[Any]) -> Table:
     rows = tuple((p.waveform, p.rate_hardness, p.peak_force, p.settling_time, p.bounces, 1e3 * p.penetration, p.unpaid,
                   1e3 * p.given, 1e3 * p.lost) for p in pulses)  # fmt: skip
-    return Numbers(
+    return titled(
         ("waveform", "rate-hardness [N/m]", "peak force [N]", "settles after [s]", "bounces", "penetration [mm]",
          "momentum not given", "given to the hand [mJ]", "lost in collisions [mJ]"), rows, 3,
         "The peg in the corner at 1 kHz, the impulse given by its device in each way. Negative energy: the pulses took "
@@ -183,10 +182,10 @@ def _pulses(pulses: Sequence[Any]) -> Finding:
         f"collisions took{brake}.", REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip
 
 
-def _ports(ports: Sequence[Any]) -> Numbers:
+def _ports(ports: Sequence[Any]) -> Table:
     rows = tuple((p.loop.world, p.loop.stiffness, p.loop.damping, p.sensors, p.motion, p.loop.bound, p.needed, p.ratio,
                   1e3 * p.leak, p.leak / p.turned_over if p.leak else 0.0) for p in ports)  # fmt: skip
-    return Numbers(
+    return titled(
         ("world", "stiffness [N/m]", "damping [N s/m]", "sensors", "the hand", "KT/2 + |B| [N s/m]",
          "damping needed [N s/m]", "needed / bound", "leak at the bound [mJ]", "of what was turned over"), rows, 4,
         "Whole device loops at 512 Hz, the hand moving 0.5 mm to and fro, worst over several speeds; stiffness and "

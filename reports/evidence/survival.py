@@ -9,10 +9,9 @@ from typing import Any
 
 from reports.evidence.depends import LAST_RESULT
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-from reports.figures.figure import Numbers
 from reports.pages.records import NOT_COMPUTED, Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import REFUTED, REPRODUCED, Failure, of_each
+from verification.finding import REFUTED, REPRODUCED, Failure, Table, of_each, titled
 
 LEAD = (
     "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
@@ -46,22 +45,22 @@ def _repeated(runner: Runner, name: str) -> Any:
     yield name, repeat_run(path)
 
 
-def _last(part: str) -> tuple[Numbers, str] | None:
+def _last(part: str) -> tuple[Table, str] | None:
     """Table of the last fuzzing or fault injection, and when and how it was made; None where it is not kept."""
     kept = json.loads(LAST_RESULT.read_text(encoding="utf-8")) if LAST_RESULT.is_file() else {}
     if part not in kept:
         return None
     found = kept[part]
-    table = Numbers(tuple(found["columns"]), tuple(tuple(row) for row in found["rows"]))
+    table = titled(tuple(found["columns"]), tuple(tuple(row) for row in found["rows"]))
     return table, f"{found['command']}, {found['date']}, commit {found['commit']}"
 
 
-def _of_table(table: Numbers, column: str) -> int:
+def _of_table(table: Table, column: str) -> int:
     """Sum of a column."""
-    return sum(row[table.columns.index(column)] for row in table.rows)
+    return sum(table.column(column))
 
 
-def _inputs(table: Numbers, made: str) -> Finding:
+def _inputs(table: Table, made: str) -> Finding:
     tried, broken = _of_table(table, "tried"), _of_table(table, "traceback or hang")
     came = f"{broken} gave a traceback or hung" if broken else "none gave a traceback or hung"
     return Finding(f"Of {tried} wrong inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
@@ -69,7 +68,7 @@ def _inputs(table: Numbers, made: str) -> Finding:
                    REFUTED if broken else REPRODUCED)  # fmt: skip
 
 
-def _faults(table: Numbers, made: str) -> Finding:
+def _faults(table: Table, made: str) -> Finding:
     tried, survived, lost = (_of_table(table, column) for column in ("tried", "survived", "lost"))
     return Finding(
         f"Of {tried} faults of {len(table.rows)} kinds, {survived} were survived; {lost} finished results were lost "
@@ -82,7 +81,7 @@ def _repetitions(repeated: Any) -> Finding:
                    "came out the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
 
 
-def _repeated_table(repeated: Any) -> Numbers:
+def _repeated_table(repeated: Any) -> Table:
     rows = tuple((name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
                  for name, one in repeated)  # fmt: skip
-    return Numbers(("run", "content hash stored", "simulated again", "differs in"), rows)
+    return titled(("run", "content hash stored", "simulated again", "differs in"), rows)

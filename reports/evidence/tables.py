@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from reports.figures.figure import Numbers
-from reports.store.tables import Column, Table
+from reports.store.tables import Column as StoredColumn
+from reports.store.tables import Table as StoredTable
+from verification.finding import Table
 
 
-def numbers_tables(records: Any) -> tuple[Table, ...]:
-    """Return one table for each `Numbers` among the records, wherever it hangs, named after its holder."""
-    found: dict[str, Numbers] = {}
+def numbers_tables(records: Any) -> tuple[StoredTable, ...]:
+    """Return what is stored of each Table among the records, wherever it hangs, named after its holder."""
+    found: dict[str, Table] = {}
     for name, numbers in _walk(records, "table"):
         label, count = name, 2
         while label in found:
@@ -24,8 +25,8 @@ def numbers_tables(records: Any) -> tuple[Table, ...]:
     return tuple(numbers_table(name, numbers) for name, numbers in found.items() if numbers.rows)
 
 
-def _walk(value: Any, name: str) -> Iterator[tuple[str, Numbers]]:
-    if isinstance(value, Numbers):
+def _walk(value: Any, name: str) -> Iterator[tuple[str, Table]]:
+    if isinstance(value, Table):
         yield name, value
     elif is_dataclass(value) and not isinstance(value, type):
         own = str(getattr(value, "id", None) or getattr(value, "key", None) or name)
@@ -39,15 +40,14 @@ def _walk(value: Any, name: str) -> Iterator[tuple[str, Numbers]]:
             yield from _walk(item, name)
 
 
-def numbers_table(name: str, numbers: Numbers) -> Table:
-    """Return the table of a `Numbers`: a unit in square brackets ends a heading."""
-    columns = []
-    for index, heading in enumerate(numbers.columns):
-        values = [row[index] for row in numbers.rows]
-        match = re.search(r"\[([^\]]+)\]", heading)
-        unit = match.group(1) if match else "1"
-        columns.append(Column(f"{index:02d} {_safe(heading)}", _column(values), unit, heading))
-    return Table(name, tuple(columns), numbers.note, command="iapb reproduce")
+def numbers_table(name: str, numbers: Table) -> StoredTable:
+    """Return a Table as it is stored: its outcomes are a column of words."""
+    units = [*(column.unit or "1" for column in numbers.columns), "1"]
+    columns = [
+        StoredColumn(f"{index:02d} {_safe(title)}", _column([row[index] for row in numbers.cells]), unit, title)
+        for index, (title, unit) in enumerate(zip(numbers.titles, units, strict=False))
+    ]
+    return StoredTable(name, tuple(columns), numbers.note, command="iapb reproduce")
 
 
 def _column(values: list[Any]) -> Any:

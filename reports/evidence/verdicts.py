@@ -51,13 +51,16 @@ def _claims(evidence: Evidence) -> Iterator[Verdict]:
 def _passivity(evidence: Evidence) -> Iterator[Verdict]:
     if evidence.bulk is None:
         return
-    totals = {row[0]: row for row in evidence.bulk.rows if row[1] == "all"}
+    totals = {row["method"]: row for row in evidence.bulk.records() if row["condition of M from"] == "all"}
     ours, printed = totals.get("factored"), totals.get("gram_pinv, as printed")
     if ours is None or printed is None:
         return
-    sentence = (f"In {ours[2]:,} random impacts the engine's largest relative energy gain is {ours[3]:.1e}, at most "
-                f"{ours[4]:.2g} of its bound 10 d ε √κ(M); the printed formula gains up to {printed[3]:.1e}.")
-    yield Verdict("Passive in floating point", REPRODUCED if ours[6] == 0 else REFUTED, sentence, "properties")
+    gain, share, above = "largest relative energy gain", "gain / (10 d ε √κ)", "above 10 d ε √κ"
+    sentence = (f"In {ours['impacts']:,} random impacts the engine's largest relative energy gain is {ours[gain]:.1e}, "
+                f"at most {ours[share]:.2g} of its bound 10 d ε √κ(M); the printed formula gains up to "
+                f"{printed[gain]:.1e}.")  # fmt: skip
+    outcome = REPRODUCED if ours[above] == 0 else REFUTED
+    yield Verdict("Passive in floating point", outcome, sentence, "properties")
 
 
 def _proofs(evidence: Evidence) -> Iterator[Verdict]:

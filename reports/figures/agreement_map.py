@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import BLUE, INK, MUTED, PAPER, STYLES, VERMILION, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "agreement-map", "Where IAPB and complementarity move alike"
 MAP, BORDER = "complementarity/map", "complementarity/two contacts"
@@ -20,13 +21,14 @@ CAPTION = (
 )
 FAMILY, RESTITUTION, REDUNDANT, SHARE = "impacts", "e", "redundant rows", "share that agrees"
 TYPICAL, FARTHEST = "median distance where they differ", "largest distance"
+_BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
 _SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw share and distance of the map, and the border."""
-    numbers: Numbers = inputs[MAP]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[MAP]
+    rows = numbers.records()
     families = [row for row in rows if not row[FAMILY].startswith("scene ")]
     kinds = list(dict.fromkeys((row[FAMILY], row[REDUNDANT]) for row in families))
     panels = (
@@ -75,12 +77,12 @@ def _rows_of(new_figure: Any, kinds: list[tuple[str, int]]) -> tuple[Any, Any]:
     return axes, drawing
 
 
-def _border(numbers: Numbers) -> str:
+def _border(numbers: Table) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=(4.1, 3.4), layout="constrained")
         axes = drawing.add_subplot()
         axes.plot([0.0, 1.0], [0.0, 1.0], **line_arguments(STYLES["bound"], marked=False))
-        for cosine, ratio, predicted, found, _ in numbers.rows:
+        for cosine, ratio, predicted, found in numbers.select(_BORDER).rows:
             axes.plot(cosine, ratio, "o" if found else "x", color=BLUE if found else VERMILION, markersize=6,
                       markeredgewidth=1.4)  # fmt: skip
             if predicted != found:
@@ -94,8 +96,8 @@ def _share_words(rows: list[dict[str, Any]]) -> str:
     return f"Shares of impacts with one motion, by kind; all of them for {', '.join(whole)}."
 
 
-def _border_words(numbers: Numbers) -> str:
-    right = sum(row[2] == row[3] for row in numbers.rows)
+def _border_words(numbers: Table) -> str:
+    right = sum(predicted == found for predicted, found in numbers.select(_BORDER[2:]).rows)
     return f"Agreement of two contacts is as predicted by r >= c at {right} of {len(numbers.rows)} points."
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import LineStyle, line_arguments, series_legend, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "anytime", "Stopping an impact early", "haptic-rate/budgets"
-BUDGET, RESIDUAL, LOST = "budget [rows]", "median residual", "share of the loss"
+BUDGET, RESIDUAL, LOST = "budget", "median residual", "share of the loss"
 CAPTION = (
     "Plastic impacts stopped after so many rows, the largest unmet one first. What is not yet resolved falls with "
     "every row, and at the rank to rounding; the energy taken never exceeds what the whole impact takes, so no budget "
@@ -21,8 +22,8 @@ _SMALLEST = 1e-17
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Residual and energy."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     names = tuple(dict.fromkeys(_name(row) for row in rows))
     legend = series_legend(names)
     panels = (

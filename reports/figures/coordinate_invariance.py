@@ -7,9 +7,10 @@ from typing import Any
 
 from reports.figures.canvas import note
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, MUTED, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "coordinate-invariance", "The same impact in other coordinates", "mechanics/coordinate invariance"
 CAPTION = (
@@ -29,8 +30,8 @@ _SIZE = (4.3, 3.3)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw both panels."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     panels = (Panel(_through_the_pose(rows), _words(rows), "Towards the straight arm"),
               Panel(_against_the_bound(rows), _words(rows), "Error against bound"))  # fmt: skip
     legend = (*((f"in {name}" if name == ANGLES else f"in the {name}", look) for name, look in LOOKS.items()),
@@ -44,10 +45,10 @@ def _through_the_pose(rows: Sequence[Mapping[str, Any]]) -> str:
         axes = drawing.add_subplot()
         for name, look in LOOKS.items():
             mine = [row for row in rows if row["coordinates"] == name and row["contacts"] in SHOWN]
-            elbows = sorted({row["elbow [rad]"] for row in mine}, reverse=True)
-            bounds = [max(row["bound"] for row in mine if row["elbow [rad]"] == elbow) for elbow in elbows]
+            elbows = sorted({row["elbow"] for row in mine}, reverse=True)
+            bounds = [max(row["bound"] for row in mine if row["elbow"] == elbow) for elbow in elbows]
             axes.plot([max(e, ZERO) for e in elbows], bounds, **_dashed(look))
-            errors = [(max(row["elbow [rad]"], ZERO), max(row["error"], SMALLEST)) for row in mine
+            errors = [(max(row["elbow"], ZERO), max(row["error"], SMALLEST)) for row in mine
                       if row["error"] is not None]  # fmt: skip
             axes.plot(*zip(*errors, strict=True), **_marks(look))
         axes.axhline(1.0, color=MUTED, linewidth=0.8)

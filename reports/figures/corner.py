@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import PANEL, STYLES, line_arguments, styled
 from reports.figures.svg import PATH, curve_id, traced_svg
+from verification.finding import Table, titled
 
 Floats = NDArray[np.float64]
 
@@ -127,7 +128,7 @@ def first_shown(runs: Mapping[str, Run]) -> int:
 
 
 def _trajectory_figure(key: str, runs: Mapping[str, Run],
-                       names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Numbers]:
+                       names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Table]:
     """The path and the three coordinates; where the device is limited, also tool against device and penetration."""
     panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
     if names in (LIMITED, STRATEGIES):
@@ -136,7 +137,7 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run],
     apart = ("from ideal x [mm]", "y [mm]", "θ [°]") if reference else ()
     columns = ("world", *apart, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
     note = _FROM_IDEAL + _SETTLED if reference else _SETTLED
-    return tuple(panels), Numbers(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
+    return tuple(panels), titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
 
 
 def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
@@ -237,7 +238,7 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
 # Forces that the device's actuators apply
 
 
-def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Numbers]:
+def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Table]:
     """Force along x and torque, each in full and magnified; peaks, and what is held at the end."""
     panels = tuple(_force_panel(key, runs, k, title, label, shown) for k, title, label, cut in _FORCES
                    for shown in (None, cut))  # fmt: skip
@@ -245,7 +246,7 @@ def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...],
                "held τ [N m]")
     rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(), *held_force(run).tolist())
                  for curve, run in runs.items())  # fmt: skip
-    return panels, Numbers(columns, rows, digits=3, note=_HELD)
+    return panels, titled(columns, rows, digits=3, note=_HELD)
 
 
 def _force_panel(key: str, runs: Mapping[str, Run], k: int, title: str, label: str, shown: float | None) -> Panel:

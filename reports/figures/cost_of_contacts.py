@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import (
     AMBER,
     BLUE,
@@ -21,6 +21,7 @@ from reports.figures.style import (
     styled,
 )
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "cost-of-contacts", "What an impact costs"
 COSTS, STEPS = "complementarity/time per impact", "complementarity/time per step"
@@ -32,7 +33,7 @@ CAPTION = (
     "what it costs. Last picture: one step of each world."
 )
 FAMILY, CONTACTS, SOLVER, OUTCOME = "impacts", "contacts", "solver", "outcome"
-MEDIAN, LEAST, LARGEST = "median [µs]", "least [µs]", "largest [µs]"
+MEDIAN, LEAST, LARGEST = "median", "least", "largest"
 # What is compiled is dashed; IAPB is blue, the rest keeps the numbered styles.
 COMPILED = {"IAPB kernel": LineStyle(BLUE, "o", (4, 1.6), 1.6, False),
             "Lemke kernel": LineStyle(VERMILION, "s", (4, 1.6), 1.6, False)}  # fmt: skip
@@ -52,8 +53,8 @@ def looks(solvers: list[str]) -> dict[str, LineStyle]:
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw a panel for each family, and the steps."""
-    numbers: Numbers = inputs[COSTS]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[COSTS]
+    rows = numbers.records()
     styles = looks(list(dict.fromkeys(row[SOLVER] for row in rows)))
     panels = [Panel(_curves(rows, styles, family), _words(rows, family), family)
               for family in dict.fromkeys(row[FAMILY] for row in rows)]  # fmt: skip
@@ -97,8 +98,8 @@ def _contact_ticks(axes: Any, contacts: list[int]) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _steps(numbers: Numbers) -> str:
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+def _steps(numbers: Table) -> str:
+    rows = numbers.records()
     ways, scenes = (list(dict.fromkeys(row[name] for row in rows)) for name in ("world", "scene"))
     with styled() as new_figure:
         drawing = new_figure(figsize=(4.6, 2.4), layout="constrained")
@@ -126,7 +127,7 @@ def _words(rows: list[dict[str, Any]], family: str) -> str:
     return f"Median times of a {family} of {most} contacts in microseconds: {', '.join(texts)}."
 
 
-def _step_words(numbers: Numbers) -> str:
+def _step_words(numbers: Table) -> str:
     return "Median times of one step in microseconds: " + ", ".join(
         f"{scene} {way} {median:.3g}" for scene, way, median, *_ in numbers.rows) + "."  # fmt: skip
 

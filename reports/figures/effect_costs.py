@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.labels import label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "effect-costs", "What leaving an effect out saves, and what it breaks", "effect_costs"
-SCENE, EFFECT, SAVED, ERROR, BEST = "scene", "effect", "time saved [%]", "error [mm]", "best of its error"
+SCENE, EFFECT, SAVED, ERROR, BEST = "scene", "effect", "time saved", "error", "best of its error"
 CAPTION = (
     "Each mark is one effect left out of a scene that calls for it: to the right it saves time, upwards it takes the "
     "tool away from where it should be. Filled marks, joined: no other effect saves more for less error. Marks on the "
@@ -24,8 +25,8 @@ _SIZE = (4.6, 3.6)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """A panel per scene."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     panels = tuple(
         Panel(_marks([row for row in rows if row[SCENE] == scene], scene),
               f"{scene}: error against time saved for {', '.join(row[EFFECT] for row in rows if row[SCENE] == scene)}.",
@@ -46,7 +47,7 @@ def _marks(rows: list[dict[str, Any]], scene: str) -> str:
         others = [(row[SAVED], max(row[ERROR], _NOTHING)) for row in rows if row[BEST] != "yes"]
         if others:
             axes.plot(*zip(*others, strict=True), **line_arguments(STYLES["cannot tell"]) | {"linestyle": "none"})
-        axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel=ERROR)
+        axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel="error [mm]")
         axes.margins(x=0.35, y=0.12)
         axes.yaxis.set_major_locator(LogLocator(numticks=8))
         axes.yaxis.set_major_formatter(FuncFormatter(_tick))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, STYLES, line_arguments, series_legend, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "energy-gains", "Does rounding make energy?"
-INPUT = "energy_gains"  # Numbers with at least the columns below, one row per method and decade of κ(M)
+INPUT = "energy_gains"  # Table with at least the columns below, one row per method and decade of κ(M)
 METHOD, CONDITION, GAIN, SHARE = (
     "method", "condition of M from", "largest relative energy gain", "gain / (10 d ε √κ)",
 )
@@ -24,22 +25,21 @@ _SMALLEST = 1e-18  # no gain at all is drawn here: a tenth of what double precis
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw both panels from the table of the bulk study."""
-    numbers: Numbers = inputs[INPUT]
-    methods = tuple(dict.fromkeys(row[0] for row in numbers.rows))
+    numbers: Table = inputs[INPUT]
+    methods = tuple(dict.fromkeys(numbers.column(METHOD)))
     panels = (Panel(_curves(numbers, GAIN, methods, "relative gain", None), _words(numbers), "largest gain"),
               Panel(_curves(numbers, SHARE, methods, "gain / bound", 1.0), "The same as a share of the bound.",
                     "as a share of 10 d ε √κ"))
     return Figure(KEY, "", TITLE, CAPTION, panels, numbers, series_legend(methods), (INPUT,))
 
 
-def series(numbers: Numbers, method: str, column: str) -> tuple[list[float], list[float]]:
+def series(numbers: Table, method: str, column: str) -> tuple[list[float], list[float]]:
     """Return the conditions and the values of one method, without the row that sums up all of them."""
-    at, of = numbers.columns.index(CONDITION), numbers.columns.index(column)
-    rows = [row for row in numbers.rows if row[0] == method and row[at] != "all"]
-    return [float(row[at]) for row in rows], [float(row[of]) for row in rows]
+    rows = [row for row in numbers.where(method=method).records() if row[CONDITION] != "all"]
+    return [float(row[CONDITION]) for row in rows], [float(row[column]) for row in rows]
 
 
-def _curves(numbers: Numbers, column: str, methods: tuple[str, ...], label: str, bound: float | None) -> str:
+def _curves(numbers: Table, column: str, methods: tuple[str, ...], label: str, bound: float | None) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.add_subplot()
@@ -65,9 +65,8 @@ def plain_powers(axes: Any) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def _words(numbers: Numbers) -> str:
-    of, at = numbers.columns.index(GAIN), numbers.columns.index(CONDITION)
-    worst = {row[0]: row[of] for row in numbers.rows if row[at] == "all"}
+def _words(numbers: Table) -> str:
+    worst = {row[METHOD]: row[GAIN] for row in numbers.records() if row[CONDITION] == "all"}
     return "Largest relative energy gain of all impacts: " + ", ".join(f"{m} {g:.1e}" for m, g in worst.items()) + "."
 
 

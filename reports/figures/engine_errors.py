@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import AMBER, BLUE, INK, MUTED, RULE, SKY, VERMILION, LineStyle, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "engine-errors", "Energy, momentum and overlap, by engine"
 INPUT = "engines/errors"
@@ -27,8 +28,8 @@ PANELS = (("energy error", "energy error"), ("momentum error", "momentum error")
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw the three tables."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     panels = tuple(Panel(_cells(rows, column, label), _words(rows, column), label) for column, label in PANELS)
     legend = tuple((name, LineStyle(color, "s", (), 0.0)) for name, (_, color, _) in zip(NAMES, LEVELS, strict=True))
     return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))

@@ -9,10 +9,11 @@ import numpy as np
 
 from iapb.run import Run
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, is_turned, make_canvas, note
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.geometry import body_outlines, body_placements, bounds
 from reports.figures.style import BLUE, FORCE, INK, PANEL, styled
 from reports.figures.svg import to_svg
+from verification.finding import titled
 
 KEY, NUMBER, TITLE = "fig01", "Figure 1", "What acts on a contact group"
 RUN = "group/IAPB"
@@ -36,7 +37,7 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     rows = tuple((title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
                   unit) for title, step, values, unit in shown for k in contacts_of(run, step))
     columns = ("instant", "t [s]", "contact x [mm]", "y [mm]", "along the normal", "unit")
-    return Figure(KEY, NUMBER, TITLE, CAPTION, panels, Numbers(columns, rows), (), (RUN,))
+    return Figure(KEY, NUMBER, TITLE, CAPTION, panels, titled(columns, rows), (), (RUN,))
 
 
 def contacts_of(run: Run, step: int) -> range:

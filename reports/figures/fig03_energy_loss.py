@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb import resolve_impact
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import PANEL, STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import titled
 
 LENGTH, MASS = 1.0, 1.0  # of both links [m], [kg]
 CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]
@@ -90,7 +91,7 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
         "point is the centre of percussion of the motion. Towards e = 1 every curve returns to its KE₀. The paper "
         "prints neither the mass distribution nor values; its axis (0 to 6) leaves both readings open.",
         tuple(_panel(energies, contact) for contact in CONTACTS),
-        Numbers(("e", *(f"{name} [J]" for name in series)), rows, digits=6,
+        titled(("e", *(f"{name} [J]" for name in series)), rows, digits=6,
               note="KE₀ is 7/3 J for uniform rods and 5 J for point masses at the far ends of the links."),
         (("uniform rods", "uniform rods"), ("point masses", "point masses"), ("before the collision, KE₀", "KE₀")),
         ("arm_energies",),

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from reports.figures.canvas import arrow, draw_bodies, draw_walls, make_canvas, note, scale_bar
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.geometry import body_outlines, bounds
 from reports.figures.numbers import MINUS
 from reports.figures.style import MUTED, PANEL, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table, titled
 
 KEY, NUMBER, TITLE = "fig04", "Figure 4", "The peg before the corner"
 SCENE = "scene/peg_corner"
@@ -58,7 +59,7 @@ def _frame(axes: Any) -> None:
         note(axes, vector, name, offset, color=MUTED)
 
 
-def _numbers(scene: Mapping[str, Any]) -> Numbers:
+def _numbers(scene: Mapping[str, Any]) -> Table:
     body, contact = scene["bodies"][0], scene["contact"]
     x, y, angle = body["position"]
     rows = (
@@ -71,7 +72,7 @@ def _numbers(scene: Mapping[str, Any]) -> Numbers:
         ("hand force [N, N, N m]", _list(scene["hand"]["force"]), "paper"),
         ("rate [Hz]", _list([scene["rate"]]), "paper"),
     )
-    return Numbers(("quantity", "value", "given by"), rows)
+    return titled(("quantity", "value", "given by"), rows)
 
 
 def _list(values: Iterable[float]) -> str:

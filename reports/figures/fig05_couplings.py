@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.blocks import block, make_board, summing_point, wire
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import BLUE, FORCE, GREEN, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table, titled
 
 KEY, NUMBER, TITLE = "fig05", "Figure 5", "Two ways to hold the tool, and Table I"
 SCENE = "scene/peg_corner"
@@ -74,7 +75,7 @@ def _spring(axes: Any, color: str) -> None:
         wire(axes, [((left + right) / 2, 2.6), (right, 2.6)], color=color)
 
 
-def _table(scene: Mapping[str, Any]) -> Numbers:
+def _table(scene: Mapping[str, Any]) -> Table:
     couplings = scene["couplings"]
     names = {"four_channel": ("K_coord", "B_coord"), "unilateral": ("K_cpl", "B_cpl")}
     rows = []
@@ -82,7 +83,7 @@ def _table(scene: Mapping[str, Any]) -> Numbers:
         gains = couplings[coupling]
         rows.append((stiffness, *map(float, gains["stiffness"]), "N/m, N m/rad"))
         rows.append((damping, *map(float, gains["damping"]), "N s/m, N m s/rad"))
-    return Numbers(("Table I", "x", "y", "θ", "unit"), tuple(rows))
+    return titled(("Table I", "x", "y", "θ", "unit"), tuple(rows))
 
 
 RECIPE = Recipe(KEY, NUMBER, TITLE, (SCENE,), draw, section="couplings")

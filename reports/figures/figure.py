@@ -11,31 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.figures.style import LineStyle
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """Numbers under a figure: `columns` are headings with their unit, `rows` hold text or numbers.
-
-    A number is printed with `digits` significant digits; None is printed as a dash: "does not apply". `timed` names the
-    columns that hold measured times, or what is made from them: nobody can ask that they repeat. `timed_rows`: which
-    rows there are depends on times too, as where larger sizes are tried until one is too slow. `prose` names the
-    columns of sentences: their numbers stand in other tables, where they are compared.
-    """
-
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
-    digits: int = 4
-    note: str = ""
-    timed: tuple[str, ...] = ()
-    timed_rows: bool = False
-    prose: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for kind, names in (("timed", self.timed), ("prose", self.prose)):
-            unknown = [name for name in names if name not in self.columns]
-            if unknown:
-                raise ValueError(f"{kind} columns {unknown}: expected some of {self.columns}")
+from verification.finding import Table
 
 
 @dataclass(frozen=True)
@@ -58,7 +34,7 @@ class Figure:
     title: str
     caption: str
     panels: tuple[Panel, ...]
-    numbers: Numbers | None = None
+    numbers: Table | None = None
     legend: tuple[tuple[str, str | LineStyle], ...] = ()  # (text, a style or the name of one)
     inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
 

@@ -13,11 +13,12 @@ import numpy as np
 
 from iapb.run import Run
 from reports.figures.corner import UNLIMITED
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.film import SIZE, Film, film, frames
 from reports.figures.geometry import Floats, is_spatial
 from reports.figures.scenes_space import SIGHTS
 from reports.figures.style import FORCE, INK, LINK, MUTED, PEG, RULE, VARIABLES, WALL
+from verification.finding import Table, titled
 
 SIGHT = {sight.run: sight for sight in SIGHTS}
 MARKS = "Blue dots are contacts, with a line as long as the root of their force; red rays are impulses."
@@ -84,9 +85,9 @@ def _panel(key: str, label: str, made: Film, times: Sequence[float]) -> Panel:
     return Panel(strip(made, key, times), alt, label, film=made.text)
 
 
-def _numbers(films: Mapping[str, Film]) -> Numbers:
+def _numbers(films: Mapping[str, Film]) -> Table:
     columns = ("world", "simulated [s]", "steps", "moments shown", "contacts", "impacts", "in this page [kB]")
-    return Numbers(columns, tuple(_row(label, made.run, made) for label, made in films.items()), digits=3)
+    return titled(columns, tuple(_row(label, made.run, made) for label, made in films.items()), digits=3)
 
 
 def _row(label: str, run: Run, made: Film) -> tuple[Any, ...]:

@@ -1,7 +1,7 @@
 """Hard cases at a glance: a row per case, a column per method or world, a mark per verdict, the decade of the error.
 
 A full dot is stable and the number in it is the decade of its error; every other mark is a failure with a shape of its
-own. The input is a `Numbers` with the columns named below, one row per case and method.
+own. The input is a `Table` with the columns named below, one row per case and method.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, RULE, VERMILION, LineStyle, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "hard-cases-matrix", "Who survives what", "hard_cases"
 CASE, KIND, METHOD, OUTCOME, GAIN, ERROR = "case", "kind", "method", "outcome", "energy gain", "forward error"
@@ -41,10 +42,10 @@ _LONGEST = 58  # characters of a case's name that fit beside the matrix
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw one matrix for the impacts and one for the motions."""
-    numbers: Numbers = inputs[INPUT]
-    kinds = {row[numbers.columns.index(KIND)] for row in numbers.rows}
+    numbers: Table = inputs[INPUT]
+    kinds = set(numbers.column(KIND))
     panels = tuple(_panel(numbers, kind, label) for kind, label in _KINDS if kind in kinds)
-    seen = {row[numbers.columns.index(OUTCOME)] for row in numbers.rows}
+    seen = set(numbers.column(OUTCOME))
     legend = tuple((outcome, style) for outcome, style in MARKS.items() if outcome in seen)
     return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
 
@@ -56,9 +57,8 @@ def decade(value: float | None) -> str:
     return str(math.floor(math.log10(value))).replace("-", "−")
 
 
-def _panel(numbers: Numbers, kind: str, label: str) -> Panel:
-    at = {name: numbers.columns.index(name) for name in (CASE, METHOD, OUTCOME, GAIN, ERROR)}
-    rows = [{name: row[place] for name, place in at.items()} for row in numbers.rows if row[1] == kind]
+def _panel(numbers: Table, kind: str, label: str) -> Panel:
+    rows = numbers.where(kind=kind).records()
     cases = tuple(dict.fromkeys(row[CASE] for row in rows))
     methods = tuple(sorted({row[METHOD] for row in rows}, key=_first))
     svg = _matrix(f"{KEY}-{kind}", rows, cases, methods)

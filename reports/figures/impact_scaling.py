@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import STYLES, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "impact-scaling", "How one impact's time grows"
 INPUTS = ("haptic-rate/scaling", "haptic-rate/fitted")
@@ -33,14 +34,14 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     return Figure(KEY, "", TITLE, CAPTION, panels, numbers, tuple(LOOKS.items()), INPUTS)
 
 
-def _curves(numbers: Numbers, powers: Mapping[tuple[str, str], float], axis: str) -> str:
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+def _curves(numbers: Table, powers: Mapping[tuple[str, str], float], axis: str) -> str:
+    rows = numbers.records()
     held, value = AXES[axis]
     with styled() as new_figure:
         drawing = new_figure(figsize=(4.1, 3.0), layout="constrained")
         axes = drawing.add_subplot()
         for method, look in LOOKS.items():
-            curve = sorted((row[axis], row["time [µs]"], row["lower quartile [µs]"], row["upper quartile [µs]"])
+            curve = sorted((row[axis], row["time"], row["lower quartile"], row["upper quartile"])
                            for row in rows if row["method"] == method and row[held] == value)  # fmt: skip
             size, middle, low, high = (np.array(part) for part in zip(*curve, strict=True))
             axes.plot(size, middle, **line_arguments(look) | {"linestyle": "none"})

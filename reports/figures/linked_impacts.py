@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from reports.figures.canvas import arrow, note
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import BLUE, GREEN, INK, MUTED, PAPER, VERMILION, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "linked-impacts", "A blow to balls that touch", "mechanics/linked impacts"
 CAPTION = (
@@ -49,19 +50,18 @@ class Outcome(NamedTuple):
         return next(look for start, look in LOOKS.items() if self.treatment.startswith(start))
 
 
-def outcomes(numbers: Numbers, problem: str) -> list[Outcome]:
+def outcomes(numbers: Table, problem: str) -> list[Outcome]:
     """Return the outcomes of one problem from the table, which has a row per ball."""
     found: dict[tuple[str, str], list[Any]] = {}
-    for row in numbers.rows:
-        if row[0] == problem:
-            found.setdefault((row[1], row[2]), []).append(row)
-    return [Outcome(*names, tuple((r[5], r[6]) for r in rows), rows[0][7], rows[0][8])
-            for names, rows in found.items()]  # fmt: skip
+    for row in numbers.where(problem=problem).records():
+        found.setdefault((row["treatment"], row["rows or order"]), []).append(row)
+    return [Outcome(*names, tuple((r["v_x after"], r["v_y after"]) for r in rows), rows[0]["energy change"],
+                    rows[0]["momentum change"]) for names, rows in found.items()]  # fmt: skip
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw both problems, and what the last ball of a cradle gets."""
-    numbers: Numbers = inputs[INPUT]
+    numbers: Table = inputs[INPUT]
     cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
     panels = (
         Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
@@ -146,17 +146,17 @@ def _bernoulli(found: Sequence[Outcome]) -> str:
         return to_svg(drawing, f"{KEY}-bernoulli")
 
 
-def _series(numbers: Numbers) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
+def _series(numbers: Table) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
     """The outcomes of all cradles by treatment and rows, each with the number of balls."""
     series: dict[tuple[str, str], list[tuple[int, Outcome]]] = {}
-    for problem in dict.fromkeys(row[0] for row in numbers.rows):
+    for problem in dict.fromkeys(numbers.column("problem")):
         for outcome in outcomes(numbers, problem):
             if problem.startswith("cradle") and "LCP" not in outcome.rows:  # as simultaneous, all rows
                 series.setdefault((outcome.treatment, outcome.rows), []).append((len(outcome.velocity), outcome))
     return series
 
 
-def _last_ball(numbers: Numbers) -> str:
+def _last_ball(numbers: Table) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=(4.1, 3.0), layout="constrained")
         axes = drawing.add_subplot()

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, line_arguments, series_legend, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table, titled
 
 KEY, TITLE = "performance-profile", "Which solver solves what, and how fast"
 INPUT = "complementarity/profile"
@@ -25,8 +26,8 @@ _SIZE = (4.4, 3.2)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw a panel for each collection and kind of problem."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     kinds = {kind: _solvers(rows, kind) for kind in KINDS}
     places = dict.fromkeys((row[COLLECTION], row[KIND]) for row in rows)
     panels = tuple(
@@ -62,12 +63,12 @@ def _at(rows: list[dict[str, Any]], place: tuple[str, str]) -> list[dict[str, An
     return [row for row in rows if (row[COLLECTION], row[KIND]) == place]
 
 
-def _ends(rows: list[dict[str, Any]]) -> Numbers:
+def _ends(rows: list[dict[str, Any]]) -> Table:
     """Where each curve starts and ends."""
     curves: dict[tuple[str, str, str], list[float]] = {}
     for row in rows:
         curves.setdefault((row[COLLECTION], row[KIND], row[SOLVER]), []).append(row[SHARE])
-    return Numbers((COLLECTION, KIND, SOLVER, "share as the fastest", "share solved at all"),
+    return titled((COLLECTION, KIND, SOLVER, "share as the fastest", "share solved at all"),
                    tuple((*name, shares[0], shares[-1]) for name, shares in curves.items()), 3,
                    timed=("share as the fastest", "share solved at all"))  # fmt: skip
 

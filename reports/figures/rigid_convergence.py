@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "rigid-convergence", "The rigid world converges to event-driven truth"
 INPUT = "complementarity/convergence"
-SCENE, STEP = "scene", "step [ms]"
+SCENE, STEP = "scene", "step"
 ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
 CAPTION = (
     "The largest error of three steps near each mark, before impacts accumulate. Parallel to the dashed line: "
@@ -26,8 +27,8 @@ _SIZE = (4.4, 3.4)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw positions and velocities."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     scenes = tuple(dict.fromkeys(row[SCENE] for row in rows))
     panels = tuple(Panel(_curves(rows, scenes, column), f"Errors of {label} against the step.", label)
                    for label, column in ERRORS.items())  # fmt: skip
@@ -52,7 +53,7 @@ def _curves(rows: list[dict[str, Any]], scenes: tuple[str, ...], column: str) ->
                 drawn += curve
         if drawn:
             _slope(axes, drawn)
-        axes.set(xscale="log", yscale="log", xlabel=STEP, ylabel="error")
+        axes.set(xscale="log", yscale="log", xlabel="step [ms]", ylabel="error")
         plain_powers(axes)
         steps = sorted({row[STEP] for row in rows})
         axes.set_xticks(steps, [f"{step:.2g}" for step in steps])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.numbers import format_number
 from reports.figures.style import (
     AMBER,
@@ -25,6 +25,7 @@ from reports.figures.style import (
     styled,
 )
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "every-scene", "Every scene at a glance"
 CONTACTS, OVER_TIME = "scene-ledger/contact and time", "scene-ledger/books over time"
@@ -37,11 +38,11 @@ CAPTION = (
 )
 # heading of the table -> (text of the legend, colour), from the bottom of the stack
 LAYERS = (
-    (("kinetic [J]",), "in motion", BLUE),
-    (("potential [J]", "springs [J]"), "in height and contact springs", SKY),
-    (("lost impacts [J]",), "lost in impacts", VERMILION),
-    (("lost damping [J]",), "lost in contact damping", AMBER),
-    (("lost friction [J]",), "lost in friction", PURPLE),
+    (("kinetic",), "in motion", BLUE),
+    (("potential", "springs"), "in height and contact springs", SKY),
+    (("lost impacts",), "lost in impacts", VERMILION),
+    (("lost damping",), "lost in contact damping", AMBER),
+    (("lost friction",), "lost in friction", PURPLE),
 )
 LEGEND = (*((text, LineStyle(color, "s", width=0.0)) for _, text, color in LAYERS),
           ("all energy so far", LineStyle(INK, width=1.2)), ("impact", LineStyle(FORCE, "|", width=0.0)))  # fmt: skip
@@ -68,28 +69,28 @@ class Strip:
     at_rest: bool
 
 
-def strips(numbers: Numbers) -> tuple[Strip, ...]:
+def strips(numbers: Table) -> tuple[Strip, ...]:
     """Return the strips of all scenes from the table of the books over time."""
-    names = tuple(dict.fromkeys(row[0] for row in numbers.rows))
+    names = tuple(dict.fromkeys(numbers.column("scene")))
     return tuple(_strip(name, numbers) for name in names)
 
 
-def _strip(name: str, numbers: Numbers) -> Strip:
-    rows = [row[1:] for row in numbers.rows if row[0] == name]
-    column = dict(zip(numbers.columns[1:], np.array(rows, dtype=float).T, strict=True))
-    stored = column["potential [J]"] + column["springs [J]"]
-    at_rest = np.ptp(column["given [J]"]) + column["kinetic [J]"].max() <= _STILL * np.abs(stored).max()
+def _strip(name: str, numbers: Table) -> Strip:
+    mine = numbers.where(scene=name)
+    column = {key: np.array(mine.column(key), dtype=float) for key in numbers.keys[1:]}
+    stored = column["potential"] + column["springs"]
+    at_rest = np.ptp(column["given"]) + column["kinetic"].max() <= _STILL * np.abs(stored).max()
     lowest = stored.min()  # heights count from the lowest: only changes of a potential mean anything
     layers = np.array([sum(column[heading] for heading in headings) for headings, _, _ in LAYERS])
     layers[1] -= lowest
-    line = column["kinetic [J]"][0] + stored[0] - lowest + column["given [J]"]
-    return Strip(name, column["time [s]"], layers, line, column["impacts"] > 0, bool(at_rest))
+    line = column["kinetic"][0] + stored[0] - lowest + column["given"]
+    return Strip(name, column["time"], layers, line, column["impacts"] > 0, bool(at_rest))
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw every row."""
     shown, contacts = strips(inputs[OVER_TIME]), inputs[CONTACTS]
-    facts = {row[0]: dict(zip(contacts.columns, row, strict=True)) for row in contacts.rows}
+    facts = {row["scene"]: row for row in contacts.records()}
     with styled() as new_figure:
         height = _HEAD + _ROW * len(shown) + _FOOT
         drawing = new_figure(figsize=(_WIDTH, height))
@@ -109,17 +110,17 @@ def _row(drawing: Any, bottom: float, height: float, strip: Strip, facts: Mappin
     drawing.text(0.006, middle, _facts_in_words(fact), va="top", fontsize=7.5, color=MUTED)
     left, width = _COLUMNS["energy"]
     _energy(drawing.add_axes((left, bottom + 0.14 * height, width, 0.78 * height)), strip)
-    depth = fact["most penetration [mm]"]
+    depth = fact["most penetration"]
     _bar(drawing, "depth", bottom, height, depth, (_NO_DEPTH, _DEEPEST), LINK,
          f"{format_number(depth, 2)} mm" if depth else "touches nothing")  # fmt: skip
-    times = [each["time per step [µs]"] for each in facts.values()]
-    _bar(drawing, "time", bottom, height, fact["time per step [µs]"], (0.5 * min(times), _LONGEST * max(times)), LINK,
-         f"{format_number(fact['time per step [µs]'], 2)} µs")
+    times = [each["time per step"] for each in facts.values()]
+    _bar(drawing, "time", bottom, height, fact["time per step"], (0.5 * min(times), _LONGEST * max(times)), LINK,
+         f"{format_number(fact['time per step'], 2)} µs")
 
 
 def _facts_in_words(fact: Mapping[str, Any]) -> str:
     space = "in space, " if fact["dimensions"] == 3 else ""
-    return f"{format_number(fact['energy turned over [J]'], 2)} J, {space}{fact['how it ends']}"
+    return f"{format_number(fact['energy turned over'], 2)} J, {space}{fact['how it ends']}"
 
 
 def _energy(axes: Any, strip: Strip) -> None:
@@ -161,11 +162,11 @@ def _headings(drawing: Any, height: float) -> None:
 
 
 def _words(shown: Sequence[Strip], facts: Mapping[str, Mapping[str, Any]]) -> str:
-    deepest = max(facts.values(), key=lambda fact: fact["most penetration [mm]"])
-    longest = max(facts.values(), key=lambda fact: fact["time per step [µs]"])
+    deepest = max(facts.values(), key=lambda fact: fact["most penetration"])
+    longest = max(facts.values(), key=lambda fact: fact["time per step"])
     return (
-        f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration [mm]']:.2g} mm in "
-        f"{deepest['scene']}; longest step {longest['time per step [µs]']:.2g} µs in {longest['scene']}."
+        f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
+        f"{deepest['scene']}; longest step {longest['time per step']:.2g} µs in {longest['scene']}."
     )
 
 

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.figures.canvas import note
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, PANEL, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "socket-collisions", "A ball rolls in a faceted socket"
 TIMES, COUNTS = "mechanics/false collisions in time", "mechanics/false collisions"
@@ -27,39 +28,39 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw counts and losses in time, and the counts over damping."""
     times, counts = inputs[TIMES], inputs[COUNTS]
     panels = (
-        Panel(_in_time(times, 3, "false collisions so far"), _words(counts), f"False collisions, {DAMPING:g} N s/m"),
-        Panel(_in_time(times, 4, "lost in them, share of the fall"), "Energy lost in false collisions, cumulative.",
-              "Energy that they take"),
+        Panel(_in_time(times, "false collisions so far", "false collisions so far"), _words(counts),
+              f"False collisions, {DAMPING:g} N s/m"),
+        Panel(_in_time(times, "lost so far, of the fall", "lost in them, share of the fall"),
+              "Energy lost in false collisions, cumulative.", "Energy that they take"),
         Panel(_bars(counts), _words(counts), "By damping of the contact"),
     )  # fmt: skip
     return Figure(KEY, "", TITLE, CAPTION, panels, counts, tuple(zip(SETTINGS, CYCLE, strict=False)), (TIMES, COUNTS))
 
 
-def _in_time(numbers: Numbers, column: int, label: str) -> str:
+def _in_time(numbers: Table, column: str, label: str) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=PANEL, layout="constrained")
         axes = drawing.add_subplot()
         for number, setting in enumerate(SETTINGS):
-            rows = [row for row in numbers.rows if row[0] == setting and row[1] == DAMPING]
-            time = [0.0, *(row[2] for row in rows), DURATION]
-            value = [0.0, *(row[column] for row in rows)]
-            look = line_arguments(CYCLE[number], marked=bool(rows))
+            mine = numbers.where(filters=setting, damping=DAMPING)
+            time, value = [0.0, *mine.column("time"), DURATION], [0.0, *mine.column(column)]
+            look = line_arguments(CYCLE[number], marked=bool(mine.rows))
             axes.step(time, [*value, value[-1]], where="post", **look | {"markevery": 4, "clip_on": False})
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, DURATION))
         axes.set_ylim(bottom=0.0)
-        shown = {row[0] for row in numbers.rows if row[1] == DAMPING}
+        shown = set(numbers.where(damping=DAMPING).column("filters"))
         none = " and ".join(setting for setting in SETTINGS if setting not in shown)
         note(axes, (DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
-        return to_svg(drawing, f"{KEY}-{column}")
+        return to_svg(drawing, f"{KEY}-{numbers.keys.index(column)}")
 
 
-def _bars(numbers: Numbers) -> str:
-    dampings = sorted({row[1] for row in numbers.rows})
+def _bars(numbers: Table) -> str:
+    dampings = sorted(set(numbers.column("damping")))
     with styled() as new_figure:
         drawing = new_figure(figsize=PANEL, layout="constrained")
         axes = drawing.add_subplot()
         for number, setting in enumerate(SETTINGS):
-            heights = [next(row[2] for row in numbers.rows if row[0] == setting and row[1] == b) for b in dampings]
+            heights = [numbers.where(filters=setting, damping=b).column("false collisions")[0] for b in dampings]
             places = [k + 0.2 * (number - 1.5) for k in range(len(dampings))]
             axes.bar(places, heights, width=0.17, color=CYCLE[number].color)
             for place, height in zip(places, heights, strict=True):
@@ -70,8 +71,8 @@ def _bars(numbers: Numbers) -> str:
         return to_svg(drawing, f"{KEY}-damping")
 
 
-def _words(numbers: Numbers) -> str:
-    found = (f"{row[0]} {row[2]}" for row in numbers.rows if row[1] == DAMPING)
+def _words(numbers: Table) -> str:
+    found = (f"{row['filters']} {row['false collisions']}" for row in numbers.where(damping=DAMPING).records())
     return f"False collisions in two seconds at {DAMPING:g} N s/m: {', '.join(found)}."
 
 

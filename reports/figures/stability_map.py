@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import BLUE, INK, MUTED, PAPER, VERMILION, LineStyle, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "stability-map", "Walls that come to rest"
 MAPS, DAMPINGS = "stability/maps", "stability/dampings"
@@ -21,24 +22,26 @@ CAPTION = (
 )
 LEGEND = (("both laws", LineStyle(MUTED, "o", (), 0.0)), ("only impulses", LineStyle(BLUE, "o", (), 0.0, filled=False)),
           ("only penalties", LineStyle(VERMILION, "s", (), 0.0)), ("b = KT/2 + B", LineStyle(INK, "", (4, 2), 1.2)))
+LOOP = ("rate", "sensors", "device damping")
 _SETTLES = "+"
 _SIZE = (3.1, 2.5)
 
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """One panel per loop."""
-    table: Numbers = inputs[MAPS]
-    damping = np.array([row[0] for row in inputs[DAMPINGS].rows])
-    loops = dict.fromkeys(row[:3] for row in table.rows)
-    panels = tuple(_panel(number, loop, [row for row in table.rows if row[:3] == loop], damping)
+    table: Table = inputs[MAPS]
+    damping = np.array(inputs[DAMPINGS].column("damping"))
+    loops = dict.fromkeys(table.select(LOOP).rows)
+    panels = tuple(_panel(number, loop, table.where(**dict(zip(LOOP, loop, strict=True))), damping)
                    for number, loop in enumerate(loops))
     return Figure(KEY, "", TITLE, CAPTION, panels, table, LEGEND, (MAPS, DAMPINGS))
 
 
-def _panel(number: int, loop: tuple[Any, ...], rows: Sequence[tuple[Any, ...]], damping: np.ndarray) -> Panel:
+def _panel(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray) -> Panel:
     rate, sensors, b = loop
-    stiffness, bound = np.array([row[3] for row in rows]), np.array([row[4] for row in rows])
-    theirs, ours = (np.array([[mark == _SETTLES for mark in row[column]] for row in rows]) for column in (5, 6))
+    stiffness, bound = np.array(walls.column("stiffness")), np.array(walls.column("passive up to"))
+    theirs, ours = (np.array([[mark == _SETTLES for mark in marks] for marks in walls.column(law)])
+                    for law in ("penalties", "impulses"))  # fmt: skip
     shown = np.where(damping > 0.0, damping, damping[damping > 0.0].min() / 2.0)  # the row without damping
     K, B = np.meshgrid(stiffness, shown, indexing="ij")
     with styled() as new_figure:

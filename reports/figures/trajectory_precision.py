@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import STYLES, LineStyle, line_arguments, series_legend, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "trajectory-precision", "What accuracy of a whole motion costs", "haptic-rate/motions"
-SCENE, METHOD, TIME, OUTCOME = "scene", "method", "time [ms]", "outcome"
+SCENE, METHOD, TIME, OUTCOME = "scene", "method", "time", "outcome"
 ERRORS = {"position": "positions [lengths]", "velocity": "velocities [speeds]", "energy": "energy [kinetic]"}
 CAPTION = (
     "Each mark is one run with one step, lower left is better; lines join the steps of a method. A curve that ends "
@@ -24,8 +25,8 @@ _SMALLEST, _SIZE = 1e-9, (4.1, 3.1)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """A panel per scene and error."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     methods = tuple(dict.fromkeys(row[METHOD] for row in rows))
     panels = tuple(
         Panel(_curves(rows, methods, scene, column, f"{number}-{column}"),

@@ -7,16 +7,19 @@ from dataclasses import replace
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.style import CYCLE, PANEL, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE, INPUT = "tumbling-drift", "A free body tumbles", "mechanics/tumbling"
 MOTION = "turning over"
 PANELS = {
-    "energy drift [relative]": "Kinetic energy", "momentum drift [relative]": "Angular momentum",
-    "attitude error [rad]": "Attitude",
+    "energy drift": "Kinetic energy", "momentum drift": "Angular momentum",
+    "attitude error": "Attitude",
 }  # fmt: skip
+_LABELS = {"energy drift": "energy drift (relative)", "momentum drift": "momentum drift (relative)",
+           "attitude error": "attitude error [rad]"}  # fmt: skip
 CAPTION = (
     "A body turns over and over near its middle axis, with no force on it; its motion is known in closed form. Each "
     "mark is a run of two seconds; the dashed lines have the slope that the integrator declares. Runge-Kutta 4 is "
@@ -34,8 +37,8 @@ SERIES = {
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw one panel per quantity."""
-    numbers: Numbers = inputs[INPUT]
-    rows = [dict(zip(numbers.columns, row, strict=True)) for row in numbers.rows]
+    numbers: Table = inputs[INPUT]
+    rows = numbers.records()
     series = {key: [row for row in rows if (row["integrator"], row["form"]) == key and row["motion"] == MOTION]
               for key in SERIES}  # fmt: skip
     panels = tuple(Panel(_panel(series, column, name), _words(series, column, name), name)
@@ -52,14 +55,14 @@ def _panel(series: Series, column: str, name: str) -> str:
         drawing = new_figure(figsize=PANEL, layout="constrained")
         axes = drawing.add_subplot()
         for key, (_, look) in SERIES.items():
-            steps = [row["step [s]"] for row in series[key]]
+            steps = [row["step"] for row in series[key]]
             values = [row[column] for row in series[key]]
             order = series[key][0]["declared order"]
             size = 5 if look.filled else 9  # so that marks which coincide are both seen
             axes.plot(steps, values, **line_arguments(look) | {"linestyle": "none", "markersize": size})
             axes.plot(steps, [values[0] * (step / steps[0]) ** order for step in steps],
                       **line_arguments(LineStyle(look.color, "", STYLES["bound"].dash, 1.2)))  # fmt: skip
-        axes.set(xscale="log", yscale="log", xlabel="step [s]", ylabel=column.replace("[relative]", "(relative)"))
+        axes.set(xscale="log", yscale="log", xlabel="step [s]", ylabel=_LABELS[column])
         plain_powers(axes)
         return to_svg(drawing, f"{KEY}-{name.split()[-1].lower()}")
 

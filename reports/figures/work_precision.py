@@ -1,6 +1,6 @@
 """Accuracy against time: error and energy gain of each impact method against the time that it takes.
 
-The input is a `Numbers` with the columns named below, one row per method and problem; rows of one problem share its
+The input is a `Table` with the columns named below, one row per method and problem; rows of one problem share its
 name. Times are medians in microseconds; an error or gain of 0 is drawn at the bottom of the picture.
 """
 
@@ -11,15 +11,16 @@ from dataclasses import replace
 from typing import Any
 
 from reports.figures.energy_gains import plain_powers
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.figures.rigid_convergence import look
 from reports.figures.style import line_arguments, styled
 from reports.figures.svg import to_svg
+from verification.finding import Table
 
 KEY, TITLE = "work-precision", "What a microsecond buys"
 INPUT = "work_precision"
-METHOD, PROBLEM, TIME = "method", "problem", "time [µs]"
-FAILED = "failed after [µs]"
+METHOD, PROBLEM, TIME = "method", "problem", "time"
+FAILED = "failed after"
 ERROR, RESIDUAL, GAIN = "relative error", "restitution residual", "relative energy gain"
 CAPTION = (
     "Each mark is one method on one problem; lower left is better. Marks at the very bottom mean none that double "
@@ -33,8 +34,8 @@ _SIZE = (4.1, 3.2)
 
 def draw(inputs: Mapping[str, Any]) -> Figure:
     """Draw error, residual and energy gain against time."""
-    numbers: Numbers = inputs[INPUT]
-    methods = tuple(dict.fromkeys(row[numbers.columns.index(METHOD)] for row in numbers.rows))
+    numbers: Table = inputs[INPUT]
+    methods = tuple(dict.fromkeys(numbers.column(METHOD)))
     shown = tuple(column for column in (ERROR, RESIDUAL, GAIN) if _any_positive(numbers, column))
     panels = tuple(Panel(_marks(numbers, methods, column), f"{column} against time for {', '.join(methods)}.", column)
                    for column in shown)
@@ -43,38 +44,32 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
     return Figure(KEY, "", TITLE, caption, panels, numbers, legend, (INPUT,))
 
 
-def _any_positive(numbers: Numbers, column: str) -> bool:
+def _any_positive(numbers: Table, column: str) -> bool:
     """Tell whether a column is there and has something to draw."""
-    if column not in numbers.columns:
-        return False
-    at = numbers.columns.index(column)
-    return any(row[at] is not None and row[at] > 0.0 for row in numbers.rows)
+    return column in numbers.keys and any(value is not None and value > 0.0 for value in numbers.column(column))
 
 
-def _marks(numbers: Numbers, methods: tuple[str, ...], column: str) -> str:
-    where, at, of = (numbers.columns.index(name) for name in (METHOD, TIME, column))
+def _marks(numbers: Table, methods: tuple[str, ...], column: str) -> str:
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.add_subplot()
         for number, method in enumerate(methods):
-            points = [(float(row[at]), max(float(row[of]), _SMALLEST)) for row in numbers.rows
-                      if row[where] == method and None not in (row[at], row[of])]
+            mine = numbers.where(method=method).select((TIME, column)).rows
+            points = [(float(time), max(float(error), _SMALLEST)) for time, error in mine if None not in (time, error)]
             marks = {**line_arguments(look(number)), "linestyle": "none", "markersize": 6}
             axes.plot(*zip(*points, strict=True), **marks) if points else None
             lost = _failures(numbers, method)
             axes.plot(lost, [0.985] * len(lost), "x", color=look(number).color, markersize=5,
                       transform=axes.get_xaxis_transform())  # fmt: skip
-        axes.set(xscale="log", yscale="log", xlabel=TIME, ylabel=column)
+        axes.set(xscale="log", yscale="log", xlabel="time [µs]", ylabel=column)
         plain_powers(axes)
         return to_svg(drawing, f"{KEY}-{column.split()[-1]}")
 
 
-def _failures(numbers: Numbers, method: str) -> list[float]:
+def _failures(numbers: Table, method: str) -> list[float]:
     """Times at which a method's failures were given up."""
-    if FAILED not in numbers.columns:
-        return []
-    where, at = numbers.columns.index(METHOD), numbers.columns.index(FAILED)
-    return [float(row[at]) for row in numbers.rows if row[where] == method and row[at] is not None]
+    found = numbers.where(method=method).column(FAILED) if FAILED in numbers.keys else []
+    return [float(seconds) for seconds in found if seconds is not None]
 
 
 RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="accuracy")

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.figures import RECIPES
-from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
+from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
@@ -18,7 +18,7 @@ from reports.pages.records import Claim, Evidence, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
 from reports.pages.verdicts import verdicts
-from verification.finding import REFUTED, VERDICTS
+from verification.finding import REFUTED, VERDICTS, Table
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
@@ -73,7 +73,7 @@ def badge_words(verdict: Verdict, topics: Sequence[Topic]) -> str:
     return f"{failing} of {len(findings)} findings fail" if failing else FINDINGS[verdict.outcome]
 
 
-def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Numbers], ...]:
+def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
     """Return the tables of a topic, with their names, that no figure was drawn from."""
     drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
     return tuple((name, table) for name, table in topic.tables.items() if f"{topic.id}/{name}" not in drawn)

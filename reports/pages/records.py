@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from reports.figures.figure import Figure, Numbers
-from verification.finding import NOT_COMPUTED, Failure
+from reports.figures.figure import Figure
+from verification.finding import NOT_COMPUTED, Failure, Table, titled
 from verification.proofs.statement import ProofRecord
 
 
@@ -40,7 +40,7 @@ class Claim:
     conditions: str = ""  # the range over which it was computed
     tolerance: str = ""
     fails: str = ""
-    numbers: Numbers | None = None
+    numbers: Table | None = None
     figure: Figure | None = None
     inputs: tuple[str, ...] = ()  # names of runs and tables
 
@@ -108,13 +108,13 @@ class HardCase:
     why_hard: str
     law: str
     expected: str
-    numbers: Numbers
+    numbers: Table
     skipped: str = ""
 
     @property
     def outcomes(self) -> dict[str, str]:
         """What came of it, by method or world; "stable" where every number is within its bound."""
-        return {str(row[0]): str(row[1]) for row in self.numbers.rows}
+        return {row["method"]: row["outcome"] for row in self.numbers.records()}
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Topic:
     title: str
     lead: str
     findings: tuple[Finding, ...]
-    tables: Mapping[str, Numbers] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
     verdict: str = ""
     failures: tuple[Failure, ...] = ()
 
@@ -155,7 +155,7 @@ def with_failures(topic: Topic, failures: Sequence[Failure]) -> Topic:
     rows = tuple((failure.case, failure.error, failure.reason) for failure in failures)
     return replace(
         topic, findings=(*topic.findings, Finding(sentence, NOT_COMPUTED)),
-        tables={**topic.tables, "not computed": Numbers(("case", "error", "reason"), rows)},
+        tables={**topic.tables, "not computed": titled(("case", "error", "reason"), rows)},
         verdict=f"{topic.verdict} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
         failures=(*topic.failures, *failures),
     )  # fmt: skip
@@ -220,7 +220,7 @@ class Evidence:
     counterexamples: tuple[Counterexample, ...] = ()
     cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
-    bulk: Numbers | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
+    bulk: Table | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
     topics: tuple[Topic, ...] = ()
     failed: tuple[FailedCases, ...] = ()

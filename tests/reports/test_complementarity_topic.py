@@ -13,7 +13,7 @@ from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
 from reports.evidence import complementarity, complementarity_tables
 from reports.figures import RECIPES
-from reports.figures.figure import Figure, Numbers, draw
+from reports.figures.figure import Figure, draw
 from reports.figures.style import VARIABLES
 from reports.runner import Runner
 from verification.complementarity.agreement import compare_cases
@@ -25,7 +25,7 @@ from verification.complementarity.problem_study import study_read
 from verification.complementarity.study import OWN, ComparisonStudy
 from verification.cost.step_cost import LEMKE_KERNEL, CostRow, impact_cost
 from verification.cost.world_cost import WAYS, StepCostRow
-from verification.finding import VERDICTS
+from verification.finding import VERDICTS, Table, titled
 
 NAN = float("nan")
 
@@ -88,7 +88,7 @@ def test_a_profile_ends_at_the_share_that_was_solved(study: ComparisonStudy, fig
 
 
 def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
-    table: Numbers = complementarity_tables.worlds(Runner(tmp_path), {"duration": 0.05})
+    table: Table = complementarity_tables.worlds(Runner(tmp_path), {"duration": 0.05})
     laws = {row[0]: row[1] for row in table.rows}
     assert set(laws) >= {"ideal", "IAPB", "PB", "CBuc"} and all(laws.values())
     assert laws["IAPB"] != laws["PB"] != laws["ideal"]
@@ -98,7 +98,7 @@ def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
 def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypatch: pytest.MonkeyPatch,
                                                tmp_path: Path) -> None:  # fmt: skip
     monkeypatch.setattr("verification.complementarity.study.compare", lambda *arguments, **options: study)
-    monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: Numbers(("world",), ()))
+    monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: titled(("world",), ()))
     topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
     assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(VERDICTS)
     assert topic.verdict and "profile" in topic.tables and str(Path.home()) not in repr(topic)

@@ -18,15 +18,15 @@ from reports.crate import CRATE_NAME, sha256
 from reports.evidence import gather
 from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.records import Claim, Evidence
 from reports.report import build_report, write_report
 from reports.runner import Runner
-from verification.finding import REPRODUCED
+from verification.finding import REPRODUCED, titled
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
-FIGURE = Figure("figA", "", "A", "See.", (PANEL,), Numbers(("x",), ((0.1,),)))
+FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))
 RECIPE = Recipe("figA", "", "A", ("bulk",), lambda inputs: FIGURE)
 
 
@@ -40,7 +40,7 @@ def out(tmp_path_factory) -> Path:
         runner.user = "C07"
         runner(scene, "PB")
         runner(scene.with_values({"name": "own"}), "PB")
-        return (Claim("C07", "s", "p", REPRODUCED, "h", numbers=Numbers(("κ", "gain"), ((1e3, 2e-16),))),)
+        return (Claim("C07", "s", "p", REPRODUCED, "h", numbers=titled(("κ", "gain"), ((1e3, 2e-16),))),)
 
     stage = Stage(folder / "tables", "claims", tuple[Claim, ...], {"depth": "quick"})
     claims = stage.get_or_compute(compute, runner)
@@ -48,7 +48,7 @@ def out(tmp_path_factory) -> Path:
         words = [str(folder / "bin" / "iapb"), "reproduce", "--out", str(folder), f"--check={folder}"]
         patch.setattr(sys, "argv", words)
         patch.setattr(companions, "uncommitted_changes", lambda: "--- a/iapb/x.py\n+++ b/iapb/x.py")
-        evidence = Evidence(inputs={"bulk": Numbers(("n",), ((3,),))}, claims=claims, provenance=gather.provenance(),
+        evidence = Evidence(inputs={"bulk": titled(("n",), ((3,),))}, claims=claims, provenance=gather.provenance(),
                             manifest=manifest(runner.used, [stage], folder))  # fmt: skip
         recipes, figures = remembering((RECIPE,))
         write_report(folder / REPORT_NAME, build_report(evidence, recipes))

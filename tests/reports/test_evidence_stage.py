@@ -14,10 +14,10 @@ from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records
 from reports.evidence.tables import numbers_table, numbers_tables
-from reports.figures.figure import Numbers
 from reports.runner import Runner
 from reports.store import keys
 from reports.store.tables import read_table
+from verification.finding import Table, titled
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Record:
     value: float
     holds: bool
     note: str | None = None
-    numbers: Numbers | None = None
+    numbers: Table | None = None
 
 
-TABLE = Numbers(("scene", "time [s]", "gain", "holds"), (("peg", 0.25, None, True), ("arm", 1.5, 1e-16, False)),
+TABLE = titled(("scene", "time [s]", "gain", "holds"), (("peg", 0.25, None, True), ("arm", 1.5, 1e-16, False)),
                 note="of the peg")  # fmt: skip
 RECORDS = (Record("C01", 1.5, True, "é", TABLE), Record("C02", math.inf, False), Record("C03", math.nan, False))
 
@@ -54,7 +54,7 @@ def test_records_come_back_as_they_were_and_are_computed_once(tmp_path):
 
 
 def test_numpy_values_become_plain_ones(tmp_path):
-    record = Record("C04", np.float64(0.1), np.bool_(True), None, Numbers(("n",), ((np.int64(3),), (np.float32(0.5),))))
+    record = Record("C04", np.float64(0.1), np.bool_(True), None, titled(("n",), ((np.int64(3),), (np.float32(0.5),))))
     stage = Stage(tmp_path, "one", Record, {})
     [computed, read] = [stage.get_or_compute(lambda: record) for _ in range(2)]
     assert same(computed, read) and type(read.value) is float and type(read.holds) is bool
@@ -148,5 +148,5 @@ def test_tables_are_columns_with_units_and_missing_numbers_are_nan(tmp_path):
 
 
 def test_every_table_is_found_and_none_replaces_another():
-    records = (RECORDS[0], {"C01": TABLE, "part b": [TABLE, Numbers(("empty",), ())]}, RECORDS[1])
+    records = (RECORDS[0], {"C01": TABLE, "part b": [TABLE, titled(("empty",), ())]}, RECORDS[1])
     assert [table.name for table in numbers_tables(records)] == ["C01", "C01_2", "part_b"]

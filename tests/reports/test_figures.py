@@ -14,16 +14,17 @@ from iapb.scene import find_scene
 from reports.figures import RECIPES, energy_gains, work_precision
 from reports.figures.condition_map import condition_map
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.figures.figure import Figure, NotComputed, Numbers, Recipe, draw
+from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.numbers import format_cell, format_number
 from reports.figures.style import CYCLE, STYLES, VARIABLES
+from verification.finding import titled
 
-GAINS = Numbers(
+GAINS = titled(
     (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE),
     (("factored", "1e2", 0.0, 0.0), ("factored", "1e4", 1e-16, 0.1), ("printed", "1e2", 1e-3, 1e11),
      ("printed", "all", 1e-3, 1e11)),
 )
-WORK = Numbers(
+WORK = titled(
     (work_precision.METHOD, work_precision.PROBLEM, work_precision.TIME, work_precision.ERROR, work_precision.GAIN),
     (("factored", "peg", 1.0, 1e-16, 0.0), ("printed", "peg", 20.0, 1e-12, 1e-9), ("qp", "peg", 900.0, None, 1e-7)),
 )

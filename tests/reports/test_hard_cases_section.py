@@ -8,10 +8,11 @@ import pytest
 
 from reports.evidence.hard_cases import INPUT, compute, summary
 from reports.evidence.stage import Stage
-from reports.figures.figure import Figure, Numbers, draw
+from reports.figures.figure import Figure, draw
 from reports.figures.hard_cases import MARKS, RECIPE, decade
 from reports.pages.records import HardCase
 from reports.runner import Runner
+from verification.finding import Table
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 
@@ -42,7 +43,7 @@ def test_every_case_is_a_record_with_a_row_for_each_method(cases: tuple[HardCase
 
 def test_a_note_has_a_column_only_where_there_is_one(cases: tuple[HardCase, ...]) -> None:
     assert all(len(row) == len(case.numbers.columns) for case in cases for row in case.numbers.rows)
-    assert "note" not in cases[0].numbers.columns
+    assert "note" not in cases[0].numbers.keys
 
 
 def test_records_are_read_back_as_they_were(cases: tuple[HardCase, ...], tmp_path: Path) -> None:
@@ -71,5 +72,5 @@ def test_the_decade_of_a_value(value: float | None, text: str) -> None:
 
 
 def test_without_cases_nothing_is_drawn() -> None:
-    figure = draw(RECIPE, {INPUT: Numbers(summary(()).columns, ())})
+    figure = draw(RECIPE, {INPUT: Table(summary(()).columns)})
     assert isinstance(figure, Figure) and figure.panels == ()

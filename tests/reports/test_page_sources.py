@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from reports.figures.figure import Figure, Numbers, Panel, Recipe
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
 from reports.pages.records import Claim, Evidence, Finding, HardCase, StoredFile, Topic, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import failures, verdicts
-from verification.finding import LIMITED, REFUTED, REPRODUCED
+from verification.finding import LIMITED, REFUTED, REPRODUCED, titled
 
 RUNS = tuple(
     StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))
@@ -17,7 +17,7 @@ RUNS = tuple(
 )  # fmt: skip
 KEPT = (StoredFile("claims", "tables/claims-1.h5", "k", "c" * 64, "iapb reproduce"),
         StoredFile("hard cases", "tables/hard_cases-1.h5", "k", "c" * 64, "iapb reproduce"))  # fmt: skip
-CLAIMS = (Claim("C10", "s", "p", REPRODUCED, "h"), Claim("C19", "s", "p", REPRODUCED, "h", numbers=Numbers(
+CLAIMS = (Claim("C10", "s", "p", REPRODUCED, "h"), Claim("C19", "s", "p", REPRODUCED, "h", numbers=titled(
     ("a", "t"), ((1, 2.0),), timed=("t",))))  # fmt: skip
 
 
@@ -36,7 +36,7 @@ def test_a_claim_without_runs_and_a_claim_on_times_say_so():
 
 
 def test_a_section_names_the_files_its_numbers_are_kept_in():
-    case = HardCase("bar", "bar", "ours", "impact", "w", "l", "e", Numbers(("method", "outcome"), (("svd", "stable"),)))
+    case = HardCase("bar", "bar", "ours", "impact", "w", "l", "e", titled(("method", "outcome"), (("svd", "stable"),)))
     page = build_page(Evidence(claims=CLAIMS, hard_cases=(case,), manifest=KEPT), ())
     assert "<code>tables/claims-1.h5</code>" in page.split('<section id="claims"')[1].split("</section>")[0]
     assert "<code>tables/hard_cases-1.h5</code>" in page.split('<section id="hard-cases"')[1].split("</section>")[0]
@@ -57,7 +57,7 @@ def test_every_section_of_numbers_names_a_table():
 def test_a_long_table_is_cut_and_says_where_the_rest_is():
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
     for shown, told in ((rows, True), (rows[:-1], False)):
-        page = build_page(Evidence(topics=(Topic("mechanics", "t", "l", (), {"trees": Numbers(("x",), shown)}),)), ())
+        page = build_page(Evidence(topics=(Topic("mechanics", "t", "l", (), {"trees": titled(("x",), shown)}),)), ())
         assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} rows" in page) == told
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 

@@ -16,7 +16,6 @@ import pytest
 from iapb.errors import ArgumentError
 from reports.evidence.verdicts import verdicts as first_page
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.figures.figure import Numbers
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
 from reports.pages.records import (
@@ -34,7 +33,7 @@ from reports.pages.records import (
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
-from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS
+from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, titled
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -71,14 +70,14 @@ class Outline(HTMLParser):
 
 
 def _hard_case(*rows: tuple[Any, ...]) -> HardCase:
-    numbers = Numbers(("method", "outcome", "forward error"), rows)
+    numbers = titled(("method", "outcome", "forward error"), rows)
     return HardCase("bar", "bar", "ours", "impact", "$0.5$ J", "exact", "no gain", numbers)
 
 
 @pytest.fixture(scope="module")
 def full() -> Evidence:
     claim = Claim("C01", "KE never rises <b>", "Thm 1", LIMITED, "half of the printed loss: $\\frac{1}{2}$",
-                  numbers=Numbers(("κ", "gain"), ((1e3, 2e-16),)), fails="as printed")
+                  numbers=titled(("κ", "gain"), ((1e3, 2e-16),)), fails="as printed")
     return Evidence(
         inputs={"arm_energies": arm_energies()},
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "properties"),),
@@ -87,7 +86,7 @@ def full() -> Evidence:
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
         topics=(Topic("mechanics", "Linkages", "Asked <here>.", (Finding("It holds to 1e-14.", REPRODUCED),),
-                      {"trees": Numbers(("joints", "error"), ((3, 1e-14),))}, "All hold."),),
+                      {"trees": titled(("joints", "error"), ((3, 1e-14),))}, "All hold."),),
         effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),

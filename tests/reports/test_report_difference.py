@@ -22,23 +22,23 @@ from reports.difference import (
     compare_values,
 )
 from reports.difference_text import SHOWN, lines, parts, sentences, unlike
-from reports.figures.figure import Numbers
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
+from verification.finding import titled
 
-TABLE = Numbers(("method", "gain", "median [µs]", "stable", "note"),
+TABLE = titled(("method", "gain", "median [µs]", "stable", "note"),
                 (("factored", 1.5, 12.0, True, "rank 3 of 4"), ("svd", math.nan, 40.0, True, ""),
                  ("pinv", math.inf, 41.0, False, "gains 2.50000e-3"), ("qr", None, 7.0, True, "x")),
                 timed=("median [µs]",))  # fmt: skip
-SENTENCES = Numbers(("claim", "outcome", "sentence"), (("C07", "reproduced", "Gains 2.5e-3 at most."),),
+SENTENCES = titled(("claim", "outcome", "sentence"), (("C07", "reproduced", "Gains 2.5e-3 at most."),),
                     prose=("sentence",))  # fmt: skip
-REPORT = ReportNumbers({"claims/C07": TABLE, "claims": Numbers(("claim", "outcome"), (("C07", "reproduced"),))},
+REPORT = ReportNumbers({"claims/C07": TABLE, "claims": titled(("claim", "outcome"), (("C07", "reproduced"),))},
                        {"iapb run peg_corner": "c" * 64}, {"cpu": "one", "commit": "abc"}, "quick")  # fmt: skip
 
 
 def changed(row: int, column: str, value: object) -> ReportNumbers:
     """The report with another value in one cell."""
     rows = [list(cells) for cells in TABLE.rows]
-    rows[row][TABLE.columns.index(column)] = value
+    rows[row][TABLE.titles.index(column)] = value
     return replace(REPORT, tables={**REPORT.tables, "claims/C07": replace(TABLE, rows=tuple(map(tuple, rows)))})
 
 
@@ -82,7 +82,7 @@ def test_another_sentence_is_told_and_not_judged_and_its_verdict_is(tmp_path):
 def test_a_file_that_does_not_say_which_columns_are_sentences_is_read(tmp_path):
     path = write_numbers(tmp_path / NUMBERS_NAME, ReportNumbers({"claims": SENTENCES}, {}, {}, "quick"))
     path.write_text(path.read_text().replace('"prose":["sentence"],', ""))
-    assert read_numbers(path).tables["claims"] == replace(SENTENCES, prose=())
+    assert read_numbers(path).tables["claims"] == titled(SENTENCES.titles, SENTENCES.rows)
 
 
 def test_rows_that_times_decide_are_no_loss_and_others_are():
@@ -96,11 +96,11 @@ def test_rows_that_times_decide_are_no_loss_and_others_are():
 
 def test_a_column_of_times_that_is_no_column_is_refused():
     with pytest.raises(ValueError, match="timed columns"):
-        Numbers(("a",), ((1.0,),), timed=("b",))
+        titled(("a",), ((1.0,),), timed=("b",))
 
 
 def test_the_parts_of_a_report_are_counted_apart():
-    tables = {"claims, from times": TABLE, "claims/C07": TABLE, "proofs": Numbers(("a",), ((1.0,),))}
+    tables = {"claims, from times": TABLE, "claims/C07": TABLE, "proofs": titled(("a",), ((1.0,),))}
     report = replace(REPORT, tables=tables)
     assert list(parts(compare_reports(report, report))) == [
         ("claims", "32", "", "", "", "8", ""), ("proofs", "1", "", "", "", "", "")]  # fmt: skip
@@ -116,14 +116,14 @@ def test_what_is_rounding_itself_need_not_repeat():
 def test_what_was_left_out_for_its_time_in_one_of_them_is_not_judged():
     outcomes = ("solved", "left out"), ("solved", "refused")
     for (old, new), state in zip(outcomes, (TIMING, DIFFERS), strict=True):
-        pair = [replace(REPORT, tables={"t": Numbers(("solver",), ((said,),))}) for said in (old, new)]
+        pair = [replace(REPORT, tables={"t": titled(("solver",), ((said,),))}) for said in (old, new)]
         assert [cell.state for cell in compare_reports(*pair).cells] == [state]
 
 
 def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
     def table(*sizes):
         rows = tuple(("pinv", size, 2.0 * size, True) for size in sizes)
-        return Numbers(("method", "contacts", "time [µs]", "stable"), rows, timed=("time [µs]",), timed_rows=True)
+        return titled(("method", "contacts", "time [µs]", "stable"), rows, timed=("time [µs]",), timed_rows=True)
 
     pair = [replace(REPORT, tables={"t": one}) for one in (table(1, 60, 300), table(1, 300, 600))]
     found = compare_reports(*pair)
@@ -141,8 +141,8 @@ def test_a_row_more_does_not_shift_the_others():
 
 
 def test_columns_of_one_name_are_kept_apart():
-    twice = ReportNumbers({"t": Numbers(("a", "a"), ((1.0, 2.0),))}, {}, {}, "quick")
-    other = ReportNumbers({"t": Numbers(("a", "a"), ((3.0, 2.0),))}, {}, {}, "quick")
+    twice = ReportNumbers({"t": titled(("a", "a"), ((1.0, 2.0),))}, {}, {}, "quick")
+    other = ReportNumbers({"t": titled(("a", "a"), ((3.0, 2.0),))}, {}, {}, "quick")
     assert [cell.state for cell in compare_reports(twice, other).cells] == [DIFFERS, EXACT]
 
 
@@ -155,7 +155,7 @@ def test_sentences_count_everything():
     assert "Only in the old report: claims." in text and "Only in the new report: extra." in text
     assert "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only." in text
     assert list(lines(found)) == ["claims/C07, row 1: factored, gain: 1.5 -> 2.0 (2.5e-01 of it)"]
-    many = Numbers(("x",), tuple((float(i),) for i in range(1, 100)))
+    many = titled(("x",), tuple((float(i),) for i in range(1, 100)))
     twice = replace(many, rows=tuple((2 * x,) for (x,) in many.rows))
     pair = [ReportNumbers({"t": one}, {}, {}, "quick") for one in (many, twice)]
     assert len(list(lines(compare_reports(*pair)))) == SHOWN
@@ -201,7 +201,7 @@ def test_a_page_alone_is_not_enough(tmp_path):
 
 def test_numbers_keep_their_last_bit_and_the_file_is_strict_json(tmp_path):
     value = 0.1 + 0.2
-    report = replace(REPORT, tables={"t": Numbers(("x",), ((value,), (-math.inf,)))})
+    report = replace(REPORT, tables={"t": titled(("x",), ((value,), (-math.inf,)))})
     path = write_numbers(tmp_path / NUMBERS_NAME, report)
     json.loads(path.read_text(), parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
     assert read_numbers(path).tables["t"].rows == ((value,), (-math.inf,))

@@ -19,10 +19,9 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.figures.figure import Numbers
 from reports.pages.records import Claim, CrossCheck, Evidence, Finding, Topic, Verdict
 from reports.report import build_report
-from verification.finding import LIMITED, REPRODUCED
+from verification.finding import LIMITED, REPRODUCED, titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
@@ -100,7 +99,7 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
     names = sorted({name for recipe in recipes for name in recipe.needs if "/" in name})
     runs = {name: _run(make_run, SPATIAL.get(name, "peg_corner"), k) for k, name in enumerate(names)}
-    table = Numbers(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
+    table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
         inputs={**runs, "arm_energies": arm_energies()},
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),

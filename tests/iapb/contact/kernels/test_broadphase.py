@@ -90,7 +90,7 @@ def test_near_pairs_of_turned_bodies_in_either_order_and_exact_capacity(
 
 
 def test_spheres_that_just_touch_are_near() -> None:
-    """Numbers that are exact: radii 0.25 and 0.5, centres 0.75 + 0.25 apart in each direction of space."""
+    """Table that are exact: radii 0.25 and 0.5, centres 0.75 + 0.25 apart in each direction of space."""
     shapes = make_spatial_shapes([Sphere(0.25, body=0), Sphere(0.5, body=1)])
     broad: Any = block(make_broad_phase(shapes, np.array([[1, 0]], np.int32)))
     R, p = np.array([np.eye(3)] * 2), np.zeros((2, 3))
