@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.mechanics.mechanism import Mechanism
 from reference.contact_finding import Contacts, find_contacts
 from reference.rigid_body import PinocchioMechanism, model_of
 
@@ -22,14 +23,15 @@ Floats = NDArray[np.float64]
 ROW_NOISE = 1e-13
 Z = np.array([0.0, 0.0, 1.0])
 
-_mechanics: WeakKeyDictionary[Any, PinocchioMechanism] = WeakKeyDictionary()
+_mechanics: WeakKeyDictionary[Mechanism, PinocchioMechanism] = WeakKeyDictionary()
 
 
 def mechanics_of(system: Any) -> PinocchioMechanism:
     """Pinocchio's model of the system's mechanism, built once."""
-    if system not in _mechanics:
-        _mechanics[system] = model_of(system.mechanism)
-    return _mechanics[system]
+    mechanism = system.mechanism
+    if mechanism not in _mechanics:
+        _mechanics[mechanism] = model_of(mechanism)
+    return _mechanics[mechanism]
 
 
 @dataclass(frozen=True)
