@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from reports.codecheck import CODECHECK_NAME, write_codecheck
 from reports.crate import write_crate
-from reports.figures.figure import Figure, Recipe
+from reports.figures.figure import Figure, NotComputed, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.records import Evidence
 from reports.provenance import uncommitted_changes
+from verification.finding import Failure, attempt
 
 REPORT_NAME, MANIFEST_NAME, DIRTY_NAME = "report.html", "manifest.json", "dirty.diff"
 _TEXTS = {
@@ -25,13 +27,23 @@ _TEXTS = {
 }
 
 
-def remembering(recipes: tuple[Recipe, ...]) -> tuple[tuple[Recipe, ...], dict[str, Figure]]:
-    """Return the recipes, and a mapping that receives each figure, by its key, once it is drawn."""
+def remembering(
+    recipes: tuple[Recipe, ...], failures: list[Failure] | None = None
+) -> tuple[tuple[Recipe, ...], dict[str, Figure]]:
+    """Return the recipes, and a mapping that receives each figure, by its key, once it is drawn.
+
+    A figure that raises is appended to `failures`, and the page says that it was not computed.
+    """
     drawn: dict[str, Figure] = {}
+    failed: list[Failure] = [] if failures is None else failures
 
     def kept(recipe: Recipe) -> Recipe:
-        def draw(inputs: Mapping[str, Any]) -> Figure:
-            drawn[recipe.key] = figure = recipe.draw(inputs)
+        def draw(inputs: Mapping[str, Any]) -> Figure | NotComputed:
+            figure = attempt(recipe.key, partial(recipe.draw, inputs), failed)
+            if figure is None:
+                return NotComputed(recipe.key, recipe.number, recipe.title)
+            if isinstance(figure, Figure):
+                drawn[recipe.key] = figure
             return figure
 
         return replace(recipe, draw=draw)

@@ -22,6 +22,7 @@ from verification.complementarity.problem_study import FACTORS, ProblemStudy, st
 from verification.complementarity.study import ComparisonStudy
 from verification.complementarity.study import compare as study_all
 from verification.cost.step_cost import CostRow
+from verification.finding import Failure
 
 
 def compare(
@@ -48,16 +49,21 @@ def compare(
         return
     with stage_progress() as progress:
         if only_problems:
-            studies = [study_problems(folder, progress=progress) for folder in problems or ()]
+            failures: list[Failure] = []
+            studies = [study_problems(folder, progress=progress, failures=failures) for folder in problems or ()]
             found = [part for study in studies for part in problem_parts(study)]
             tables = [table for study in studies for table in _problem_tables(study)]
         else:
             study = study_all("full" if full else "quick", problems or (), progress=progress)
-            found, tables = list(parts_of(study)), _tables(study)
+            found, tables, failures = list(parts_of(study)), _tables(study), list(study.failures)
     for table in tables:
         console.print(table)
     for part in found:
         console.print(f"• {part.sentence}", highlight=False)
+    if failures:
+        for one in failures:
+            print(f"Not computed: {one.case}: {one.error}: {one.reason}")
+        raise typer.Exit(1)
 
 
 def _require_problems(folder: Path) -> None:

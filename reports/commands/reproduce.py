@@ -18,7 +18,7 @@ from reports.commands.report import print_difference
 from reports.companions import REPORT_NAME, remembering, write_companions
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports
 from reports.difference_text import unlike
-from reports.evidence.gather import gather
+from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
@@ -28,6 +28,7 @@ from reports.pages.builder import figure_inputs
 from reports.pages.records import FailedCases
 from reports.report import build_report, write_report
 from reports.runner import Runner
+from verification.finding import Failure
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
 
@@ -57,8 +58,10 @@ def make_report(out: Path, depth: str) -> None:
     took: dict[str, float] = {}
     with stage_progress() as progress:
         evidence = gather(out, depth, _timed(progress, took))
-    recipes, figures = remembering(RECIPES)
+    undrawn: list[Failure] = []
+    recipes, figures = remembering(RECIPES, undrawn)
     path = write_report(out / REPORT_NAME, build_report(evidence, recipes))
+    failed = evidence.failed + failed_cases(out / "tables", "figures", undrawn)
     beside = write_companions(out, evidence, figures, depth)
     for verdict in evidence.verdicts:
         print(f"{verdict.topic}: {verdict.sentence}")
@@ -67,13 +70,13 @@ def make_report(out: Path, depth: str) -> None:
     print(f"Beside it: {', '.join(file.name for file in beside)}.")
     took["figures and page"] = time.perf_counter() - started - sum(took.values())
     print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
-    if evidence.failed:
-        _say_what_failed(evidence.failed)
-        raise typer.Exit(1)
+    _end_where_something_failed(failed)
 
 
-def _say_what_failed(failed: Sequence[FailedCases]) -> None:
-    """The last lines: what was not computed, why, and where the tracebacks are."""
+def _end_where_something_failed(failed: Sequence[FailedCases]) -> None:
+    """The last lines: what was not computed, why, and where the tracebacks are; then the command ends with 1."""
+    if not failed:
+        return
     count = sum(len(one.failures) for one in failed)
     print(f"\nNot computed: {count} {'case' if count == 1 else 'cases'}. The next call tries again.")
     for one in failed:
@@ -82,6 +85,7 @@ def _say_what_failed(failed: Sequence[FailedCases]) -> None:
         if len(one.failures) > SHOWN_FAILURES:
             print(f"  {one.stage}: and {len(one.failures) - SHOWN_FAILURES} more")
         print(f"    tracebacks: {one.file}")
+    raise typer.Exit(1)
 
 
 def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) -> Callable[[str, int, int], None]:
@@ -127,7 +131,8 @@ def _write_figure(key: str, out: Path, depth: str) -> None:
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         raise ArgumentError("--figure", key, one_of(key, recipes))
-    drawn = draw(recipes[key], _inputs(recipes[key].needs, out, depth))
+    inputs, failed = _inputs(recipes[key].needs, out, depth)
+    drawn = draw(recipes[key], inputs)
     if not isinstance(drawn, Figure):
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
     out.mkdir(parents=True, exist_ok=True)
@@ -135,13 +140,15 @@ def _write_figure(key: str, out: Path, depth: str) -> None:
     for name, (svg, label) in {**pictures, f"{key}.svg": (standalone(drawn), "all of it")}.items():
         (out / name).write_text(svg, encoding="utf-8")
         print(f"{out / name}: {label or drawn.title}")
+    _end_where_something_failed(failed)
 
 
-def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
-    """What a figure asks for: a few runs and scenes, or else all evidence."""
+def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
+    """What a figure asks for: a few runs and scenes, or else all evidence, and what of that failed."""
     if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
         with stage_progress() as progress:
-            return figure_inputs(gather(out, depth, progress))
+            evidence = gather(out, depth, progress)
+        return figure_inputs(evidence), evidence.failed
     runner = Runner(out / "runs")
     found: dict[str, Any] = {}
     with stage_progress() as progress:
@@ -153,4 +160,4 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> Mapping[str, Any]:
             else:
                 found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
         progress("runs of the figure", len(needs), len(needs))
-    return found
+    return found, ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -137,12 +137,16 @@ class _Kept:
 
     def failed(self) -> tuple[FailedCases, ...]:
         """What failed in each stage; the tracebacks go to a file beside the tables, in place of older ones."""
-        found = []
-        for name, failures in self.failures.items():
-            path = self.folder / f"{name.replace(' ', '_')}-failed.txt"
-            path.unlink(missing_ok=True)
-            if failures:
-                self.folder.mkdir(parents=True, exist_ok=True)
-                path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in failures), encoding="utf-8")
-                found.append(FailedCases(name, tuple(failures), str(path)))
-        return tuple(found)
+        return tuple(case for name, failures in self.failures.items()
+                     for case in failed_cases(self.folder, name, failures))  # fmt: skip
+
+
+def failed_cases(folder: Path, name: str, failures: Sequence[Failure]) -> tuple[FailedCases, ...]:
+    """Write the tracebacks of what failed under a name to a file in `folder`, in place of an older one; () for none."""
+    path = folder / f"{name.replace(' ', '_')}-failed.txt"
+    path.unlink(missing_ok=True)
+    if not failures:
+        return ()
+    folder.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in failures), encoding="utf-8")
+    return (FailedCases(name, tuple(failures), str(path)),)

@@ -123,7 +123,7 @@ def motions(study: Any) -> Table:
                     "signed energy", "outcome", "note"), rows, 3,
                    "Position in lengths of the body (sup norm), velocity in largest speeds (L¹, at samples a "
                    "millisecond apart), energy at the end in largest kinetic energies.",
-                   timed=("time [ms]", "note"))  # fmt: skip
+                   timed=("time [ms]", "outcome", "note"))  # fmt: skip
 
 
 def _known(value: float) -> float | None:

@@ -50,7 +50,7 @@ class Recipe:
     number: str
     title: str
     needs: tuple[str, ...]
-    draw: Callable[[Mapping[str, Any]], Figure]
+    draw: Callable[[Mapping[str, Any]], Figure | NotComputed]
     section: str = "figures"
 
     def missing(self, inputs: Mapping[str, Any]) -> tuple[str, ...]:

@@ -21,13 +21,15 @@ CAPTION = (
     "A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, with the "
     "decade of its error against the truth (−16: the last digit); without a number its error is zero, or energy is the "
     "only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are wrong, with "
-    "the decade of the error. A ring refused the input, a diamond was cut at its limit of time."
+    "the decade of the error; a grey square leaves restitution so near its tolerance that another BLAS would decide "
+    "otherwise. A ring refused the input, a diamond was cut at its limit of time."
 )
 STABLE = "stable"
 MARKS: dict[str, LineStyle] = {
     STABLE: LineStyle(BLUE, "o", (), 0.0),
     "gains energy": LineStyle(VERMILION, "X", (), 0.0),
     "restitution unmet": LineStyle(PURPLE, "s", (), 0.0, filled=False),
+    "hangs on rounding": LineStyle(MUTED, "s", (), 0.0, filled=False),
     "wrong motion": LineStyle(AMBER, "^", (), 0.0, filled=False),
     "refused": LineStyle(MUTED, "o", (), 0.0, filled=False),
     "timed out": LineStyle(INK, "D", (), 0.0, filled=False),

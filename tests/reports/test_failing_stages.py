@@ -30,6 +30,7 @@ from reports.evidence import (
     runs,
     survival,
 )
+from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
 from verification.claims import c07_plastic
@@ -275,6 +276,29 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(
     assert lines[-2:] == ["  claims: and 2 more", f"    tracebacks: {path}"]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Not computed: 22 of claims" in page and "C22: ValueError: planted" in page
+
+
+def test_a_figure_that_raises_costs_that_figure_only(
+    monkeypatch: Patch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(_inputs: object) -> Figure:
+        raise ValueError("planted")
+
+    def whole(_inputs: object) -> Figure:
+        return Figure("whole", "", "A figure", "caption", (Panel("<svg />", "alt"),))
+
+    recipes = tuple(Recipe(key, "", key, (), draw) for key, draw in (("broken", broken), ("whole", whole)))
+    monkeypatch.setattr(reproduce, "RECIPES", recipes)
+    monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence())
+    with pytest.raises(typer.Exit) as ended:
+        reproduce.make_report(tmp_path, "quick")
+    assert ended.value.exit_code == 1
+    path = tmp_path / "tables" / "figures-failed.txt"
+    last = capsys.readouterr().out.splitlines()[-2:]
+    assert last == ["  figures: broken: ValueError: planted", f"    tracebacks: {path}"]
+    assert "in broken" in path.read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Not computed in this run" in page and 'id="whole"' in page
 
 
 def test_a_column_without_rows_has_no_outcome() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 RESTITUTION_TOLERANCE = 1e-8  # as the kit asks of anybody's resolver
+HANGS_ON_ROUNDING = "hangs on rounding"
 _NONE = float("nan")
 
 
@@ -15,7 +16,8 @@ class HardCaseVerdict:
     Attributes
     ----------
     verdict : "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of memory",
-        or "failed".
+        "failed", or HANGS_ON_ROUNDING: a method that goes through LAPACK leaves a residual within a factor of ten of
+        the tolerance, so that another BLAS would change the verdict.
     note : the error's words where there is no answer.
     energy_gain : impacts (KE⁺ − KE⁻)/KE⁻ exactly, trajectories the largest gain at any instant, as a share of what
         the motion started with or was fed.  energy_bound : what rounding (10 d ε √κ(M)) or the step excuses.

@@ -16,11 +16,13 @@ from verification.hard_cases import (
     TrajectoryCase,
     judge_hard_case,
     judge_hard_cases,
+    judge_impact,
 )
 from verification.hard_cases.bounded import OutOfMemory, TimedOut, bounded_impact
 from verification.hard_cases.case import AnyCase
 from verification.hard_cases.judge import methods_for
 from verification.hard_cases.judge_impact import NEWTON_COULOMB, WITHOUT_CLAMP
+from verification.hard_cases.verdict import HANGS_ON_ROUNDING
 
 
 @pytest.fixture(scope="module")
@@ -169,3 +171,13 @@ def test_chosen_methods_and_cases_only() -> None:
         ("svd", "Grazing impact"),
         ("PB", "Contact chatter: infinitely many bounces in 0.43 s"),
     ]
+
+
+@pytest.mark.parametrize(("residual", "hangs"), [(9e-10, False), (1.1e-9, True), (9e-8, True), (1.1e-7, False)])
+def test_noise_of_lapack_about_the_tolerance_decides_nothing(
+    monkeypatch: pytest.MonkeyPatch, residual: float, hangs: bool
+) -> None:
+    monkeypatch.setattr(judge_impact, "_unmet", lambda *_: residual)
+    case = HARD_CASES["kahan_rows"]()
+    assert (judge_impact.judge_impact(case, "gram_pinv").verdict == HANGS_ON_ROUNDING) is hangs
+    assert judge_impact.judge_impact(case, "factored").verdict != HANGS_ON_ROUNDING
