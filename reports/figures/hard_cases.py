@@ -21,8 +21,8 @@ CAPTION = (
     "A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, with the "
     "decade of its error against the truth (−16: the last digit); without a number its error is zero, or energy is the "
     "only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are wrong, with "
-    "the decade of the error; a grey square leaves restitution so near its tolerance that another BLAS would decide "
-    "otherwise. A ring refused the input, a diamond was cut at its limit of time."
+    "the decade of the error; what a grey square gets wrong is noise, and another BLAS would make other noise. A ring "
+    "refused the input, a diamond was cut at its limit of time."
 )
 STABLE = "stable"
 MARKS: dict[str, LineStyle] = {

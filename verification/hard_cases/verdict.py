@@ -17,7 +17,7 @@ class HardCaseVerdict:
     ----------
     verdict : "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of memory",
         "failed", or HANGS_ON_ROUNDING: a method that goes through LAPACK leaves a residual within a factor of ten of
-        the tolerance, so that another BLAS would change the verdict.
+        the tolerance, or moves wrong by more than half of |v⁻|: another BLAS would change what is wrong first.
     note : the error's words where there is no answer.
     energy_gain : impacts (KE⁺ − KE⁻)/KE⁻ exactly, trajectories the largest gain at any instant, as a share of what
         the motion started with or was fed.  energy_bound : what rounding (10 d ε √κ(M)) or the step excuses.

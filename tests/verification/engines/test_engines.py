@@ -60,12 +60,23 @@ def test_an_engine_that_is_absent_is_named_and_not_left_out(monkeypatch):
     assert "pip install absent" in sentence(records)
 
 
-def test_an_engine_that_stops_is_a_result(monkeypatch):
-    rigid = find_simulator("rigid")
-    monkeypatch.setattr(type(rigid), "run", lambda *_: (_ for _ in ()).throw(RuntimeError("it broke")))
-    records = compare_engines(["rigid"], ["bernoulli"])
-    assert verdict(records[0]) == "failed"
+def breaks(*_):
+    raise RuntimeError("it broke")
+
+
+def test_another_engine_that_stops_is_a_result(monkeypatch):
+    monkeypatch.setattr(type(find_simulator("pinocchio")), "run", breaks)
+    failures = []
+    records = compare_engines(["pinocchio"], ["bernoulli"], failures=failures)
+    assert verdict(records[0]) == "failed" and not failures
     assert "it broke" in sentence([records[0]])
+
+
+def test_our_own_engine_that_stops_is_a_failure(monkeypatch):
+    monkeypatch.setattr(type(find_simulator("rigid")), "run", breaks)
+    failures = []
+    assert compare_engines(["rigid"], ["bernoulli"], failures=failures) == []
+    assert [(one.case, one.reason) for one in failures] == [("rigid on bernoulli", "it broke")]
 
 
 def test_depth_is_checked():

@@ -76,7 +76,7 @@ def test_no_two_cases_have_one_name(case_of: Callable[[str], AnyCase]) -> None:
     ("name", "method", "verdict"),
     [
         ("mass_ratio", "gram_pinv", "gains energy"),
-        ("printed_formula_gains", "gram_pinv", "restitution unmet"),
+        ("printed_formula_gains", "gram_pinv", HANGS_ON_ROUNDING),
         ("nearly_parallel_normals", "damped", "restitution unmet"),
         ("tiny_lever_arm", "gram_pinv", "wrong motion"),
         ("hilbert_rows", "gram_cholesky", "refused"),
