@@ -20,12 +20,15 @@ Case = TypeVar("Case")
 Result = TypeVar("Result")
 Row = Mapping[str, Any]
 
-REPRODUCED, LIMITED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
-    "reproduced", "reproduced within stated limits", "refuted", "not testable here", "not computed in this run",
+# WHERE: every trial inside a region that `Part.region` names holds. MIXED: some hold, and no region is confirmed.
+REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
+    "reproduced", "reproduced where", "mixed", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
-# What fails in more trials than it holds in is not "true with exceptions".
+LIMITED = MIXED
+# What fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
-_WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
+# What is unknown of one part keeps the whole from being reproduced.
+WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
@@ -239,14 +242,14 @@ def check_depth(depth: str) -> None:
 
 def worst(verdicts: Iterable[str]) -> str:
     """Return the worst of some verdicts; NOT_COMPUTED for none."""
-    return min(verdicts, key=_WORST_FIRST.index, default=NOT_COMPUTED)
+    return min(verdicts, key=WORST_FIRST.index, default=NOT_COMPUTED)
 
 
 def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     """Return the verdict on something that was tried many times, from the outcomes of its trials.
 
-    All that can tell hold: reproduced. At least LEAST_SHARE of them: reproduced within stated limits. Fewer:
-    refuted. None can tell: not testable here.
+    All that can tell hold: reproduced. At least LEAST_SHARE of them: mixed. Fewer: refuted. None can tell: not
+    testable here. "Reproduced where" takes a region: see `search_region`.
     """
     decided = [outcome for outcome in holds if outcome is not None]
     if not decided:
@@ -254,7 +257,7 @@ def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     share = sum(decided) / len(decided)
     if share == 1.0:
         return REPRODUCED
-    return LIMITED if share >= LEAST_SHARE else REFUTED
+    return MIXED if share >= LEAST_SHARE else REFUTED
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from reports.pages.records import Evidence, Verdict
-from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, VERDICTS, Failure
-
-_WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, VERDICTS, WORST_FIRST, Failure
 
 _ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
 
@@ -42,7 +40,7 @@ def _claims(evidence: Evidence) -> Iterator[Verdict]:
     count = Counter(claim.outcome for claim in evidence.claims)
     words = ", ".join(f"{count[outcome]} {outcome}" for outcome in VERDICTS if count[outcome])
     refuted = [claim.id for claim in evidence.claims if claim.outcome == REFUTED]
-    outcome = REPRODUCED if set(count) == {REPRODUCED} else LIMITED
+    outcome = REPRODUCED if set(count) == {REPRODUCED} else MIXED
     tail = f" Refuted: {', '.join(refuted)}." if refuted else ""
     yield Verdict("The paper's claims", outcome, f"Of {len(evidence.claims)} claims computed: {words}.{tail}", "claims",
                   any(claim.timed for claim in evidence.claims))
@@ -105,13 +103,13 @@ def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
     sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases with certain answers."
                 + (f" Not on: {'; '.join(failing)}." if failing else "")
                 + (f" {skipped} were skipped: their files are absent." if skipped else ""))  # fmt: skip
-    yield Verdict("Hard cases", LIMITED if failing else REPRODUCED, sentence, "hard-cases")
+    yield Verdict("Hard cases", MIXED if failing else REPRODUCED, sentence, "hard-cases")
 
 
 def _topics(evidence: Evidence) -> Iterator[Verdict]:
     for topic in evidence.topics:
         if topic.verdict:
-            outcome = min((finding.outcome for finding in topic.findings), key=_WORST_FIRST.index)
+            outcome = min((finding.outcome for finding in topic.findings), key=WORST_FIRST.index)
             if topic.failures and outcome == REPRODUCED:
                 outcome = NOT_COMPUTED  # what failed never counts as holding
             timed = any(finding.timed for finding in topic.findings)

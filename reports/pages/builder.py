@@ -23,10 +23,12 @@ from verification.finding import REFUTED, VERDICTS, Table
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
 # The mark that goes with each outcome: shape as well as colour.
-OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "≈", "✕", "○", "…"), strict=True))
-OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "limited", "bad", "open", "absent"), strict=True))
+OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "◐", "≈", "✕", "○", "…"), strict=True))
+OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "where", "limited", "bad", "open", "absent"), strict=True))
 # The same outcomes in the words of a check that is not a claim of the paper.
-FINDINGS = dict(zip(VERDICTS, ("holds", "holds within limits", "fails", "cannot tell", "not computed"), strict=True))
+FINDINGS = dict(
+    zip(VERDICTS, ("holds", "holds where stated", "mixed", "fails", "cannot tell", "not computed"), strict=True)
+)
 
 
 def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from reports.pages.records import Claim, Verdict
-from verification.finding import LIMITED, NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.finding import REPRODUCED, WORST_FIRST
 
 SUBJECTS = (
     ("Energy", ("C01", "C02", "C04", "C08")),
@@ -20,7 +20,6 @@ SUBJECTS = (
     ("Stable contact", ("C20", "C21")),
     ("Cost", ("C19", "C22")),
 )
-_WORST_FIRST = (REFUTED, LIMITED, REPRODUCED, NOT_TESTABLE, NOT_COMPUTED)
 # "part: in 24 of 36 trials, with ..." of a claim's `fails`, which parts its parts by "; ".
 _FAILURE = re.compile(r"^(?:(?P<part>.*): )?in (?P<count>all \d+|\d+ of \d+) trials")
 _SHOWN = 2  # parts that fail, in a line of the first page
@@ -35,7 +34,7 @@ def verdicts(claims: Sequence[Claim]) -> tuple[Verdict, ...]:
 
 
 def _verdict(subject: str, members: Sequence[Claim]) -> Verdict:
-    worst = min(members, key=lambda claim: _WORST_FIRST.index(claim.outcome))
+    worst = min(members, key=lambda claim: WORST_FIRST.index(claim.outcome))
     held = sum(claim.outcome == REPRODUCED for claim in members)
     count = f"{held} of {len(members)} claims reproduced. " if 0 < held < len(members) else ""
     sentence = f"{count}{worst.id}: {_told(worst)}"

@@ -84,4 +84,4 @@ def test_the_first_page_says_where_and_not_twice():
 def test_a_topic_with_failing_findings_counts_them():
     topic = Topic("mechanics", "t", "l", (Finding("a", REPRODUCED), Finding("b", REFUTED)), {}, "v")
     assert badge_words(Verdict("t", REFUTED, "v", "mechanics"), (topic,)) == "1 of 2 findings fail"
-    assert badge_words(Verdict("t", LIMITED, "v", "proofs"), (topic,)) == "holds within limits"
+    assert badge_words(Verdict("t", LIMITED, "v", "proofs"), (topic,)) == "mixed"

@@ -4,7 +4,7 @@ import pytest
 
 from verification.claims.claim import Claim, Part, overall
 from verification.finding import (
-    LIMITED,
+    MIXED,
     NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
@@ -18,8 +18,8 @@ from verification.finding import (
     ("holds", "verdict"),
     [
         ([True, True, None], REPRODUCED),
-        ([True, True, False], LIMITED),
-        ([True, False], LIMITED),
+        ([True, True, False], MIXED),
+        ([True, False], MIXED),
         ([True, False, False], REFUTED),
         ([False], REFUTED),
         ([None, None], NOT_TESTABLE),
@@ -34,8 +34,8 @@ def test_verdict_follows_from_the_trials(holds, verdict):
     ("verdicts", "verdict"),
     [
         ([REPRODUCED, REPRODUCED, NOT_TESTABLE], REPRODUCED),
-        ([REPRODUCED, REFUTED], LIMITED),
-        ([LIMITED, REPRODUCED], LIMITED),
+        ([REPRODUCED, REFUTED], MIXED),
+        ([MIXED, REPRODUCED], MIXED),
         ([REFUTED, REFUTED], REFUTED),
         ([NOT_TESTABLE], NOT_TESTABLE),
     ],
@@ -58,11 +58,11 @@ def concluded(*trials):
 
 def test_failures_are_told_apart_by_part_with_their_conditions():
     result = concluded(("x", 0.0, 0.5), ("x", 0.3, 2.0), ("y", 0.0, 0.5), ("y", 0.3, 0.5))
-    assert result.verdict == LIMITED
+    assert result.verdict == MIXED
     assert result.fails == "x: in 1 of 2 trials, with tilt 0.3 rad"
     assert result.conditions == "tilt 0, 0.3 rad"
     assert (result.held, result.decided) == (3, 4)
-    assert result.parts == (Part("x", LIMITED, 1, 2), Part("y", REPRODUCED, 2, 2))
+    assert result.parts == (Part("x", MIXED, 1, 2), Part("y", REPRODUCED, 2, 2))
 
 
 def test_a_part_that_never_holds_says_so():
