@@ -12,6 +12,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from iapb.errors import MissingDependencyError
+from reference.simulators import find_simulator
+
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
 # What a report compares with, or rests its proofs on.
@@ -93,9 +96,6 @@ def package_version(package: str) -> str:
 
 def _siconos_version() -> str:
     """Siconos is a package of the system's Python, not of this one; the adapter that runs it knows."""
-    from iapb.errors import MissingDependencyError
-    from reference.simulators import find_simulator
-
     try:
         return find_simulator("siconos").version()
     except MissingDependencyError:

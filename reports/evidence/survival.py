@@ -10,6 +10,7 @@ from typing import Any
 from reports.evidence.depends import LAST_RESULT
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.pages.records import NOT_COMPUTED, Finding, Topic, with_failures
+from reports.resimulate import repeat_run
 from reports.runner import Runner
 from verification.finding import REFUTED, REPRODUCED, Failure, Table, of_each, titled
 
@@ -36,8 +37,6 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 
 def _repeated(runner: Runner, name: str) -> Any:
-    from reports.resimulate import repeat_run
-
     scene, values, world, rendering = FIGURE_RUNS[name]
     source = shipped_scene(scene, values)
     runner(source, world, rendering)

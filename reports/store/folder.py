@@ -14,7 +14,6 @@ fixed share of the time at most is the checkpoint's own business (see `Checkpoin
 from __future__ import annotations
 
 import json
-import os
 import re
 import time
 from collections.abc import Callable, Mapping
@@ -25,7 +24,7 @@ from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import remove_abandoned, written_aside
+from reports.store.io import append_line, read_lines, remove_abandoned, written_aside
 from reports.store.keys import run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
@@ -182,7 +181,7 @@ class RunStore:
     def _keep(self, place: Place, run: Run) -> RunEntry:
         entry = store_run(place.path, run, key=place.key)
         place.partial.unlink(missing_ok=True)
-        _add_to_index(self.folder, entry)
+        append_line(self.folder / INDEX_NAME, asdict(entry))
         return entry
 
     def entries(self) -> tuple[RunEntry, ...]:
@@ -199,19 +198,12 @@ def file_name(label: str, key: str) -> str:
     return (re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run") + f"-{key[:_KEY_DIGITS]}.h5"
 
 
-def _add_to_index(folder: Path, entry: RunEntry) -> None:
-    """Append the entry of a new file; one short write, so that several processes may do it at once."""
-    line = json.dumps(asdict(entry), ensure_ascii=False) + "\n"
-    handle = os.open(folder / INDEX_NAME, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-    try:
-        os.write(handle, line.encode())
-    finally:
-        os.close(handle)
-
-
 def read_index(folder: Path) -> tuple[RunEntry, ...]:
     """Return the entries of all run files in `folder`, by file name; the files decide, not the index."""
-    listed = _lines(folder / INDEX_NAME)
+    listed = {}
+    for record in read_lines(folder / INDEX_NAME):
+        with suppress(TypeError):  # no entry
+            listed[record["file"]] = RunEntry(**record)
     files = sorted(folder.glob("*.h5"))
     entries = []
     for path in files:
@@ -223,16 +215,6 @@ def read_index(folder: Path) -> tuple[RunEntry, ...]:
     if {entry.file for entry in entries} != set(listed):
         _write_index(folder, entries)
     return tuple(entries)
-
-
-def _lines(index: Path) -> dict[str, RunEntry]:
-    entries: dict[str, RunEntry] = {}
-    if index.is_file():
-        for line in index.read_text(encoding="utf-8").splitlines():
-            with suppress(ValueError, TypeError):  # a line cut off by a crash
-                entry = RunEntry(**json.loads(line))
-                entries[entry.file] = entry
-    return entries
 
 
 def _write_index(folder: Path, entries: list[RunEntry]) -> None:

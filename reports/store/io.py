@@ -9,9 +9,10 @@ everything built on it ignore what stands behind the end that the file states.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -83,11 +84,27 @@ def remove_abandoned(folder: Path) -> None:
                 path.unlink()
 
 
-def seal(path: Path) -> None:
-    """Append the checksum of a file to it."""
-    mark = _MARK + _checksum(path, path.stat().st_size).encode() + b"\n"
-    with path.open("ab") as file:
-        file.write(mark)
+def sealed(content: bytes) -> bytes:
+    """Return a file's content with its checksum behind it."""
+    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+
+
+def append_line(path: Path, record: Mapping[str, Any]) -> None:
+    """Append a record as a line of JSON, in one write: two processes at once do not mix their lines."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        size = os.fstat(handle).st_size
+        cut_off = size and os.pread(handle, 1, size - 1) != b"\n"  # by a crash
+        os.write(handle, b"\n" * bool(cut_off) + json.dumps(record, ensure_ascii=False).encode() + b"\n")
+    finally:
+        os.close(handle)
+
+
+def read_lines(path: Path) -> Iterator[Any]:
+    """Yield the records of a file of lines; none where there is no file, and a line that is cut off does not count."""
+    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
+        with suppress(ValueError):
+            yield json.loads(line)
 
 
 def check_seal(path: Path) -> None:
@@ -135,8 +152,7 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with written_aside(path, replace=replace) as aside:
-            aside.write_bytes(image)
-            seal(aside)
+            aside.write_bytes(sealed(image))
     except OSError as error:
         why = error.strerror or error
         raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error

@@ -18,6 +18,7 @@ import numpy as np
 
 from iapb.errors import ArgumentError
 from iapb.run import Run
+from iapb.scene import scene_folder
 from reports.store.io import written_aside
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
@@ -60,8 +61,6 @@ def code_version() -> str:
 @cache
 def evidence_version() -> str:
     """Hash of everything that can change a verdict: engine, references, verification, its stages, and the scenes."""
-    from iapb.scene import scene_folder  # with pydantic
-
     files = sorted(path for path in scene_folder().rglob("*") if path.is_file())
     scenes = {path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8") for path in files}
     return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes])

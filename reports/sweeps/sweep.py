@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -28,10 +27,10 @@ from reference.one_thread import one_thread
 from reference.worlds import find_world, require_complete
 from reports.batches import Scheduler, do_missing, here
 from reports.runner import run_inputs
-from reports.store.folder import file_name
-from reports.store.io import remove_abandoned
+from reports.store.folder import Checkpoint, Place, RunStore, file_name
+from reports.store.io import append_line, read_lines
 from reports.store.keys import code_version, run_key
-from reports.store.runs import RunEntry, read_stored, store_run
+from reports.store.runs import RunEntry
 from reports.store.tables import Column, Table, write_table
 from reports.sweeps.study import Point, Study, points_of
 
@@ -54,10 +53,6 @@ class Result:
     energy_lost: float | None = None  # in impacts [J]
     penetration: float | None = None  # deepest [m]
     kinetic_energy: float | None = None  # at the end [J]
-
-    def record(self) -> dict[str, Any]:
-        """As plain values."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -93,22 +88,20 @@ def run_sweep(
     progress : called as progress(points done, points in all)
     """
     folder = Path(out).resolve() / study.name
-    (folder / RUNS).mkdir(parents=True, exist_ok=True)
-    remove_abandoned(folder / RUNS)
+    RunStore(folder / RUNS)  # makes the folder
     code = _code(scene)
     points = list(points_of(study, str(Path(scene).resolve())))
     found = _journal(folder)
     results = {p.index: r for p in points if (r := found.get(p.key(code))) is not None}
     reused = len(results)
-    with _appending(folder / JOURNAL) as append:
 
-        def keep(point: Point, result: Result) -> None:
-            results[point.index] = replace(result, point=point.key(code))
-            append(results[point.index])
+    def keep(point: Point, result: Result) -> None:
+        results[point.index] = replace(result, point=point.key(code))
+        append_line(folder / JOURNAL, asdict(results[point.index]))
 
-        do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()), keep,
-                   done=lambda point: point.index in results, scheduler=scheduler,
-                   progress=progress or (lambda done, total: None))  # fmt: skip
+    do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()), keep,
+               done=lambda point: point.index in results, scheduler=scheduler,
+               progress=progress or (lambda done, total: None))  # fmt: skip
     ordered = tuple(results[p.index] for p in points)
     _write_summary(folder / SUMMARY, study, points, ordered)
     return SweepOutcome(folder, ordered, reused, _hash(ordered))
@@ -122,32 +115,13 @@ def _code(scene: str) -> str:
 def _journal(folder: Path) -> dict[str, Result]:
     """Finished points by key; a line cut off by a crash, a failure and a run whose file is gone do not count."""
     found: dict[str, Result] = {}
-    journal = folder / JOURNAL
     there = {entry.name for entry in os.scandir(folder / RUNS)}
-    for line in journal.read_text(encoding="utf-8").splitlines() if journal.is_file() else ():
-        with suppress(ValueError, TypeError):
-            result = Result(**json.loads(line))
+    for record in read_lines(folder / JOURNAL):
+        with suppress(TypeError):
+            result = Result(**record)
             if result.status == DONE and result.file in there:
                 found[result.point] = result
     return found
-
-
-class _appending:
-    """Append results to the journal, each in one write: two sweeps at once do not mix their lines."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> Callable[[Result], None]:
-        self._handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-        os.write(self._handle, b"\n" if os.fstat(self._handle).st_size else b"")  # ends a line that a crash cut off
-        return lambda result: self._append(result)
-
-    def _append(self, result: Result) -> None:
-        os.write(self._handle, (json.dumps(result.record()) + "\n").encode())
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self._handle)
 
 
 def _hash(results: tuple[Result, ...]) -> str:
@@ -213,12 +187,18 @@ def _run(point: Point, folder: Path) -> tuple[Run, RunEntry]:
     world = find_world(point.world, point.rendering)
     law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
     key = run_key(run_inputs(scene, law, coupling, point.world))
-    path = folder / file_name(f"{scene.name}-{point.world}", key)
-    if path.is_file():
-        return read_stored(path)
+    place = Place(key, folder / file_name(f"{scene.name}-{point.world}", key))
+
+    def compute(_: Checkpoint) -> Run:
+        return require_complete(simulate(scene, law, coupling, world=point.world))
+
     with one_thread():
-        run = require_complete(simulate(scene, law, coupling, world=point.world))
-    return run, store_run(path, run, key=key)
+        return _store(folder).fetch(place, compute)
+
+
+@cache
+def _store(folder: Path) -> RunStore:
+    return RunStore(folder)
 
 
 @cache

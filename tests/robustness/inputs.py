@@ -34,7 +34,7 @@ from reference.datasets import read_problem
 from reference.fclib import _write_rows, write_fclib
 from reports.cli import main
 from reports.commands.inspect import inspect
-from reports.store.io import seal
+from reports.store.io import sealed
 from reports.store.tables import Column, Table, read_table, write_table
 from reports.sweeps.study import load_study, points_of, scene_of
 from tests.robustness.damage import TOKENS, Rng, damaged_bytes, damaged_text, damaged_values
@@ -202,11 +202,7 @@ def damaged_hdf5(sample: bytes, other: bytes, rng: Rng) -> bytes:
 
 def damaged_hdf5_sealed(sample: bytes, other: bytes, rng: Rng) -> bytes:
     """Damage to what the file says, under a seal that is right: somebody else's program wrote it."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "sealed.h5"
-        path.write_bytes(_changed(sample, rng))
-        seal(path)
-        return path.read_bytes()
+    return sealed(_changed(sample, rng))
 
 
 def _changed(content: bytes, rng: Rng) -> bytes:

@@ -17,7 +17,7 @@ import pytest
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store import Checkpoint, RunStore, folder, read_run, run_key, runs
+from reports.store import Checkpoint, RunStore, folder, io, read_run, run_key, runs
 from reports.store.folder import INDEX_NAME
 from reports.store.keys import content_hash
 
@@ -108,13 +108,14 @@ def test_a_new_run_has_its_key_and_hash_taken_once_and_its_file_not_read_back(
     tmp_path: Path, make_run: MakeRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = collections.Counter[str]()
-    for place, name in ((folder, "run_key"), (runs, "content_hash"), (runs, "opened"), (RunStore, "place_of")):
+    for place, name in ((folder, "run_key"), (runs, "content_hash"), (runs, "opened"), (RunStore, "place_of"),
+                        (io, "sealed"), (io, "_checksum")):  # fmt: skip
         monkeypatch.setattr(place, name, _counted(calls, name, getattr(place, name)))
     store = RunStore(tmp_path)
     store.get_or_run(INPUTS, Counter(make_run()))
-    assert calls == {"run_key": 1, "place_of": 1, "content_hash": 1}
+    assert calls == {"run_key": 1, "place_of": 1, "content_hash": 1, "sealed": 1}  # its bytes are hashed once
     store.get_or_run(INPUTS, Counter(make_run()))  # reads: opened once, judged once
-    assert calls == {"run_key": 2, "place_of": 2, "content_hash": 2, "opened": 1}
+    assert calls == {"run_key": 2, "place_of": 2, "content_hash": 2, "sealed": 1, "opened": 1, "_checksum": 1}
     assert len(store.entries()) == 1 and calls["opened"] == 1
 
 

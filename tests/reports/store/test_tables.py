@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from iapb.errors import ArgumentError, RunFileError
-from reports.store.io import seal
+from reports.store.io import sealed
 from reports.store.tables import Column, Table, read_table, read_tables, write_table, write_tables
 
 E = np.linspace(0, 1, 5)
@@ -76,7 +76,7 @@ def test_damage_is_found(tmp_path: Path) -> None:
         file["fig03/energy"][0] = 1.0
     with pytest.raises(RunFileError, match="checksum"):
         read_table(path)
-    seal(path)
+    path.write_bytes(sealed(path.read_bytes()))
     with pytest.raises(RunFileError, match="damaged"):
         read_table(path)
 
