@@ -60,9 +60,9 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
         columns = ("effect", "active", "change", "cost")
         yield f"effects/{scene}", titled(columns, rows, timed=("cost",), prose=("change",))
     for topic in evidence.topics:
-        found = enumerate(topic.findings, 1)
-        yield from _outcomes(topic.id, ((number, one.outcome, one.sentence, one.timed) for number, one in found))
-        yield from ((f"{topic.id}/{name}", table) for name, table in topic.tables.items())
+        found = enumerate(topic.parts, 1)
+        yield from _outcomes(topic.key, ((number, one.verdict, one.sentence, one.timed) for number, one in found))
+        yield from ((f"{topic.key}/{name}", table) for name, table in topic.tables.items())
 
 
 def _checks(evidence: Evidence) -> Iterator[tuple[str, Table]]:

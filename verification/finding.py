@@ -281,6 +281,17 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
     )  # fmt: skip
 
 
+def finding_of(
+    key: str, title: str, question: str, answer: str, parts: Iterable[Part],
+    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (),
+) -> Finding:  # fmt: skip
+    """Return the finding that parts make: the verdict of the worst of them, timed where one is, with what failed."""
+    parts = tuple(parts)
+    timed = any(part.timed for part in parts)
+    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed)
+    return with_failures(made, failures)
+
+
 def failure_of(case: str, error: Exception) -> Failure:
     """Return the record of an exception."""
     reason = (str(error).splitlines() or ["no reason given"])[0]

@@ -34,8 +34,8 @@ def bench(
     if tables:
         _print(console, "What a microsecond buys", methods)
     words = {REPRODUCED: "as asked for", LIMITED: "not as asked for", NOT_COMPUTED: "not measured"}
-    for finding in topic.findings:
-        console.print(f"• {words[finding.outcome]}: {finding.sentence}", highlight=False, markup=False)
+    for part in topic.parts:
+        console.print(f"• {words[part.verdict]}: {part.sentence}", highlight=False, markup=False)
     console.print(_methods(methods), highlight=False, markup=False)
     if not tables:
         console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)

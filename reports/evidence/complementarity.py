@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reports.evidence import complementarity_tables as tables
-from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import VERDICTS
+from verification.finding import REPRODUCED, Finding, Part, finding_of
 
 if TYPE_CHECKING:
     from verification.complementarity.study import ComparisonStudy
@@ -27,7 +26,7 @@ FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
 FOLDER_NAME = "problems of others"
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Compare, judge each sentence from the records, and keep what is behind it."""
     from verification.complementarity.findings import parts_of
     from verification.complementarity.study import compare
@@ -41,10 +40,10 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
     failures = list(study.failures)
-    findings = tuple(Finding(part.sentence, part.verdict, part.timed) for part in parts_of(study, failures))
+    parts = tuple(parts_of(study, failures))
     made = tables.all_tables(study, failures) | {"worlds": tables.worlds(runner, failures=failures)}
     progress(STAGES, STAGES)
-    return with_failures(Topic(ID, TITLE, LEAD, findings, made, verdict(study, findings)), failures)
+    return finding_of(ID, TITLE, LEAD, answer(study, parts), parts, made, failures)
 
 
 STAGES = 9  # of `compare`, with a folder of problems
@@ -56,12 +55,12 @@ def _renamed(study: ComparisonStudy) -> ComparisonStudy:
     return replace(study, problems=(own, *(replace(each, folder=FOLDER_NAME) for each in others)))
 
 
-def verdict(study: ComparisonStudy, findings: tuple[Finding, ...]) -> str:
+def answer(study: ComparisonStudy, parts: Sequence[Part]) -> str:
     """The sentence of the first page."""
     cells = study.cells + study.scenes
     cases = sum(cell.cases for cell in cells) or 1
     agree = sum(cell.agree * cell.cases for cell in cells) / cases
     against = sum(cell.contradictions for cell in cells)
-    held = sum(finding.outcome == VERDICTS[0] for finding in findings)
+    held = sum(part.verdict == REPRODUCED for part in parts)
     return (f"IAPB moves as the Newton LCP in {agree:.0%} of {cases} impacts, and exactly where some p >= 0 gives its "
-            f"motion ({against} exceptions); {held} of {len(findings)} findings hold without limits.")
+            f"motion ({against} exceptions); {held} of {len(parts)} findings hold without limits.")

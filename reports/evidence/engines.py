@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_TESTABLE, REPRODUCED, Failure, Table, titled
+from verification.finding import (
+    LIMITED,
+    NOT_TESTABLE,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    finding_of,
+    titled,
+)
 
 if TYPE_CHECKING:
     from verification.engines import EngineRecord
@@ -26,24 +35,24 @@ COLUMNS = (
 SETTINGS_COLUMNS = ("engine", "version", "settings", "used in", "what it cannot do")
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Compare all engines that are here, and name those that are not."""
     from verification.engines import compare_engines
 
     failures: list[Failure] = []
     records = compare_engines(depth=depth, progress=progress, failures=failures)
     tables = {"errors": errors_table(records), "settings": settings_table(records)}
-    return with_failures(Topic(ID, TITLE, LEAD, findings(records), tables, verdict_of(records)), failures)
+    return finding_of(ID, TITLE, LEAD, verdict_of(records), findings(records), tables, failures)
 
 
-def findings(records: Sequence[EngineRecord]) -> tuple[Finding, ...]:
+def findings(records: Sequence[EngineRecord]) -> tuple[Part, ...]:
     """One sentence per engine and choice of settings, and one on those that are not installed."""
     from verification.engines import sentence
 
-    found = [Finding(sentence(group), _outcome(group)) for group in _groups(records)]
+    found = [Part(sentence(group), _outcome(group)) for group in _groups(records)]
     absent = sorted({record.title for record in records if record.missing})
     if absent:
-        found.append(Finding(f"Not installed here, and so not compared: {', '.join(absent)}.", NOT_TESTABLE))
+        found.append(Part(f"Not installed here, and so not compared: {', '.join(absent)}.", NOT_TESTABLE))
     return tuple(found)
 
 

@@ -32,11 +32,10 @@ from reports.pages.records import (
     HardCase,
     Property,
     SceneEffect,
-    Topic,
 )
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
-from verification.finding import Failure, Table, attempt
+from verification.finding import Failure, Finding, Table, attempt
 
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
@@ -81,9 +80,9 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     return _with_verdicts(evidence)
 
 
-def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Topic:
+def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
     """One topic, or one that says why it could not be computed."""
-    topic: Topic | None = kept.stage(name, Topic, lambda done, _: compute_topic(name, runner, depth, done), None)
+    topic: Finding | None = kept.stage(name, Finding, lambda done, _: compute_topic(name, runner, depth, done), None)
     return failed_topic(name, kept.failures[name][-1]) if topic is None else topic
 
 

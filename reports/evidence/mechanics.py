@@ -15,9 +15,8 @@ from reports.evidence.mechanics_tables import (
     study_table,
     times_table,
 )
-from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import Failure, attempt, of_each
+from verification.finding import Failure, Finding, Part, attempt, finding_of, of_each
 
 ID, TITLE = "mechanics", "Linkages and free bodies"
 LEAD = (
@@ -27,7 +26,7 @@ LEAD = (
 )
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Run every study of the mechanics and say what each found."""
     from verification.cost.many_bodies import study_many_bodies
     from verification.mechanics import STUDIES, check_mechanics
@@ -53,7 +52,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         **{name: study_table(studies[name], leave_out=("fault",)) for name in ("operating",) if name in studies},
         "many bodies": bodies_table(costs),
     }
-    said: list[partial[Iterator[Finding]]] = [
+    said: list[partial[Iterator[Part]]] = [
         *(partial(sentences.against_pinocchio, name, studies[name]) for name in AGAINST_PINOCCHIO if name in studies),
         *(partial(sentence, studies[name]) for name, sentence in sentences.OF_STUDIES.items() if name in studies),
         partial(sentences.linked, linked), partial(sentences.rows_decide, linked),
@@ -61,4 +60,4 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     ]  # fmt: skip
     findings = tuple(of_each(said, lambda sentence: sentence(), failures, lambda sentence: sentence.func.__name__))
     verdict = attempt("verdict", lambda: sentences.verdict(studies, linked), failures) or ""
-    return with_failures(Topic(ID, TITLE, LEAD, findings, tables, verdict), failures)
+    return finding_of(ID, TITLE, LEAD, verdict, findings, tables, failures)

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from reports.evidence.mechanics_tables import AGAINST_PINOCCHIO
-from reports.pages.records import Finding
 from verification.cost.many_bodies import StepCost, growth_exponent
-from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Table
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Part, Table
 from verification.mechanics.false_collisions import EDGE_JUMP, FalseCollisions
 from verification.mechanics.linked_impacts import (
     ALL,
@@ -38,17 +37,17 @@ def _outcome(passed: bool | None) -> str:
     return NOT_COMPUTED if passed is None else REPRODUCED if passed else REFUTED
 
 
-def against_pinocchio(name: str, study: Table) -> Iterator[Finding]:
+def against_pinocchio(name: str, study: Table) -> Iterator[Part]:
     """The sentence on one set of mechanisms."""
     from verification.mechanics.robots import AGREEMENT, QUANTITIES
 
     if not study.rows:
-        yield Finding(f"Robots beside the checkout: not there ({study.note}), so not compared.", NOT_COMPUTED)
+        yield Part(f"Robots beside the checkout: not there ({study.note}), so not compared.", NOT_COMPUTED)
         return
     rows = study.records()
     states = sum(row["states"] for row in rows)
     quantity = max(QUANTITIES, key=lambda q: max(row[q] for row in rows)).replace("_", " ")
-    yield Finding(
+    yield Part(
         f"{_count(name, rows)} {_AGREE[name]}: at {states:,} random states everything differs from Pinocchio "
         f"by at most {max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}), the "
         f"{quantity} most.", _outcome(study.passed),
@@ -63,12 +62,12 @@ def _count(name: str, rows: Sequence[Mapping[str, Any]]) -> int:
     return len({row["mechanism"] for row in rows})
 
 
-def positive_definite(study: Table) -> Iterator[Finding]:
+def positive_definite(study: Table) -> Iterator[Part]:
     """How many matrices, and how near to zero."""
     rows = study.records()
     judged = sum(row["judged, condition ≤ 1e12"] for row in rows)
     least = min(row["least eigenvalue × condition"] for row in rows)
-    yield Finding(
+    yield Part(
         f"All {judged} of {sum(row['mass matrices'] for row in rows)} random mass matrices whose scaled condition is "
         f"at most 1e12 (up to {max(row['largest condition judged'] for row in rows):.1e}) are positive definite: the "
         f"least eigenvalue times the condition is never below {least:.2g}."
@@ -77,29 +76,29 @@ def positive_definite(study: Table) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def power_balance(study: Table) -> Iterator[Finding]:
+def power_balance(study: Table) -> Iterator[Part]:
     """The orders found for each integrator."""
     found = "; ".join(
         f"{_plain(name)} {_span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
         for name, rows in _by(study.records(), "integrator").items()
     )
-    yield Finding(
+    yield Part(
         f"On random trees of 1 to 30 joints the energy changes by the work of the forces with the integrator's order: "
         f"{found}.", _outcome(study.passed))  # fmt: skip
 
 
-def tumbling(study: Table) -> Iterator[Finding]:
+def tumbling(study: Table) -> Iterator[Part]:
     """The orders found for each integrator and form."""
     series = []
     for (name, form), rows in _by(_judged(study), "integrator", "form").items():
         orders = _span([row["order"] for row in rows])
         series.append(f"{_plain(name)}, {form}: {orders} (declared {rows[0]['declared order']})")
-    yield Finding(
+    yield Part(
         "A free tumbling body converges to the closed form with the declared order, and its energy and angular "
         f"momentum converge no slower: {'; '.join(series)}.", _outcome(study.passed))  # fmt: skip
 
 
-def coordinate_invariance(study: Table) -> Iterator[Finding]:
+def coordinate_invariance(study: Table) -> Iterator[Part]:
     """Where the conditions are moderate, and where only the bound holds."""
     from verification.mechanics.coordinate_invariance import AGREEMENT
 
@@ -107,38 +106,38 @@ def coordinate_invariance(study: Table) -> Iterator[Finding]:
     moderate = [row for row, _ in rows if row["tolerance"] == AGREEMENT]
     beyond = [row for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]
     silent = sum(held is None for _, held in rows)
-    yield Finding(
+    yield Part(
         f"C06: the same impact in two parametrizations agrees to {max(row['error'] for row in moderate):.1e} in the "
         f"{len(moderate)} cases of moderate condition (tolerance {AGREEMENT:g}); in {len(beyond)} worse ones, up to "
         f"the singular pose, the error is at most {max(row['error'] / row['bound'] for row in beyond):.1e} of its "
         f"bound C ε κ/σ_min. In {silent} the bound exceeds 1 and says nothing.", _outcome(study.passed))  # fmt: skip
 
 
-def operating(study: Table) -> Iterator[Finding]:
+def operating(study: Table) -> Iterator[Part]:
     """How near to singular, how fast, and how well the balance closes."""
     rows = study.records()
     near = sum(row["steps near singular"] or 0 for row in rows)
     faults = sum(bool(row["fault"]) for row in rows)
     share = max(abs(row["residual"]) / row["tolerance"] for row in rows if not row["fault"])
-    yield Finding(
+    yield Part(
         f"Led by any link and point along {len(rows)} ways through its singular poses ({near:,} steps within a degree "
         f"or so of straight or folded), the simulation breaks off in {faults}; no joint turns faster than "
         f"{max(row['largest joint speed'] for row in rows if not row['fault']):.3g} rad/s, and the energy balance is "
         f"open by at most {share:.2g} of what a first-order step may make up.", _outcome(study.passed))  # fmt: skip
 
 
-def linked(outcomes: Sequence[LinkedOutcome]) -> Iterator[Finding]:
+def linked(outcomes: Sequence[LinkedOutcome]) -> Iterator[Part]:
     """What is conserved, what is not, and what the rows decide."""
     kept = [o for o in outcomes if o.treatment != PER_BODY]
     lost = [o for o in outcomes if o.treatment == PER_BODY]
     energy, momentum = _changes(kept)
     problems = len({o.problem for o in outcomes})
-    yield Finding(
+    yield Part(
         f"Cradles of 2 to 7 balls and Bernoulli's problem ({problems}): with relative rows (12), and event by event, "
         f"energy and momentum change by at most {energy:.1e} and {momentum:.1e} (tolerance {CONSERVED:g}).",
         REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
     energy, least = _changes(lost)[0], min(o.momentum_change for o in lost)
-    yield Finding(
+    yield Part(
         f"With the per-body rows of (13)-(14) energy changes by at most {energy:.1e}, but in all {len(lost)} cases "
         f"momentum changes by {least:.2g} times what there was or more: the striker comes back as from a wall "
         "(erratum 3).", REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
@@ -148,14 +147,14 @@ def _changes(outcomes: Sequence[LinkedOutcome]) -> tuple[float, float]:
     return max(abs(o.energy_change) for o in outcomes), max(o.momentum_change for o in outcomes)
 
 
-def rows_decide(outcomes: Sequence[LinkedOutcome]) -> Iterator[Finding]:
+def rows_decide(outcomes: Sequence[LinkedOutcome]) -> Iterator[Part]:
     """The cradle of five by three choices of rows that all conserve everything."""
     five = {(o.treatment, o.rows): o.velocity[:, 0] for o in outcomes if o.problem == "cradle of 5"}
     found = {"all touching rows": five[RELATIVE, ALL], "the approaching row": five[RELATIVE, APPROACHING],
              "one after the other": next(v for (_, rows), v in five.items() if "one after" in rows)}  # fmt: skip
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in found.items())
     apart = min(float(np.abs(a - b).max()) for a, b in _pairs(list(found.values())))
-    yield Finding(
+    yield Part(
         f"Conservation does not decide the outcome, the rows do. Cradle of five, velocities after: {words} m/s. The "
         "paper takes the rows that approach; only the sequence hands the blow to the last ball.",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
@@ -165,7 +164,7 @@ def _pairs(values: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
     return ((a, b) for k, a in enumerate(values) for b in values[k + 1 :])
 
 
-def false_collisions(found: Sequence[FalseCollisions]) -> Iterator[Finding]:
+def false_collisions(found: Sequence[FalseCollisions]) -> Iterator[Part]:
     """C18 at the scene's own distances: with both filters, then each alone."""
     of: dict[str, dict[float, FalseCollisions]] = {}
     for run in found:
@@ -176,7 +175,7 @@ def false_collisions(found: Sequence[FalseCollisions]) -> Iterator[Finding]:
     bounce = "".join(f" At {damping:g} N s/m the ball leaves the facets ({run.lifted} steps off them) and comes back "
                      "as a new contact." for damping, run in left.items() if run.lifted)  # fmt: skip
     lost = max(run.energy_lost / run.potential_drop for run in none.values())
-    yield Finding(
+    yield Part(
         f"C18: a ball that rolls in the faceted socket, at damping {', '.join(f'{b:g}' for b in both)} N s/m and with "
         f"distances beyond the {1e3 * EDGE_JUMP:.1f} mm of an edge, collides falsely: {counts}. Without filters up to "
         f"{lost:.0%} of the fall's energy goes with them. Coherence removes them, clustering the doubled contacts "
@@ -185,13 +184,13 @@ def false_collisions(found: Sequence[FalseCollisions]) -> Iterator[Finding]:
         REFUTED if len(left) == len(both) else LIMITED if left else REPRODUCED)  # fmt: skip
 
 
-def many_bodies(costs: Sequence[StepCost]) -> Iterator[Finding]:
+def many_bodies(costs: Sequence[StepCost]) -> Iterator[Part]:
     """The slope of the pairs tested, and the time of a step."""
     slope, last, first = growth_exponent(costs, "tested"), costs[-1], min(costs, key=lambda c: abs(c.bodies - 20))
-    yield Finding(
+    yield Part(
         f"With the broad phase the pairs tested grow as bodies to the power {slope:.2f}: {last.tested:.0f} of "
         f"{last.pairs:,} for {last.bodies} free bodies.", REPRODUCED if slope <= LINEAR else REFUTED)  # fmt: skip
-    yield Finding(
+    yield Part(
         f"A step took {1e6 * first.seconds:.3g} µs with {first.bodies} free bodies and {1e6 * last.seconds:.3g} µs "
         f"with {last.bodies} here (exponent {growth_exponent(costs):.2f}).", REPRODUCED, timed=True)  # fmt: skip
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from reports.evidence import scenes_tables as tables
 from reports.evidence.runs import shipped_scene
 from reports.evidence.scenes_findings import findings_of, verdict_of
-from reports.pages.records import Topic, with_failures
 from reports.runner import Runner
-from verification.finding import Failure, attempt
+from verification.finding import Failure, Finding, attempt, finding_of
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -30,7 +29,7 @@ TIMED_AGAIN = 3  # short runs are timed in one piece, which may hold compilation
 REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Run every scene, at shorter steps too, and keep the books of each."""
     from iapb.scene import scene_names
     from reference.worlds import run_world
@@ -57,9 +56,9 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 def topic_of(
     runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks], failures: Sequence[Failure] = ()
-) -> Topic:
+) -> Finding:
     """Return the topic of these records."""
     more = list(failures)
     findings = findings_of(runs, measures, books, more)
     made = tables.all_tables(runs, measures, books)
-    return with_failures(Topic(ID, TITLE, LEAD, findings, made, verdict_of(measures, books)), more)
+    return finding_of(ID, TITLE, LEAD, verdict_of(measures, books), findings, made, more)

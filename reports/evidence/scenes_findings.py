@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.evidence.scenes_tables import YARDSTICK, pace_of
-from reports.pages.records import Finding
-from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Failure, attempt
+from verification.finding import LIMITED, NOT_COMPUTED, REFUTED, REPRODUCED, Failure, Part, attempt
 
 if TYPE_CHECKING:
     from iapb.run import Run
@@ -26,7 +25,7 @@ ROUNDING = 1e-12  # share of the energy turned over: sums of some thousand terms
 def findings_of(
     runs: Sequence[Run], measures: Sequence[SceneMeasure], books: Sequence[OpenBooks],
     failures: list[Failure] | None = None,
-) -> tuple[Finding, ...]:
+) -> tuple[Part, ...]:
     """Return every finding; `failures` receives those that cannot be made, as without the scene that is the unit."""
     judges = {
         "overlap": partial(_penetration, runs, measures), "impacts": partial(_impacts, runs, measures),
@@ -52,7 +51,7 @@ def _deepest(measures: Sequence[SceneMeasure]) -> SceneMeasure:
     return max(measures, key=lambda m: m.penetration)
 
 
-def _penetration(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Finding:
+def _penetration(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Part:
     touching = [(m, thinnest(run)) for run, m in zip(runs, measures, strict=True) if m.most_contacts]
     m, size = max(touching, key=lambda pair: pair[0].penetration / pair[1])
     deepest, ratio = _deepest(measures), m.penetration / size
@@ -63,7 +62,7 @@ def _penetration(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Findi
         f"Measured by the thinnest moving shape of its scene, {m.scene} goes deepest: {ratio:.0%} of it. "
         "Nothing passes through anything."
     )  # fmt: skip
-    return Finding(sentence if ratio < DEEP else sentence.removesuffix(" Nothing passes through anything."),
+    return Part(sentence if ratio < DEEP else sentence.removesuffix(" Nothing passes through anything."),
                    REPRODUCED if ratio < DEEP else LIMITED)
 
 
@@ -81,7 +80,7 @@ def _thickness(shape: dict[str, object]) -> float:
     return float(np.ptp(np.array(shape["vertices"]), axis=0).min())
 
 
-def _impacts(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Finding:
+def _impacts(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Part:
     gained = max(
         float(-run.impacts.energy_lost.min(initial=0.0)) / m.book.turned_over
         for run, m in zip(runs, measures, strict=True) if m.impacts
@@ -91,11 +90,11 @@ def _impacts(runs: Sequence[Run], measures: Sequence[SceneMeasure]) -> Finding:
         f"Of {sum(m.impacts for m in measures)} impacts, with up to {most.most_rows} rows at once ({most.scene}), the "
         f"one that adds most energy adds {gained:.0e} of what its scene turns over: rounding."
     )
-    return Finding(sentence if gained <= ROUNDING else sentence.removesuffix(": rounding.") + ".",
+    return Part(sentence if gained <= ROUNDING else sentence.removesuffix(": rounding.") + ".",
                    REPRODUCED if gained <= ROUNDING else REFUTED)
 
 
-def _order(books: Sequence[OpenBooks]) -> Finding:
+def _order(books: Sequence[OpenBooks]) -> Part:
     tried = [each for each in books if each.order is not None]
     short = [each for each in tried if not each.falls_as_declared]
     orders = sorted(float(each.order) for each in tried)  # type: ignore[arg-type]
@@ -107,29 +106,29 @@ def _order(books: Sequence[OpenBooks]) -> Finding:
     if short:
         names = ", ".join(f"{each.scene} ({each.order:.2f})" for each in short)
         sentence += f" Below the declared order: {names}."
-    return Finding(sentence, LIMITED if short else REPRODUCED)
+    return Part(sentence, LIMITED if short else REPRODUCED)
 
 
-def _open(measures: Sequence[SceneMeasure]) -> Finding:
+def _open(measures: Sequence[SceneMeasure]) -> Part:
     wide = [m for m in measures if abs(m.book.open_share) > WORTH_NAMING]
     wide.sort(key=lambda m: -abs(m.book.open_share))
     if not wide:
-        return Finding(f"No books leave more than {WORTH_NAMING:.0%} open at the scene's own step.", REPRODUCED)
+        return Part(f"No books leave more than {WORTH_NAMING:.0%} open at the scene's own step.", REPRODUCED)
     words = ", ".join(f"{m.scene} {m.book.open_share:+.1%}".replace("-", "−") for m in wide)
     sentence = (
         f"At the scene's own step {len(wide)} of {len(measures)} books leave more than {WORTH_NAMING:.0%} of the "
         f"energy turned over open: {words}. Minus is energy swallowed by the steps, plus made up."
     )
-    return Finding(sentence, LIMITED)
+    return Part(sentence, LIMITED)
 
 
-def _gains(measures: Sequence[SceneMeasure]) -> Finding:
+def _gains(measures: Sequence[SceneMeasure]) -> Part:
     made = [m for m in measures if m.book.gain_share > ROUNDING and m.book.largest_gain > _floor(m)]
     made.sort(key=lambda m: -m.book.gain_share)
     words = ", ".join(f"{m.scene} {m.book.gain_share:.1%}" for m in made)
     if not made:
-        return Finding("No scene ever holds more energy than it started with and was given.", REPRODUCED)
-    return Finding(
+        return Part("No scene ever holds more energy than it started with and was given.", REPRODUCED)
+    return Part(
         f"{len(measures) - len(made)} of {len(measures)} scenes never hold more energy than they started with and were "
         f"given. The others do at some time, as a share of what they turn over: {words}. No impact adds it: the steps "
         "in time do.", LIMITED,
@@ -140,11 +139,11 @@ def _floor(m: SceneMeasure) -> float:
     return ROUNDING * max(abs(m.book.start), abs(m.book.end))
 
 
-def _endings(measures: Sequence[SceneMeasure]) -> Finding:
+def _endings(measures: Sequence[SceneMeasure]) -> Part:
     ends = Counter(m.ending for m in measures)
     words = "; ".join(f"{count} {_plural(ending, count)}" for ending, count in sorted(ends.items()))
     complete = sum(m.complete for m in measures)
-    return Finding(f"{complete} of {len(measures)} runs go to their end: {words}.",
+    return Part(f"{complete} of {len(measures)} runs go to their end: {words}.",
                    REPRODUCED if complete == len(measures) else REFUTED)
 
 
@@ -153,14 +152,14 @@ def _plural(ending: str, count: int) -> str:
     return f"{first.removesuffix('s')} {rest}" if count != 1 else ending
 
 
-def _time(measures: Sequence[SceneMeasure]) -> Finding:
+def _time(measures: Sequence[SceneMeasure]) -> Part:
     unit, slow = pace_of(measures), max(measures, key=lambda m: m.seconds_per_step)
     near = min(measures, key=lambda m: m.realtime_factor)
     if unit is None:
-        return Finding(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
+        return Part(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
     sentence = (
         f"A step of {slow.scene}, the dearest, takes {slow.seconds_per_step / unit:.0f} times as long as one of "
         f"{YARDSTICK} ({1e6 * unit:.1f} µs on this machine). Nearest to real time is {near.scene}: "
         f"a step is computed {near.realtime_factor:.1f} times as fast as it lasts."
     )
-    return Finding(sentence, REPRODUCED if near.realtime_factor > 1.0 else LIMITED, timed=True)
+    return Part(sentence, REPRODUCED if near.realtime_factor > 1.0 else LIMITED, timed=True)

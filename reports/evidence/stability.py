@@ -10,9 +10,20 @@ from typing import Any
 import numpy as np
 
 from reports.evidence.runs import shipped_scene
-from reports.pages.records import Finding, Topic, with_failures
 from reports.runner import Runner
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED, Failure, Table, attempt, titled
+from verification.finding import (
+    LIMITED,
+    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    attempt,
+    finding_of,
+    titled,
+)
 
 LEAD = (
     "A wall in a sampled loop can feed the hand. A mass of 2 kg is pushed against walls of every stiffness and "
@@ -22,7 +33,7 @@ LEAD = (
 MARKS = {"settles": "+", "bounces on": "o", "grows": "x"}
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Maps of the sampled wall, and the peg under the same laws."""
     from verification.stability.device_port import device_port_leaks
     from verification.stability.maps import grid, stability_maps
@@ -46,7 +57,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
              for judge, records in judges]  # fmt: skip
     findings = tuple(finding for finding in tried if finding is not None)
     verdict = findings[0].sentence if tried[0] is not None else ""
-    return with_failures(Topic("stability", "Stability of contact", LEAD, findings, tables, verdict), failures)
+    return finding_of("stability", "Stability of contact", LEAD, verdict, findings, tables, failures)
 
 
 def _pairs(maps: Sequence[Any]) -> list[tuple[Any, Any]]:
@@ -72,44 +83,44 @@ def _sensors(loop: Any) -> str:
     return "late" if loop.delay else "ideal"
 
 
-def _held(maps: Sequence[Any]) -> Finding:
+def _held(maps: Sequence[Any]) -> Part:
     pairs = _pairs(maps)
     theirs, ours = (np.array([pair[law].contact.settled for pair in pairs]) for law in (0, 1))
     more = ours.sum(axis=1) / theirs.sum(axis=1)
     lost = int((theirs & ~ours).sum())
     outcome = REFUTED if more.min() < 1.0 else LIMITED if lost else REPRODUCED
-    return Finding(
+    return Part(
         f"Of {theirs.size} walls, penalties hold {theirs.sum()} and impulses {ours.sum()}, {more.min():.2f} to "
         f"{more.max():.2f} times as many per loop; {lost} walls only penalties hold.", outcome)  # fmt: skip
 
 
-def _beyond(maps: Sequence[Any]) -> Finding:
+def _beyond(maps: Sequence[Any]) -> Part:
     """The condition speaks of ideal sensors and penalties."""
     chosen = [one for one in maps if one.passive.any() and one.law == "penalty" and not one.loop.delay]
     passive = np.stack([one.passive for one in chosen])
     grown, settled = (np.array([getattr(one.contact, name) for one in chosen]) for name in ("grown", "settled"))
     gains = int((grown & passive).sum())
-    return Finding(
+    return Part(
         f"Within b >= KT/2 + |B| no wall may make the hand faster: {gains} of {passive.sum()} do. Under this hand "
         f"{(settled & ~passive).sum()} walls beyond it settle too: it is a condition for every hand, not for this one.",
         REFUTED if gains else REPRODUCED)  # fmt: skip
 
 
-def _undamped(maps: Sequence[Any]) -> Finding:
+def _undamped(maps: Sequence[Any]) -> Part:
     bare = [one for one in maps if one.loop.device_damping == 0.0 and not one.loop.delay and one.law == "penalty"]
     shares = ", ".join(f"{100 * one.settled_share:.0f} % at {one.loop.rate:.0f} Hz" for one in bare)
-    return Finding(
+    return Part(
         "The paper's device has no damping, b = 0: by the condition no wall at all is passive for every hand. That "
         f"penalties still hold {shares} of these walls rests on this hand, a constant push.", LIMITED)  # fmt: skip
 
 
-def _hard(maps: Sequence[Any]) -> Finding:
+def _hard(maps: Sequence[Any]) -> Part:
     pairs = [(theirs.contact, ours.contact, rows) for theirs, ours, rows in _at_paper(maps)]
     harder, deeper = (
         [float(np.median(getattr(ours, name)[rows] / getattr(theirs, name)[rows])) for theirs, ours, rows in pairs]
         for name in ("rate_hardness", "penetration")
     )  # fmt: skip
-    return Finding(
+    return Part(
         f"At the paper's damping of 50 N s/m an impulse feels {min(harder):.3g} to {max(harder):.3g} times as hard at "
         f"first (rate-hardness, median over stiffnesses) and lets the hand {min(deeper):.2f} to {max(deeper):.2f} "
         "times as deep.", REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else LIMITED)  # fmt: skip
@@ -148,7 +159,7 @@ def _pegs(pegs: Sequence[Any]) -> Table:
                     "penetration [mm]", "stopped"), rows, 3, "A dash: it never came to rest.")
 
 
-def _peg(pegs: Sequence[Any]) -> Finding:
+def _peg(pegs: Sequence[Any]) -> Part:
     pairs = list(zip(pegs[::2], pegs[1::2], strict=True))
     sooner = [(a, b) for a, b in pairs if b.settling_time is not None
               and (a.settling_time is None or b.settling_time <= a.settling_time)]
@@ -156,7 +167,7 @@ def _peg(pegs: Sequence[Any]) -> Finding:
     fewer = sum(b.bounces <= a.bounces for a, b in pairs)
     share = len(sooner) / max(1, len(decided))
     outcome = NOT_TESTABLE if not decided else REPRODUCED if share == 1.0 else LIMITED if share >= 0.5 else REFUTED
-    return Finding(
+    return Part(
         f"The peg in the corner comes to rest no later with impulses in {len(sooner)} of {len(decided)} trials of "
         f"device and wall where either does, and bounces no more often in {fewer} of {len(pairs)}.",
         outcome)
@@ -172,12 +183,12 @@ def _waveforms(pulses: Sequence[Any]) -> Table:
         "it from the hand. Momentum not given is still on its way at the end.")  # fmt: skip
 
 
-def _pulses(pulses: Sequence[Any]) -> Finding:
+def _pulses(pulses: Sequence[Any]) -> Part:
     most, unpaid = max(p.given - p.lost for p in pulses), max(p.unpaid for p in pulses)
     forces = {p.waveform: p.peak_force for p in pulses}
     brake = ("" if not {"step", "brake"} <= set(forces) else
              f"; a brake asks for {forces['brake']:.3g} N at most where one step asks for {forces['step']:.3g} N")
-    return Finding(
+    return Part(
         f"Every waveform gives the hand the computed momentum (all but {unpaid:.0e}) and no more energy than the "
         f"collisions took{brake}.", REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip
 
@@ -192,7 +203,7 @@ def _ports(ports: Sequence[Any]) -> Table:
         "damping of the coupler in CBuc, else of the wall, with the coordination of Table I.")  # fmt: skip
 
 
-def _coupled(ports: Sequence[Any]) -> Finding:
+def _coupled(ports: Sequence[Any]) -> Part:
     from verification.stability.device_loop import COUPLER_WORLD
 
     coupled = [p for p in ports if p.loop.world == COUPLER_WORLD]
@@ -200,7 +211,7 @@ def _coupled(ports: Sequence[Any]) -> Finding:
     crossing, late = ([p.ratio for p in coupled if p.motion == motion and (p.sensors == "ideal") == ideal]
                       for motion, ideal in (("crosses", True), ("presses", False)))  # fmt: skip
     most = max(p.ratio for p in pressing)
-    return Finding(
+    return Part(
         "A device coupled to a tool on a rigid wall, the hand pressing and the sensors ideal, leaks nothing from "
         f"b = KT/2 + |B| of the coupler on: it needs {most:.4f} of that. Late or coarse sensors need up to "
         f"{max(late):.3g} of it, and a hand that goes in and out of contact {max(crossing):.3g}: a coupler that "
@@ -208,13 +219,13 @@ def _coupled(ports: Sequence[Any]) -> Finding:
         LIMITED if most <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
-def _coordinated(ports: Sequence[Any]) -> Finding:
+def _coordinated(ports: Sequence[Any]) -> Part:
     from verification.stability.device_loop import COORDINATION, COUPLER_WORLD
 
     four = [p for p in ports if p.loop.world != COUPLER_WORLD]
     wall, whole = (max(p.needed / bound(p.loop) for p in four) for bound in
                    (lambda loop: loop.bound, lambda loop: loop.bound_with_coordination))  # fmt: skip
-    return Finding(
+    return Part(
         f"With the four-channel controller the wall's own KT/2 + |B| is not enough: up to {wall:.3g} of it is needed, "
         f"{min(p.needed for p in four):.3g} to {max(p.needed for p in four):.3g} N s/m, for the coordination's damping "
         f"of {COORDINATION[1]:g} N s/m is felt in the hand as well. The gains of both added, up to {whole:.3g} of the "

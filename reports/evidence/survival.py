@@ -9,10 +9,20 @@ from typing import Any
 
 from reports.evidence.depends import LAST_RESULT
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-from reports.pages.records import NOT_COMPUTED, Finding, Topic, with_failures
 from reports.resimulate import repeat_run
 from reports.runner import Runner
-from verification.finding import REFUTED, REPRODUCED, Failure, Table, of_each, titled
+from verification.finding import (
+    NOT_COMPUTED,
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    finding_of,
+    of_each,
+    titled,
+)
 
 LEAD = (
     "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
@@ -21,7 +31,7 @@ LEAD = (
 )
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Simulate the runs of the figures again from their files; read the last results of the laboratory."""
     failures: list[Failure] = []
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
@@ -31,9 +41,9 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
             tables[part] = last[0]
             findings.append(finding(*last))
         else:
-            findings.append(Finding(f"No result of {part} is kept here: `make fuzz` makes one.", NOT_COMPUTED))
+            findings.append(Part(f"No result of {part} is kept here: `make fuzz` makes one.", NOT_COMPUTED))
     verdict = " ".join(finding.sentence for finding in findings)
-    return with_failures(Topic("survival", "Runs that survive", LEAD, tuple(findings), tables, verdict), failures)
+    return finding_of("survival", "Runs that survive", LEAD, verdict, findings, tables, failures)
 
 
 def _repeated(runner: Runner, name: str) -> Any:
@@ -59,24 +69,24 @@ def _of_table(table: Table, column: str) -> int:
     return sum(table.column(column))
 
 
-def _inputs(table: Table, made: str) -> Finding:
+def _inputs(table: Table, made: str) -> Part:
     tried, broken = _of_table(table, "tried"), _of_table(table, "traceback or hang")
     came = f"{broken} gave a traceback or hung" if broken else "none gave a traceback or hung"
-    return Finding(f"Of {tried} wrong inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
+    return Part(f"Of {tried} wrong inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
                    f"were refused by name, the others taken as valid ({made}).",
                    REFUTED if broken else REPRODUCED)  # fmt: skip
 
 
-def _faults(table: Table, made: str) -> Finding:
+def _faults(table: Table, made: str) -> Part:
     tried, survived, lost = (_of_table(table, column) for column in ("tried", "survived", "lost"))
-    return Finding(
+    return Part(
         f"Of {tried} faults of {len(table.rows)} kinds, {survived} were survived; {lost} finished results were lost "
         f"({made}).", REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
 
 
-def _repetitions(repeated: Any) -> Finding:
+def _repetitions(repeated: Any) -> Part:
     same = sum(repetition.same for _, repetition in repeated)
-    return Finding(f"{same} of {len(repeated)} runs of the figures, simulated again from nothing but their own files, "
+    return Part(f"{same} of {len(repeated)} runs of the figures, simulated again from nothing but their own files, "
                    "came out the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
-from reports.pages.records import Finding, Topic
 from reports.runner import Runner
-from verification.finding import NOT_COMPUTED, Failure
+from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
 
 # id of the topic -> module of reports.evidence
 TOPICS: dict[str, str] = {
@@ -21,14 +20,14 @@ TOPICS: dict[str, str] = {
 }
 
 
-def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Topic:
+def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Compute one topic."""
-    topic: Topic = import_module(f"reports.evidence.{TOPICS[name]}").compute(runner, depth, progress)
+    topic: Finding = import_module(f"reports.evidence.{TOPICS[name]}").compute(runner, depth, progress)
     return topic
 
 
-def failed_topic(name: str, failure: Failure) -> Topic:
+def failed_topic(name: str, failure: Failure) -> Finding:
     """A topic in place of one that could not be computed: it says why."""
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
     title = name.replace("-", " ").capitalize()
-    return Topic(name, title, "", (Finding(sentence, NOT_COMPUTED),), verdict=sentence)
+    return finding_of(name, title, "", sentence, (Part(sentence, NOT_COMPUTED),))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from reports.pages.records import Evidence, Verdict
-from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, VERDICTS, WORST_FIRST, Failure
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, VERDICTS, Failure
 
 _ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
 
@@ -108,12 +108,8 @@ def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
 
 def _topics(evidence: Evidence) -> Iterator[Verdict]:
     for topic in evidence.topics:
-        if topic.verdict:
-            outcome = min((finding.outcome for finding in topic.findings), key=WORST_FIRST.index)
-            if topic.failures and outcome == REPRODUCED:
-                outcome = NOT_COMPUTED  # what failed never counts as holding
-            timed = any(finding.timed for finding in topic.findings)
-            yield Verdict(topic.title, outcome, topic.verdict, topic.id, timed)
+        if topic.answer:
+            yield Verdict(topic.title, topic.verdict, topic.answer, topic.key, topic.timed)
 
 
 # stage -> its sentences; stage -> title and section

@@ -14,11 +14,11 @@ from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
-from reports.pages.records import Claim, Evidence, Topic, Verdict
+from reports.pages.records import Claim, Evidence, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
 from reports.pages.verdicts import verdicts
-from verification.finding import REFUTED, VERDICTS, Table
+from verification.finding import REFUTED, VERDICTS, Finding, Table
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
@@ -50,7 +50,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
-    tables = {f"{topic.id}/{name}": table for topic in evidence.topics for name, table in topic.tables.items()}
+    tables = {f"{topic.key}/{name}": table for topic in evidence.topics for name, table in topic.tables.items()}
     return {**scenes, **tables, "energy_gains": evidence.bulk, **evidence.inputs}
 
 
@@ -66,19 +66,19 @@ def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, s
     return {name: figure.key for figure in drawn if figure.panels[0].film for name in figure.inputs}
 
 
-def badge_words(verdict: Verdict, topics: Sequence[Topic]) -> str:
+def badge_words(verdict: Verdict, topics: Sequence[Finding]) -> str:
     """Return what a verdict of the first page amounts to in words; of a topic's findings, how many fail."""
     if verdict.link == "claims":
         return verdict.outcome
-    findings = [finding for topic in topics if topic.id == verdict.link for finding in topic.findings]
-    failing = sum(finding.outcome == REFUTED for finding in findings)
-    return f"{failing} of {len(findings)} findings fail" if failing else FINDINGS[verdict.outcome]
+    parts = [part for topic in topics if topic.key == verdict.link for part in topic.parts]
+    failing = sum(part.verdict == REFUTED for part in parts)
+    return f"{failing} of {len(parts)} findings fail" if failing else FINDINGS[verdict.outcome]
 
 
-def tables_without(topic: Topic, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
+def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
     """Return the tables of a topic, with their names, that no figure was drawn from."""
     drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
-    return tuple((name, table) for name, table in topic.tables.items() if f"{topic.id}/{name}" not in drawn)
+    return tuple((name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn)
 
 
 def _environment() -> Environment:

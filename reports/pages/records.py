@@ -7,12 +7,12 @@ dollar signs. `outcome` is one of VERDICTS.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from reports.figures.figure import Figure
-from verification.finding import NOT_COMPUTED, Failure, Table, titled
+from verification.finding import Failure, Finding, Table
 from verification.proofs.statement import ProofRecord
 
 
@@ -118,50 +118,6 @@ class HardCase:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One sentence that a topic found, with its number, and what that means; `timed` if measured times are in it."""
-
-    sentence: str
-    outcome: str
-    timed: bool = False
-
-
-@dataclass(frozen=True)
-class Topic:
-    """A section of the report: what it asks, what it found, and the tables behind that.
-
-    lead : two or three sentences that say what is asked and how
-    tables : by name; a figure asks for one as "<id>/<name>", and those that none asks for are printed
-    verdict : the sentence of the first page, empty for none; its outcome is the worst of the findings
-    failures : the cases that raised; their rows are missing from the tables
-    """
-
-    id: str
-    title: str
-    lead: str
-    findings: tuple[Finding, ...]
-    tables: Mapping[str, Table] = field(default_factory=dict)
-    verdict: str = ""
-    failures: tuple[Failure, ...] = ()
-
-
-def with_failures(topic: Topic, failures: Sequence[Failure]) -> Topic:
-    """Return the topic with the cases that failed: a finding, a table with the reasons, and a word in its verdict."""
-    if not failures:
-        return topic
-    count = len(failures)
-    said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
-    sentence = f"{said} in no other number: {', '.join(failure.case for failure in failures)}."
-    rows = tuple((failure.case, failure.error, failure.reason) for failure in failures)
-    return replace(
-        topic, findings=(*topic.findings, Finding(sentence, NOT_COMPUTED)),
-        tables={**topic.tables, "not computed": titled(("case", "error", "reason"), rows)},
-        verdict=f"{topic.verdict} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
-        failures=(*topic.failures, *failures),
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
 class SceneEffect:
     """One effect of a scene: on or off, why, what it costs and what leaving it out would change.
 
@@ -222,7 +178,7 @@ class Evidence:
     hard_cases: tuple[HardCase, ...] = ()
     bulk: Table | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
-    topics: tuple[Topic, ...] = ()
+    topics: tuple[Finding, ...] = ()
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     manifest: tuple[StoredFile, ...] = ()

@@ -18,7 +18,7 @@ class Section:
     id: str
     title: str
     ready: Callable[[Evidence], bool]
-    topic: bool = False  # drawn from a Topic, by the template that all of them share
+    topic: bool = False  # drawn from a Finding, by the template that all of them share
     tables: tuple[str, ...] = ()
 
     @property
@@ -31,7 +31,7 @@ def _always(_: Evidence) -> bool:
 
 
 def _topic(id: str, title: str) -> Section:
-    return Section(id, title, lambda evidence: any(topic.id == id for topic in evidence.topics), True, (id,))
+    return Section(id, title, lambda evidence: any(topic.key == id for topic in evidence.topics), True, (id,))
 
 
 SECTIONS: tuple[Section, ...] = (

@@ -100,5 +100,5 @@ def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypat
     monkeypatch.setattr("verification.complementarity.study.compare", lambda *arguments, **options: study)
     monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: titled(("world",), ()))
     topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
-    assert len(topic.findings) >= 10 and {finding.outcome for finding in topic.findings} <= set(VERDICTS)
-    assert topic.verdict and "profile" in topic.tables and str(Path.home()) not in repr(topic)
+    assert len(topic.parts) >= 10 and {part.verdict for part in topic.parts} <= set(VERDICTS)
+    assert topic.answer and "profile" in topic.tables and str(Path.home()) not in repr(topic)

@@ -8,11 +8,11 @@ import pytest
 
 from reports.evidence import gather
 from reports.evidence.verdicts import verdicts
-from reports.pages.records import Evidence, Finding, Topic
+from reports.pages.records import Evidence
 from reports.runner import Runner
-from verification.finding import NOT_COMPUTED, failure_of
+from verification.finding import NOT_COMPUTED, Finding, Part, failure_of, finding_of
 
-COMPUTED = Topic("engines", "Other engines", "", (Finding("all well", "reproduced"),), verdict="all well")
+COMPUTED = finding_of("engines", "Other engines", "", "all well", (Part("all well", "reproduced"),))
 
 
 def kept(folder: Path) -> gather._Kept:
@@ -22,14 +22,14 @@ def kept(folder: Path) -> gather._Kept:
 def test_the_reason_is_said_and_the_next_time_it_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def compute(name: str, *rest: object) -> Topic:
+    def compute(name: str, *rest: object) -> Finding:
         raise RuntimeError("the disk went away\nand more")
 
     stages = kept(tmp_path)
     monkeypatch.setattr(gather, "compute_topic", compute)
     topic = gather._topic(stages, "engines", stages.runner, "quick")
-    assert topic.id == "engines" and [finding.outcome for finding in topic.findings] == [NOT_COMPUTED]
-    assert "RuntimeError: the disk went away" in topic.verdict and "and more" not in topic.verdict
+    assert topic.key == "engines" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
+    assert "RuntimeError: the disk went away" in topic.answer and "and more" not in topic.answer
     [failed] = stages.failed()
     assert failed.file == str(tmp_path / "tables" / "engines-failed.txt")
     assert "in compute" in Path(failed.file).read_text()
@@ -48,7 +48,7 @@ def test_the_first_page_says_so() -> None:
 
 
 def test_ctrl_c_is_no_failure_of_a_topic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def compute(name: str, *rest: object) -> Topic:
+    def compute(name: str, *rest: object) -> Finding:
         raise KeyboardInterrupt
 
     stages = kept(tmp_path)

@@ -11,7 +11,6 @@ import pytest
 
 from iapb import find_scene, load_scene
 from reports.evidence import engines, haptic_rate, scenes, stability
-from reports.pages.records import Topic
 from reports.runner import Runner
 from verification.cost import (
     against_mujoco,
@@ -27,6 +26,7 @@ from verification.cost import (
 )
 from verification.cost import haptic_rate as rate
 from verification.engines import study as engines_study
+from verification.finding import Finding
 from verification.stability import device_port, maps, peg, waveforms
 
 
@@ -41,11 +41,11 @@ def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[
     return call
 
 
-def lost(topic: Topic) -> list[str]:
+def lost(topic: Finding) -> list[str]:
     """The cases that failed, each of the planted fault; the topic says how many."""
     assert {failure.error for failure in topic.failures} == {"ZeroDivisionError"}
     count = len(topic.failures)
-    assert topic.verdict.endswith(f"{count} case{'s' if count > 1 else ''} failed.")
+    assert topic.answer.endswith(f"{count} case{'s' if count > 1 else ''} failed.")
     return [failure.case for failure in topic.failures]
 
 
@@ -72,7 +72,7 @@ def test_stability(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "walls at 1000 Hz, delay 0, device damping 5 N s/m", "peg at 512 Hz, K = 500 N/m, B = 50 N s/m",
         "waveform brake", "hand's port in PB, K = 1000 N/m, B = 0 N s/m, late sensors, the hand presses",
     ]  # fmt: skip
-    assert len(topic.findings) == 9
+    assert len(topic.parts) == 9
     assert len(topic.tables["maps"].rows) == 3 * 7 and len(topic.tables["peg"].rows) == 2
     assert len(topic.tables["hand port"].rows) == 2 * len(device_port.SENSORS) * 2 - 1
 
@@ -98,7 +98,7 @@ def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> N
     topic = scenes.compute(Runner(tmp_path), "quick", nothing)
     assert lost(topic) == [name]
     assert [row[0] for row in topic.tables["energy ledger"].rows] == [each for each in names if each != name]
-    assert len(topic.findings) == 8
+    assert len(topic.parts) == 8
 
 
 def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:

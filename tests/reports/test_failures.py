@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from reports.evidence.verdicts import verdicts
-from reports.pages.records import Evidence, Finding, Topic, with_failures
-from verification.finding import NOT_COMPUTED, REPRODUCED, Failure, attempt
+from reports.pages.records import Evidence
+from verification.finding import NOT_COMPUTED, REPRODUCED, Failure, Part, attempt, finding_of, with_failures
 
-TOPIC = Topic("engines", "Other engines", "", (Finding("all well", REPRODUCED),), verdict="All well.")
+TOPIC = finding_of("engines", "Other engines", "", "All well.", (Part("all well", REPRODUCED),))
 
 
 def test_a_topic_says_what_failed_and_no_longer_holds_as_a_whole() -> None:
@@ -17,8 +17,8 @@ def test_a_topic_says_what_failed_and_no_longer_holds_as_a_whole() -> None:
     assert topic.tables["not computed"].rows == (
         ("two discs", "ZeroDivisionError", "integer division or modulo by zero"),
     )
-    assert topic.verdict == "All well. 1 case failed." and topic.failures == tuple(failures)
-    assert topic.findings[-1].outcome == NOT_COMPUTED and "two discs" in topic.findings[-1].sentence
+    assert topic.answer == "All well. 1 case failed." and topic.failures == tuple(failures)
+    assert topic.parts[-1].verdict == NOT_COMPUTED and "two discs" in topic.parts[-1].sentence
     assert [verdict.outcome for verdict in verdicts(Evidence(topics=(topic,)))] == [NOT_COMPUTED]
 
 

@@ -68,8 +68,8 @@ def study() -> HapticStudy:
 
 def test_what_is_as_asked_for_is_said_to_be(study: HapticStudy) -> None:
     topic = topic_of(study)
-    assert {finding.outcome for finding in topic.findings} == {REPRODUCED}
-    assert "0.05 times MuJoCo's as box (8 contacts" in topic.findings[0].sentence
+    assert {part.verdict for part in topic.parts} == {REPRODUCED}
+    assert "0.05 times MuJoCo's as box (8 contacts" in topic.parts[0].sentence
     for table in topic.tables.values():
         assert all(len(row) == len(table.columns) for row in table.rows)
 
@@ -86,13 +86,13 @@ def test_what_is_as_asked_for_is_said_to_be(study: HapticStudy) -> None:
     ],
 )
 def test_a_miss_is_called_one(study: HapticStudy, change: dict[str, Any], words: str) -> None:
-    missed = [finding.sentence for finding in topic_of(replace(study, **change)).findings if finding.outcome == LIMITED]
+    missed = [part.sentence for part in topic_of(replace(study, **change)).parts if part.verdict == LIMITED]
     assert len(missed) == 1 and words in missed[0]
 
 
 def test_an_absent_engine_is_named(study: HapticStudy) -> None:
-    first = topic_of(replace(study, races=(), without_mujoco="mujoco is not installed")).findings[0]
-    assert first.outcome == NOT_COMPUTED and "not installed" in first.sentence
+    first = topic_of(replace(study, races=(), without_mujoco="mujoco is not installed")).parts[0]
+    assert first.verdict == NOT_COMPUTED and "not installed" in first.sentence
 
 
 def test_figures_draw_every_method_and_failure(study: HapticStudy) -> None:

@@ -57,7 +57,7 @@ def rolled(left: dict[float, int]) -> tuple[FalseCollisions, ...]:
 
 def test_robots_that_are_not_there_are_said_to_be_not_there(compared) -> None:
     found = [next(sentences.against_pinocchio(name, study)) for name, study in compared.items()]
-    assert [finding.outcome for finding in found] == [REPRODUCED] * 4 + [NOT_COMPUTED]
+    assert [finding.verdict for finding in found] == [REPRODUCED] * 4 + [NOT_COMPUTED]
     assert "not there" in found[-1].sentence
     assert len(pinocchio_table(compared).rows) == 4 * len(compared["joint kinds"].rows)
 
@@ -65,19 +65,19 @@ def test_robots_that_are_not_there_are_said_to_be_not_there(compared) -> None:
 def test_a_mechanism_that_differs_is_refuted(compared) -> None:
     kinds = compared["joint kinds"]
     wrong = replace(kinds, holds=(False,) * len(kinds.rows))
-    assert next(sentences.against_pinocchio("random trees", wrong)).outcome == REFUTED
+    assert next(sentences.against_pinocchio("random trees", wrong)).verdict == REFUTED
 
 
 def test_linked_impacts_are_refuted_where_momentum_is_lost_by_relative_rows(linked) -> None:
     said = (*sentences.linked(linked), *sentences.rows_decide(linked))
-    assert [finding.outcome for finding in said] == [REPRODUCED] * 3
+    assert [finding.verdict for finding in said] == [REPRODUCED] * 3
     spoilt = [replace(o, velocity=1.001 * o.velocity) if o.treatment != PER_BODY else o for o in linked]
-    assert next(sentences.linked(spoilt)).outcome == REFUTED
+    assert next(sentences.linked(spoilt)).verdict == REFUTED
 
 
 def test_per_body_rows_that_kept_momentum_would_refute_erratum_3(linked) -> None:
     kept = [replace(o, velocity=o.before) if o.treatment == PER_BODY else o for o in linked]
-    assert list(sentences.linked(kept))[1].outcome == REFUTED
+    assert list(sentences.linked(kept))[1].verdict == REFUTED
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_per_body_rows_that_kept_momentum_would_refute_erratum_3(linked) -> None
 )
 def test_false_collisions_are_judged_by_what_both_filters_leave(left, outcome) -> None:
     [finding] = sentences.false_collisions(rolled(left))
-    assert finding.outcome == outcome
+    assert finding.verdict == outcome
     assert ("comes back" in finding.sentence) == (outcome != REPRODUCED)
 
 
@@ -94,8 +94,8 @@ def test_work_that_grows_as_all_pairs_is_refuted() -> None:
     counts = (20, 50, 100, 200)
     linear = [StepCost(n, 1e-6 * n, 0.0, 0, n * n, n) for n in counts]
     pairs, time = sentences.many_bodies(linear)
-    assert (pairs.outcome, pairs.timed, time.timed) == (REPRODUCED, False, True)
-    assert next(sentences.many_bodies([replace(cost, tested=cost.pairs) for cost in linear])).outcome == REFUTED
+    assert (pairs.verdict, pairs.timed, time.timed) == (REPRODUCED, False, True)
+    assert next(sentences.many_bodies([replace(cost, tested=cost.pairs) for cost in linear])).verdict == REFUTED
 
 
 def test_every_figure_of_the_topic_is_drawn_from_its_tables(linked) -> None:

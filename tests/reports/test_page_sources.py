@@ -6,10 +6,10 @@ import pytest
 
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
-from reports.pages.records import Claim, Evidence, Finding, HardCase, StoredFile, Topic, Verdict
+from reports.pages.records import Claim, Evidence, HardCase, StoredFile, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import failures, verdicts
-from verification.finding import LIMITED, REFUTED, REPRODUCED, titled
+from verification.finding import LIMITED, REFUTED, REPRODUCED, Part, finding_of, titled
 
 RUNS = tuple(
     StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))
@@ -57,7 +57,8 @@ def test_every_section_of_numbers_names_a_table():
 def test_a_long_table_is_cut_and_says_where_the_rest_is():
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
     for shown, told in ((rows, True), (rows[:-1], False)):
-        page = build_page(Evidence(topics=(Topic("mechanics", "t", "l", (), {"trees": titled(("x",), shown)}),)), ())
+        topic = finding_of("mechanics", "t", "l", "", (), {"trees": titled(("x",), shown)})
+        page = build_page(Evidence(topics=(topic,)), ())
         assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} rows" in page) == told
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
@@ -82,6 +83,6 @@ def test_the_first_page_says_where_and_not_twice():
 
 
 def test_a_topic_with_failing_findings_counts_them():
-    topic = Topic("mechanics", "t", "l", (Finding("a", REPRODUCED), Finding("b", REFUTED)), {}, "v")
+    topic = finding_of("mechanics", "t", "l", "v", (Part("a", REPRODUCED), Part("b", REFUTED)))
     assert badge_words(Verdict("t", REFUTED, "v", "mechanics"), (topic,)) == "1 of 2 findings fail"
     assert badge_words(Verdict("t", LIMITED, "v", "proofs"), (topic,)) == "mixed"

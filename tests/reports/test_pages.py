@@ -22,18 +22,16 @@ from reports.pages.records import (
     Claim,
     CrossCheck,
     Evidence,
-    Finding,
     HardCase,
     Property,
     SceneEffect,
     StoredFile,
-    Topic,
     Verdict,
 )
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
-from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, titled
+from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, Part, finding_of, titled
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -85,8 +83,9 @@ def full() -> Evidence:
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
-        topics=(Topic("mechanics", "Linkages", "Asked <here>.", (Finding("It holds to 1e-14.", REPRODUCED),),
-                      {"trees": titled(("joints", "error"), ((3, 1e-14),))}, "All hold."),),
+        topics=(finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
+                           (Part("It holds to 1e-14.", REPRODUCED),),
+                           {"trees": titled(("joints", "error"), ((3, 1e-14),))}),),
         effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
@@ -215,8 +214,9 @@ def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Ev
 
 
 def test_a_topic_with_a_verdict_stands_on_the_first_page_with_the_worst_of_its_findings() -> None:
-    findings = (Finding("a", REPRODUCED), Finding("b", LIMITED))
-    topics = (Topic("mechanics", "Linkages", "", findings, {}, "Most hold."), Topic("scenes", "Scenes", "", findings))
+    parts = (Part("a", REPRODUCED), Part("b", LIMITED))
+    topics = (finding_of("mechanics", "Linkages", "", "Most hold.", parts),
+              finding_of("scenes", "Scenes", "", "", parts))
     assert first_page(Evidence(topics=topics)) == (Verdict("Linkages", LIMITED, "Most hold.", "mechanics"),)
 
 

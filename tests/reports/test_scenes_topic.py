@@ -18,8 +18,7 @@ from reports.evidence import scenes
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes_ledger, scenes_space
 from reports.figures.geometry import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
-from reports.pages.records import Topic
-from verification.finding import LIMITED, REFUTED, REPRODUCED
+from verification.finding import LIMITED, REFUTED, REPRODUCED, Finding
 from verification.scenes.open_books import OpenBooks
 from verification.scenes.scene_measures import SceneMeasure, measure
 
@@ -41,27 +40,27 @@ BOOKS = tuple(OpenBooks(name, (1, 2, 4), (0.04, 0.02, 0.01), 1, 1.0) for name in
 
 
 @pytest.fixture(scope="module")
-def topic(runs: tuple[Run, ...], measures: tuple[SceneMeasure, ...]) -> Topic:
+def topic(runs: tuple[Run, ...], measures: tuple[SceneMeasure, ...]) -> Finding:
     return scenes.topic_of(runs, measures, BOOKS)
 
 
-def test_sentences_say_the_numbers(topic: Topic, measures: tuple[SceneMeasure, ...]) -> None:
+def test_sentences_say_the_numbers(topic: Finding, measures: tuple[SceneMeasure, ...]) -> None:
     deepest = max(measures, key=lambda m: m.penetration)
-    assert f"{1e3 * deepest.penetration:.2f} mm ({deepest.scene})" in topic.findings[0].sentence
-    assert all(finding.sentence.endswith(".") for finding in topic.findings)
-    assert {finding.outcome for finding in topic.findings} <= {REPRODUCED, LIMITED}
-    assert "4 scenes, 3 of them in space" in topic.verdict
+    assert f"{1e3 * deepest.penetration:.2f} mm ({deepest.scene})" in topic.parts[0].sentence
+    assert all(part.sentence.endswith(".") for part in topic.parts)
+    assert {part.verdict for part in topic.parts} <= {REPRODUCED, LIMITED}
+    assert "4 scenes, 3 of them in space" in topic.answer
 
 
 def test_worse_records_are_judged_worse(runs: tuple[Run, ...], measures: tuple[SceneMeasure, ...]) -> None:
     gaining = replace(runs[0], impacts=replace(runs[0].impacts, energy_lost=-runs[0].impacts.energy_lost))
     stuck = tuple(replace(books, order=0.1) for books in BOOKS)
     broken = (replace(measures[0], complete=False, ending="stopped: a fault"), *measures[1:])
-    outcomes = [f.outcome for f in scenes.topic_of((gaining, *runs[1:]), broken, stuck).findings]
+    outcomes = [part.verdict for part in scenes.topic_of((gaining, *runs[1:]), broken, stuck).parts]
     assert outcomes[1] == REFUTED and outcomes[2] == LIMITED and outcomes[5] == REFUTED
 
 
-def test_strips_show_every_joule(topic: Topic, measures: tuple[SceneMeasure, ...]) -> None:
+def test_strips_show_every_joule(topic: Finding, measures: tuple[SceneMeasure, ...]) -> None:
     strips = scenes_ledger.strips(topic.tables["books over time"])
     for strip, found in zip(strips, measures, strict=True):
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
@@ -70,7 +69,7 @@ def test_strips_show_every_joule(topic: Topic, measures: tuple[SceneMeasure, ...
         assert not strip.at_rest
 
 
-def test_figures_are_drawn_and_can_stand_in_a_page(topic: Topic, runs: tuple[Run, ...]) -> None:
+def test_figures_are_drawn_and_can_stand_in_a_page(topic: Finding, runs: tuple[Run, ...]) -> None:
     inputs = {f"scene-ledger/{name}": table for name, table in topic.tables.items()}
     inputs |= {name: runs[NAMES.index(FIGURE_RUNS[name][0])] for name in scenes_space.RECIPE.needs}
     for recipe in (scenes_ledger.RECIPE, scenes_space.RECIPE):

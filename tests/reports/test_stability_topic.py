@@ -28,14 +28,14 @@ def test_every_loop_has_its_row() -> None:
 
 def test_the_sentence_says_what_is_needed() -> None:
     finding = _coupled(PORTS)
-    assert finding.outcome == LIMITED
+    assert finding.verdict == LIMITED
     assert "needs 0.9000" in finding.sentence and "up to 4 " in finding.sentence and "contact 2:" in finding.sentence
     assert "70 to 70 N s/m" in _coordinated(PORTS).sentence
 
 
 def test_a_leak_at_the_bound_refutes_it() -> None:
     leaking = replace(PORTS[0], needed=1.001 * LOOP.bound)
-    assert _coupled((leaking, *PORTS[1:])).outcome == REFUTED
+    assert _coupled((leaking, *PORTS[1:])).verdict == REFUTED
 
 
 def test_the_ratio_is_the_damping_over_the_bound() -> None:

@@ -19,9 +19,9 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.pages.records import Claim, CrossCheck, Evidence, Finding, Topic, Verdict
+from reports.pages.records import Claim, CrossCheck, Evidence, Verdict
 from reports.report import build_report
-from verification.finding import LIMITED, REPRODUCED, titled
+from verification.finding import LIMITED, REPRODUCED, Part, finding_of, titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
@@ -105,7 +105,8 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),
         claims=(Claim("C01", "energy never rises", "Theorem 1", LIMITED, "half: $\\frac{1}{2}$", numbers=table),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
-        topics=(Topic("scene-ledger", "The scenes", "Asked.", (Finding("It holds.", REPRODUCED),), {"wide": table}),),
+        topics=(finding_of("scene-ledger", "The scenes", "Asked.", "", (Part("It holds.", REPRODUCED),),
+                           {"wide": table}),),
         provenance={"commit": "0123456789abcdef" * 4},
     )
 
