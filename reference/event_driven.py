@@ -49,10 +49,6 @@ class LinearSystem:
         """Gaps (c,) [m]."""
         return self.rows @ q + self.start
 
-    def jacobian(self, _q: Floats) -> Floats:
-        """Contact rows (c, d), the same everywhere."""
-        return self.rows
-
 
 @dataclass(frozen=True)
 class ExactTrajectory:

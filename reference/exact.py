@@ -4,6 +4,11 @@ Every finite double is a rational number, so an impact given in doubles has an e
 v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal independent subset
 of the rows (33). The subset is found without rounding: redundant rows are decided, not estimated. Rows that
 are redundant only up to rounding *are* independent here; give fractions where exact redundancy is meant.
+
+For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error bound:
+2 (KE⁺ − KE⁻) = (v⁺ − v⁻)ᵀ M (v⁺ + v⁻), where the difference and the sum are exact double-doubles, so nothing cancels
+before it is known to 106 bits.
+Source: Dekker, Numerische Mathematik 18 (1971); Ogita, Rump, Oishi, SIAM J. Sci. Comput. 26 (2005).
 """
 
 from __future__ import annotations
@@ -12,6 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +29,11 @@ Rational = Any  # flint.fmpq_mat; named here because flint is imported only when
 _FIRST_BALL_BITS = 256  # working precision tried first; doubled until the ball is narrow
 _LAST_BALL_BITS = 1 << 14  # a ball still wide at this precision is given up, with an error
 _BALL_ACCURACY_BITS = 80  # narrow enough to round to the nearest double and to judge its last bit
+
+_SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
+_ROUNDING = 2.0**-100  # error of one double-double operation is below 2^-102; with room
+# Beyond these magnitudes the halves or the error terms leave the range of doubles; the caller goes exact then.
+_SMALLEST, _LARGEST = 1e-60, 1e60
 
 
 @dataclass(frozen=True)
@@ -95,7 +106,7 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
 def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
     """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded once; > 0 is a gain.
 
-    KE⁻ = 0 gives 0 when KE⁺ = 0 and infinity otherwise. For bulk see `reference.energy_gain`.
+    KE⁻ = 0 gives 0 when KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     before, after = (
@@ -229,3 +240,102 @@ def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
     """Return the nonzero eigenvalues, ascending, of a matrix known to have real eigenvalues >= 0."""
     roots = matrix.charpoly().complex_roots()
     return sorted(float(root.real.mid()) for root, _ in roots if not root.contains(0))
+
+
+def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> tuple[Floats, Floats]:
+    """Return (gain, bound), each (n,): (KE⁺ − KE⁻)/KE⁻ per impact and a bound of its error.
+
+    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). NaN, with bound infinity, where KE⁻ is not positive.
+    """
+    before = np.atleast_2d(np.asarray(v_minus, dtype=np.float64))
+    after = np.atleast_2d(np.asarray(v_plus, dtype=np.float64))
+    masses = np.asarray(mass_matrix, dtype=np.float64)
+    n, d = before.shape
+    if after.shape != before.shape:
+        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
+    if masses.shape not in ((d, d), (n, d, d)):
+        raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
+    _check_magnitudes(masses, before, after)
+    gain, bound = np.empty(n), np.empty(n)
+    _gains(np.ascontiguousarray(np.broadcast_to(masses, (n, d, d))), before, after, gain, bound)
+    return gain, bound
+
+
+def _check_magnitudes(masses: Floats, before: Floats, after: Floats) -> None:
+    for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
+        size = np.abs(array[array != 0.0])
+        if not np.isfinite(array).all() or (size.size and (size.max() > _LARGEST or size.min() < _SMALLEST)):
+            expected = f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
+            raise ArgumentError(argument, array, expected)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _two_sum(a, b):  # type: ignore[no-untyped-def]
+    """a + b as an exact pair (sum, error)."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _two_product(a, b):  # type: ignore[no-untyped-def]
+    """a b as an exact pair (product, error)."""
+    p = a * b
+    c = _SPLITTER * a
+    a1 = c - (c - a)
+    a2 = a - a1
+    c = _SPLITTER * b
+    b1 = c - (c - b)
+    b2 = b - b1
+    return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _add(ah, al, bh, bl):  # type: ignore[no-untyped-def]
+    """Double-double sum, the accurate variant (both low parts kept)."""
+    sh, sl = _two_sum(ah, bh)
+    th, tl = _two_sum(al, bl)
+    sh, sl = _two_sum(sh, sl + th)
+    return _two_sum(sh, sl + tl)
+
+
+@numba.njit(cache=True, fastmath=False)
+def _multiply(ah, al, bh, bl):  # type: ignore[no-untyped-def]
+    """Double-double product."""
+    ph, pl = _two_product(ah, bh)
+    return _two_sum(ph, pl + (ah * bl + al * bh))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _bilinear(mass, ah, al, bh, bl):  # type: ignore[no-untyped-def]
+    """Return aᵀ M b as a double-double, and the sum of |a_i M_ij b_j|, for double-double vectors a and b."""
+    high, low, size = 0.0, 0.0, 0.0
+    for i in range(len(ah)):
+        rh, rl = 0.0, 0.0
+        for j in range(len(bh)):
+            th, tl = _multiply(bh[j], bl[j], mass[i, j], 0.0)
+            rh, rl = _add(rh, rl, th, tl)
+            size += abs(ah[i] * th)
+        th, tl = _multiply(ah[i], al[i], rh, rl)
+        high, low = _add(high, low, th, tl)
+    return high, low, size
+
+
+@numba.njit(cache=True, fastmath=False)
+def _gains(masses, before, after, gain, bound):  # type: ignore[no-untyped-def]
+    """Write the relative gain and its bound for each impact."""
+    n, d = before.shape
+    difference, difference_low = np.empty(d), np.empty(d)
+    total, total_low, zero = np.empty(d), np.empty(d), np.zeros(d)
+    for k in range(n):
+        for i in range(d):
+            difference[i], difference_low[i] = _two_sum(after[k, i], -before[k, i])
+            total[i], total_low[i] = _two_sum(after[k, i], before[k, i])
+        change, _, size = _bilinear(masses[k], difference, difference_low, total, total_low)
+        energy, _, energy_size = _bilinear(masses[k], before[k], zero, before[k], zero)
+        if not energy > d * d * _ROUNDING * energy_size:
+            gain[k], bound[k] = np.nan, np.inf
+            continue
+        gain[k] = change / energy
+        rounding = 4.0 * abs(gain[k]) * 2.0**-53  # the final division and the dropped low parts
+        bound[k] = 2.0 * d * _ROUNDING * (size + abs(gain[k]) * energy_size) / energy + rounding

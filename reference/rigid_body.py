@@ -20,6 +20,9 @@ from iapb.mechanics.mechanism import Body, Mechanism
 
 Floats = NDArray[np.float64]
 
+# Step [s] of the differences of fourth order: truncation (h ω)⁴ω/480 and rounding stay below 1e-11 up to 10 rad/s.
+_RATE_STEP = 1e-3
+
 
 def _pinocchio() -> ModuleType:
     try:
@@ -128,6 +131,18 @@ class PinocchioMechanism:
     def difference(self, q0: Floats, q1: Floats) -> Floats:
         """The velocity (d,) that leads from q0 to q1 in unit time."""
         return np.array(_pinocchio().difference(self.model, q0, q1))
+
+    def normalize(self, q: Floats) -> Floats:
+        """Return q (nq,) with its quaternions and (cos, sin) scaled to length one."""
+        return np.array(_pinocchio().normalize(self.model, q))
+
+    def rate(self, q: Floats, v: Floats) -> Floats:
+        """dq/dt (nq,) of a motion with velocity v (d,) through q: v itself where coordinates may be added."""
+        if self.nq == self.nv:
+            return v
+        near, far = ((self.integrate(q, v, h) - self.integrate(q, v, -h)) / (2.0 * h)
+                     for h in (_RATE_STEP, 2.0 * _RATE_STEP))  # fmt: skip
+        return np.asarray((4.0 * near - far) / 3.0)
 
     def impulse_dynamics(self, q: Floats, v: Floats, contact_jacobian: Floats, restitution: float) -> Floats:
         """v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""

@@ -38,7 +38,6 @@ from iapb.scene.mechanism import one_restitution
 from iapb.system import System
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
-from reference.configurations import configuration_rate, of_length_one
 from reference.contact_rows import find_rows, identities, mechanics_of
 from reference.rigid_body import PinocchioMechanism, model_of
 from reference.rigid_step import nearest_velocity
@@ -163,7 +162,7 @@ class _Motion:
         """q, v, device q, device v of a state; q of length one where it turns."""
         nq, t = self.nq, self.tool.stop - self.tool.start if self.coupled else 0
         both = nq + self.d
-        q = of_length_one(self.system.mechanism, state[:nq])
+        q = self.mechanics.normalize(state[:nq])
         return q, state[nq:both], state[both : both + t], state[both + t :]
 
     def rows(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
@@ -224,7 +223,7 @@ class _Motion:
         q, v, device_q, device_v = self.split(state)
         acceleration, contact = self.acceleration(state)
         if self.device is None:
-            return np.concatenate([configuration_rate(self.mechanics, q, v), acceleration])
+            return np.concatenate([self.mechanics.rate(q, v), acceleration])
         force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
         force -= self.drag * device_v

@@ -1,7 +1,7 @@
 """Rigid contacts at velocity level, one QP per step: the law of the "ideal" world and of CBuc.
 
-The step itself is `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson), with dry friction
-`reference.rigid_friction`; here it becomes a contact law that runs on every scene.
+The step itself is in `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction);
+here it becomes a contact law that runs on every scene.
 """
 
 from __future__ import annotations
@@ -26,8 +26,14 @@ from reference.contact_rows import (
     write_impact,
 )
 from reference.one_thread import one_thread
-from reference.rigid_friction import FRICTION_LAWS, friction_step
-from reference.rigid_step import SCHEMES, nearest_velocity, rigid_step, velocity_bounds
+from reference.rigid_step import (
+    FRICTION_LAWS,
+    SCHEMES,
+    friction_step,
+    nearest_velocity,
+    rigid_step,
+    velocity_bounds,
+)
 
 __all__ = ["RigidConstraints", "nearest_velocity", "rigid_step", "velocity_bounds"]
 

@@ -14,7 +14,6 @@ Restitution that differs between bodies needs no world of its own: IAPB does as 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any, NamedTuple
 
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
@@ -25,6 +24,7 @@ from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import INTERRUPTED, simulate
 from iapb.system import coupling_of
+from reference.time_stepping import RigidConstraints
 
 
 class World(NamedTuple):
@@ -41,18 +41,12 @@ class World(NamedTuple):
         return coupling_of(scene, "none" if without else self.coupling)
 
 
-def _named(module: str, law: str) -> ContactLaw:
-    """A law with its defaults, imported when its world is asked for."""
-    made: ContactLaw = getattr(import_module(module), law)()
-    return made
-
-
 # name -> (how IAPB meets the device's limits) -> world; to add one: a line here
 WORLDS: dict[str, Callable[[str], World]] = {
-    "ideal": lambda rendering: World("ideal", _named("reference.time_stepping", "RigidConstraints"), "four-channel"),
+    "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
     "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
     "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
-    "CBuc": lambda rendering: World("CBuc", _named("reference.time_stepping", "RigidConstraints"), "unilateral"),
+    "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
     "IAPB-friction": lambda rendering: World(
         "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
     ),

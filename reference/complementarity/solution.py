@@ -1,4 +1,9 @@
-"""Solution: what a solver answered, judged by residuals recomputed from the problem alone."""
+"""Solution: what a solver answered, judged by residuals recomputed from the problem alone.
+
+A contact's block has 1 (normal), 2 or 3 components, normal first. Coulomb's cone with friction mu is
+K = {(n, t): |t| <= mu n}; its dual is K* = {(n, t): n >= mu |t|}. Without friction K = K* = {n >= 0}.
+Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008), section 3.9.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +13,26 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.complementarity.cones import (
-    de_saxce_shift,
-    distance_to_cone,
-    distance_to_dual_cone,
-    project_on_cone,
-)
 from reference.complementarity.problem import ImpactProblem
 
 Floats = NDArray[np.float64]
 
 # First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting ones 1e-12.
 SOLVED_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a solver's file hands back: impulse (n,) [N s] or None, and what the solver said.
+
+    refused : True when the solver does not take this kind of problem
+    seconds : [s] where the solver keeps its own time
+    """
+
+    impulse: Floats | None
+    note: str = ""
+    refused: bool = False
+    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -126,3 +139,34 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
         float(product.max()),
         float(np.abs(natural).max()),
     )
+
+
+def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
+    """Project each row of `blocks` (k, m) orthogonally on Coulomb's cone of `friction` (k,)."""
+    normal, tangent = blocks[:, 0], np.linalg.norm(blocks[:, 1:], axis=1)
+    inside = (normal >= 0.0) & (tangent <= friction * normal)
+    polar = ~inside & (friction * tangent <= -normal)
+    height = np.where(polar, 0.0, (normal + friction * tangent) / (1.0 + friction**2))
+    shrink = np.divide(friction * height, tangent, out=np.zeros_like(tangent), where=tangent > 0.0)
+    projected = np.column_stack([height, shrink[:, None] * blocks[:, 1:]])
+    return np.where(inside[:, None], blocks, projected)
+
+
+def distance_to_cone(blocks: Floats, friction: Floats) -> Floats:
+    """Distance (k,) of each row of `blocks` from Coulomb's cone."""
+    return np.linalg.norm(blocks - project_on_cone(blocks, friction), axis=1)
+
+
+def distance_to_dual_cone(blocks: Floats, friction: Floats) -> Floats:
+    """Distance (k,) of each row from the dual cone: by Moreau's decomposition |proj_K(-x)|."""
+    return np.linalg.norm(project_on_cone(-blocks, friction), axis=1)
+
+
+def de_saxce_shift(relative_velocity: Floats, friction: Floats) -> Floats:
+    """Return the velocity blocks with mu |u_T| added to the normal component (de Saxcé and Feng, 1998).
+
+    With this shift Coulomb's law reads K ∋ p ⟂ shifted velocity ∈ K*.
+    """
+    shifted = relative_velocity.copy()
+    shifted[:, 0] += friction * np.linalg.norm(relative_velocity[:, 1:], axis=1)
+    return shifted

@@ -6,8 +6,7 @@ from importlib import import_module
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from reference.simulators.fixed_scenes import FIXED_SCENES, fixed_scene
-from reference.simulators.scene import FixedScene
+from reference.simulators.scene import FIXED_SCENES, FixedScene, fixed_scene
 from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Trajectory
 

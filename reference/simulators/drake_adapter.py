@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import MissingDependencyError
-from reference.simulators.linear_spring import viscous_dissipation_for
 from reference.simulators.scene import Cuboid, FixedScene, RigidBody, Sphere
-from reference.simulators.simulator import Settings
+from reference.simulators.simulator import Settings, viscous_dissipation_for
 from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
 
 STEP = 1e-3  # [s] its default for discrete plants

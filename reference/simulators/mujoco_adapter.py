@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import IapbError, MissingDependencyError
-from reference.simulators.linear_spring import damping_for
 from reference.simulators.scene import Cuboid, FixedScene, RigidBody, Sphere, rotation
-from reference.simulators.simulator import Settings
+from reference.simulators.simulator import Settings, damping_for
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 NO_RESTITUTION = "no coefficient e: a spring and damper per contact, stiff enough to part impacts, stand in for it"

@@ -14,7 +14,7 @@ from iapb.errors import MissingDependencyError
 from iapb.system import System
 from reference.contact_rows import find_rows
 from reference.rigid_body import model_of
-from reference.simulators.own_scene import own_scene, world_state
+from reference.simulators.own_engines import own_scene, world_state
 from reference.simulators.scene import FixedScene, Floats
 from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples

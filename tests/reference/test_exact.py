@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError
-from reference.energy_gain import bulk_energy_gain
 from reference.exact import (
     ball_impact,
+    bulk_energy_gain,
     condition_number,
     exact_impact,
     independent_rows,

@@ -8,8 +8,8 @@ import pytest
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
-from reference import rigid_friction
-from reference.rigid_friction import friction_step
+from reference import rigid_step
+from reference.rigid_step import friction_step
 from reference.time_stepping import RigidConstraints
 
 SCENES = (
@@ -112,8 +112,8 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
 
 
 def test_a_step_without_solution_says_how_many_contacts_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rigid_friction, "FRICTION_TOLERANCE", -1.0)
-    monkeypatch.setattr(rigid_friction, "CONVERGED", -1.0)
+    monkeypatch.setattr(rigid_step, "FRICTION_TOLERANCE", -1.0)
+    monkeypatch.setattr(rigid_step, "CONVERGED", -1.0)
     with pytest.raises(SolverError, match="1 contacts.*nsgs.*cvxpy_socp"):
         friction_step(np.eye(2), np.array([0.3, -1.0]), np.eye(2)[1:], np.eye(2)[None, :1], np.zeros(1), 0.5)
 

@@ -9,8 +9,8 @@ from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
-from reference.configurations import configuration_rate, of_length_one
 from reference.event_driven import LinearSystem, event_driven
+from reference.rigid_body import model_of
 from reference.scene_events import scene_truth
 
 G = 9.81
@@ -106,7 +106,7 @@ def test_a_tumbling_body_keeps_energy_and_angular_momentum() -> None:
     scene = load_scene(find_scene("tumbling_body"))
     q, v = scene_truth(scene, 0.5).state(np.linspace(0.0, 0.5, 6))
     inertia, mechanism = np.diag([1e-3, 2e-3, 2.8e-3]), System(scene).mechanism
-    axes = [mechanism.placements(of_length_one(mechanism, x))[0][0] for x in q]
+    axes = [mechanism.placements(model_of(mechanism).normalize(x))[0][0] for x in q]
     momentum = [turn @ inertia @ w[3:] for turn, w in zip(axes, v, strict=True)]
     assert np.ptp(momentum, axis=0) == pytest.approx(0.0, abs=1e-9 * 2e-3 * 6.0 * 10.0)
     energy = [w[3:] @ inertia @ w[3:] for w in v]
@@ -119,8 +119,8 @@ def test_the_rate_of_a_quaternion_is_half_its_product_with_the_turning() -> None
         Body("wheel", None, Joint("continuous"), mass=1.0, inertia=inertia),
         Body("free", None, Joint("free_flyer"), mass=1.0, inertia=inertia),
     ])  # fmt: skip
-    q, v = of_length_one(mechanism, rng.normal(size=9)), rng.normal(size=7)
-    rate = configuration_rate(mechanism, q, v)
+    q, v = model_of(mechanism).normalize(rng.normal(size=9)), rng.normal(size=7)
+    rate = model_of(mechanism).rate(q, v)
     assert rate[:2] == pytest.approx(v[0] * np.array([-q[1], q[0]]), abs=1e-10)
     u, w, omega = q[5:8], q[8], v[4:]
     assert rate[5:8] == pytest.approx(0.5 * (w * omega + np.cross(u, omega)), abs=1e-10)

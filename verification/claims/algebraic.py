@@ -45,7 +45,7 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
 
 def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) -> Floats:
     """Relative energy gain of each impact, in double-double arithmetic, plus the bound of its error."""
-    from reference.energy_gain import bulk_energy_gain
+    from reference.exact import bulk_energy_gain
 
     masses = np.stack([instance.mass_matrix for instance in instances])
     before = np.stack([instance.velocity for instance in instances])

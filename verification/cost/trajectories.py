@@ -25,9 +25,8 @@ from iapb.simulation import Simulation
 from reference.one_thread import one_thread
 from reference.scene_events import scene_truth
 from reference.simulators import FixedScene, Settings, Trajectory, find_simulator, fixed_scene
-from reference.simulators.fixed_scenes import FLOOR, RADIUS, WEIGHT
-from reference.simulators.own_scene import own_scene, world_state
-from reference.simulators.scene import Cuboid, Obstacle, RigidBody, Sphere, rotation
+from reference.simulators.own_engines import own_scene, world_state
+from reference.simulators.scene import FLOOR, RADIUS, WEIGHT, Cuboid, Obstacle, RigidBody, Sphere, rotation
 from reference.simulators.trajectory import steps_between_samples
 from verification.finding import Failure, attempt
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.energy_gain import bulk_energy_gain
+from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
 
 Floats = NDArray[Any]

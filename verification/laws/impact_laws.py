@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.energy_gain import bulk_energy_gain
+from reference.exact import bulk_energy_gain
 from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import EPS, Bounds, LawResidual
 from verification.laws.resolver import Resolver, outcome, own_answer, own_outcome

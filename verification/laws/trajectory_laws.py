@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from iapb.run import Run
-from reference.energy_gain import bulk_energy_gain
-from reference.exact import relative_energy_gain
+from reference.exact import bulk_energy_gain, relative_energy_gain
 from verification.laws.bounds import FACTORED, LawResidual
 
 # A run to be judged from its arrays and its scene text alone, so that a stored run will do as well as a fresh one.

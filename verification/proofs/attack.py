@@ -106,7 +106,7 @@ def attack(
 
 def _judge(batch: Impacts, v_plus: Floats) -> tuple[Floats, Floats]:
     """Relative gains, with their own error taken off, and κ(M) of each mass matrix as rounded."""
-    from reference.energy_gain import bulk_energy_gain
+    from reference.exact import bulk_energy_gain
 
     gains, error = bulk_energy_gain(batch.mass_matrix, batch.velocity, v_plus)
     spectra = np.linalg.eigvalsh(batch.mass_matrix)

@@ -15,8 +15,7 @@ import numpy as np
 from iapb.errors import ArgumentError, MissingDependencyError, SolverError
 from iapb.names import one_of
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import Solution
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, Solution
 
 
 @dataclass(frozen=True)

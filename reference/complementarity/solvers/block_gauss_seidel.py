@@ -13,8 +13,7 @@ import numba
 import numpy as np
 
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 _SWEEPS = 20_000
 _INNER = (

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 # Accuracy asked for, on a problem scaled to unit W and b; defaults stop at 1e-4 to 1e-6. Clarabel below 1e-11
 # walks along the unbounded set of impulses of opposed contacts (p to 6e9, residual back up to 4e-6).

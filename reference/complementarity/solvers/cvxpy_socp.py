@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 Floats = NDArray[np.float64]
 

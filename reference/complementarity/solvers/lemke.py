@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 _ACCURACY = 1e-12  # asked for at unit W and b
 _ITERATIONS = 20_000

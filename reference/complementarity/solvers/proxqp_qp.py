@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 _ACCURACY = 1e-10  # asked for, relative to a problem scaled to unit W and b; what is reached is measured
 

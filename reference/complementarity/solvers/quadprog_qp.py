@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer
 
 Floats = NDArray[np.float64]
 

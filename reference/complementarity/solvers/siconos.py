@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError, SolverError
 from reference.complementarity.problem import ImpactProblem
-from reference.complementarity.solution import velocity_scale
-from reference.complementarity.solvers.answer import Answer
+from reference.complementarity.solution import Answer, velocity_scale
 
 Floats = NDArray[np.float64]
 

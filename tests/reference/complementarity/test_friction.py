@@ -9,7 +9,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
-from reference.complementarity.cones import (
+from reference.complementarity.solution import (
     distance_to_cone,
     distance_to_dual_cone,
     project_on_cone,

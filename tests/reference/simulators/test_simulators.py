@@ -10,8 +10,8 @@ import pytest
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
-from reference.simulators.fixed_scenes import after_all_collisions
-from reference.simulators.linear_spring import damping_for, spring_restitution, viscous_dissipation_for
+from reference.simulators.scene import after_all_collisions
+from reference.simulators.simulator import damping_for, spring_restitution, viscous_dissipation_for
 from reference.simulators.trajectory import Trajectory, deepest_overlap
 
 ROUNDING = 1e-10  # of some hundred steps, and the 1e-12 by which Pinocchio's Delassus matrix is damped
