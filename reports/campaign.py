@@ -19,6 +19,7 @@ import numpy as np
 
 from reports.batches import do_missing, here, processes
 from reports.counterexamples import CampaignRequest, keep_counterexample
+from reports.store.io import mark_store
 from reports.store.tables import Column, Table, read_table, write_table
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import Batch, BatchOutcome, do_batch
@@ -35,7 +36,7 @@ class Campaign:
 
     def __init__(self, out: Path, request: CampaignRequest) -> None:
         self.request, self.folder = request, out / request.key()
-        self.folder.mkdir(parents=True, exist_ok=True)
+        mark_store(self.folder)
 
     def path_of(self, batch: Batch) -> Path:
         """The file of a batch; its size is in the name, for the last one of a part may be short."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -16,12 +17,14 @@ from reports.provenance import linear_algebra
 from reports.resimulate import repeat_run
 from reports.store.care import (
     DAMAGED,
+    FOREIGN,
     WHOLE,
     FileState,
     check_store,
     collect_garbage,
     garbage,
     is_run,
+    mark_stores,
     repair_store,
 )
 from reports.store.runs import read_provenance
@@ -33,39 +36,51 @@ class Action(StrEnum):
     repair = "repair"
     gc = "gc"
     again = "again"
+    mark = "mark"
 
 
-_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: remove "
-           "what nothing needs. again: simulate runs again and compare bit for bit.")
+_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: list what "
+           "nothing needs; remove it with --delete. again: simulate runs again and compare bit for bit. mark: say of "
+           "folders with results of an older version that they are stores.")
 
 
 def store(
     action: Annotated[Action, typer.Argument(help=_ACTION)],
     where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (check, again).")] = Path("out"),
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="gc: only say what would be removed.")] = False,
+    delete: Annotated[bool, typer.Option("--delete", help="gc: remove what it lists.")] = False,
 ) -> None:
-    """Look after the run and table files below a folder."""
+    """Look after the run and table files below a folder.
+
+    repair and gc act in marked stores only, and there on files of iapb only.
+    """
     if not where.exists():
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
-    if where.is_file() and action in (Action.repair, Action.gc):
+    if where.is_file() and action in (Action.repair, Action.gc, Action.mark):
         raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")
-    {Action.check: _check, Action.repair: _repair, Action.gc: _gc, Action.again: _again}[action](where, dry_run)
+    if delete and action is not Action.gc:
+        raise typer.BadParameter("is for gc", param_hint="--delete")
+    if action is Action.gc:
+        _gc(where, delete)
+    else:
+        {Action.check: _check, Action.repair: _repair, Action.again: _again, Action.mark: _mark}[action](where)
 
 
-def _check(where: Path, _: bool) -> None:
+def _check(where: Path) -> None:
     with stage_progress() as progress:
-        states = check_store(where, lambda done, total: progress("files read whole", done, total))
+        states = check_store(where, partial(progress, "files read whole"))
     _tell(states)
+    if where.is_file() and states[0].state == FOREIGN:
+        raise typer.Exit(1)
     if any(state.state == DAMAGED for state in states):
         print(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
         raise typer.Exit(1)
 
 
-def _repair(where: Path, _: bool) -> None:
+def _repair(where: Path) -> None:
     with stage_progress() as progress:
-        states = repair_store(where, lambda done, total: progress("files read whole", done, total))
+        states = repair_store(where, partial(progress, "files read whole"))
     _tell(states)
-    aside = sum(state.state == DAMAGED for state in states)
+    aside = sum(not state.path.exists() for state in states)
     print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
 
 
@@ -78,18 +93,25 @@ def _tell(states: Sequence[FileState]) -> None:
     print(f"{len(states)} files: {parts or 'none'}")
 
 
-def _gc(where: Path, dry_run: bool) -> None:
+def _gc(where: Path, delete: bool) -> None:
     found = garbage(where)
     size = sum(state.size for state in found) / 1e6
     for state in found:
         print(f"{state.path}: {state.state}: {state.why}")
-    if not dry_run:
-        collect_garbage(where)
-    print(f"{len(found)} files, {size:.1f} MB, {'would be removed' if dry_run else 'removed'}; results of the present "
-          "code are kept.")
+    if delete:
+        collect_garbage(found)
+    print(f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of "
+          "the present code, of your own code and all foreign files are kept.")
 
 
-def _again(where: Path, _: bool) -> None:
+def _mark(where: Path) -> None:
+    found = mark_stores(where)
+    for folder in found:
+        print(f"{folder}: marked as a store")
+    print(f"{len(found)} folders marked." if found else "No folder with whole results that is not marked yet.")
+
+
+def _again(where: Path) -> None:
     files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
     same = 0
     with stage_progress() as progress:

@@ -17,6 +17,7 @@ import numpy as np
 from reports.evidence.tables import numbers_tables
 from reports.provenance import collect_provenance
 from reports.runner import Runner
+from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
 from reports.store.tables import Column, Table, read_tables, write_tables
 from reports.uses import UsedRun, add_use
@@ -72,7 +73,7 @@ class Stage:
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        mark_store(self.path.parent)
         runs = (self._runs_table(),) if self.runs else ()
         write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs),
                      collect_provenance() | {SOURCES: evidence_version()})

@@ -1,29 +1,37 @@
-"""Care of a folder of results: which files are whole, which can be trusted, which nothing needs any more.
+"""Care of stores: which files are whole, which can be trusted, which nothing needs any more.
 
-Nothing is lost in silence: a damaged file is set aside under another name, so that it is computed again; what `gc`
-removes can be computed again from its inputs, and only files that no present code would ask for are.
+Only what lies in a marked store (`reports.store.io.mark_store`) is ever renamed or removed, and of that only files of
+ours: whatever has no seal of iapb and says nowhere that it is a run or a table of iapb is left alone. A damaged file is
+set aside under another name, so that it is computed again; what `gc` removes can be computed again from its inputs.
 """
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from iapb.errors import RunFileError
+from iapb.errors import ArgumentError, RunFileError
 from reports.store.folder import INDEX_NAME, PARTIAL_SUFFIX, read_index
-from reports.store.io import WRITING, opened
-from reports.store.keys import SOURCES, evidence_version, run_key
-from reports.store.runs import read_entry, read_provenance, read_run
-from reports.store.schema import FORMAT
+from reports.store.io import (
+    MARK_NAME,
+    WRITING,
+    abandoned,
+    is_aside,
+    is_old,
+    is_ours,
+    is_store,
+    mark_store,
+    opened,
+)
+from reports.store.keys import SOURCES, evidence_version, is_older_engine
+from reports.store.runs import read_provenance, read_run
+from reports.store.schema import FORMAT, TABLE_FORMAT
 
 Progress = Callable[[int, int], None]
 
 DAMAGED_SUFFIX = ".damaged"
-_AS_JSON = ("scene", "law settings", "coupling settings")
 WHOLE, DAMAGED, PARTIAL, FOREIGN, STALE, LEFTOVER = "whole", "damaged", "partial", "foreign", "stale", "leftover"
 
 
@@ -42,7 +50,7 @@ class FileState:
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Read every result file below a folder (or this file) whole, seals and content hashes included; change nothing.
+    """Read every result file below a folder, marked or not (or this file) whole, seals and hashes included.
 
     `progress` is called as progress(files read, files in all).
     """
@@ -63,8 +71,10 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _state(path: Path) -> FileState:
-    if path.name.endswith(WRITING):
-        return FileState(path, LEFTOVER, "a writer was stopped before it was done")
+    if is_aside(path):
+        return FileState(path, LEFTOVER, "not whole yet: a writer is at work, or was stopped before it was done")
+    if path.name.endswith(WRITING) or not is_ours(path):
+        return FileState(path, FOREIGN, "no file of iapb: no seal, and nothing that says so")
     if path.name.endswith(DAMAGED_SUFFIX):
         return FileState(path, LEFTOVER, "set aside as damaged")
     try:
@@ -74,8 +84,7 @@ def _state(path: Path) -> FileState:
             run = read_run(path)
             if path.name.endswith(PARTIAL_SUFFIX) or not run.complete:
                 return FileState(path, PARTIAL, f"{run.steps} steps are readable; {run.stopped}")
-            return FileState(path, WHOLE)
-        if not kind.startswith("iapb"):
+        elif kind != TABLE_FORMAT:
             return FileState(path, FOREIGN, "an HDF5 file of somebody else's")
         return FileState(path, WHOLE)
     except RunFileError as error:
@@ -83,82 +92,97 @@ def _state(path: Path) -> FileState:
 
 
 def is_run(path: Path) -> bool:
-    """Whether a file is a run or damaged; a table or somebody else's file is not."""
+    """Whether a file is a run, or a damaged file of ours; a table or somebody else's file is not."""
     try:
         with opened(path, expected_format=None) as file:
             return file.attrs.get("format") == FORMAT
     except RunFileError:
-        return True
+        return is_ours(path)
+
+
+def stores_below(folder: Path | str) -> tuple[Path, ...]:
+    """Return the marked stores at and below a folder.
+
+    Raises
+    ------
+    ArgumentError
+        There is none.
+    """
+    found = tuple(mark.parent for mark in sorted(Path(folder).rglob(MARK_NAME)) if is_store(mark.parent))
+    if not found:
+        expected = f"a store of iapb ({MARK_NAME}) or a folder of stores; iapb store mark marks those of older versions"
+        raise ArgumentError("where", str(folder), expected)
+    return found
+
+
+def mark_stores(folder: Path | str) -> tuple[Path, ...]:
+    """Mark every folder, this one and those below, that has a whole run or table of ours; return those marked now."""
+    new: list[Path] = []
+    for path in _files(Path(folder)):
+        if not (path.is_symlink() or is_store(path.parent)) and _is_whole(path):
+            mark_store(path.parent)
+            new.append(path.parent)
+    return tuple(new)
+
+
+def _is_whole(path: Path) -> bool:
+    return path.is_file() and is_ours(path) and _state(path).state == WHOLE
 
 
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Set damaged files aside and write the index anew; return the state of every file before that.
+    """Set damaged files aside and write the index anew, in stores; return the state of every file before that.
 
     A file that was set aside is computed again when it is next asked for.
     """
+    stores = stores_below(folder)
     states = check_store(folder, progress)
     for state in states:
-        if state.state == DAMAGED:
+        if state.state == DAMAGED and state.path.parent in stores and not state.path.is_symlink():
             os.replace(state.path, state.path.with_name(state.path.name + DAMAGED_SUFFIX))
-    for index in Path(folder).rglob(INDEX_NAME):
-        index.unlink()  # lines about files that changed would be believed
-        read_index(index.parent)
+    for store in stores:
+        if (store / INDEX_NAME).is_file():
+            (store / INDEX_NAME).unlink()  # lines about files that changed would be believed
+            read_index(store)
     return states
 
 
 def garbage(folder: Path | str) -> tuple[FileState, ...]:
-    """Return the files that nothing needs: leftovers, partial runs that were finished, results of older code."""
-    return tuple(_garbage(Path(folder)))
+    """Return the files of stores that nothing needs: leftovers, partial runs that were finished, results of older code.
+
+    Results of somebody's own code (`RunStore(folder, code=…)`), of versions that did not say their code, and what is
+    young enough for a writer to be at work on are none.
+    """
+    return tuple(state for store in stores_below(folder) for state in _garbage(store))
 
 
-def _garbage(folder: Path) -> Iterator[FileState]:
-    for path in _files(folder):
-        if path.name.endswith((WRITING, DAMAGED_SUFFIX)):
+def _garbage(store: Path) -> Iterator[FileState]:
+    for path in abandoned(store):
+        yield FileState(path, LEFTOVER, "a writer was stopped before it was done")
+    for path in _files(store):
+        if path.parent != store or path.is_symlink() or path.name.endswith(WRITING) or not is_ours(path):
+            continue
+        if path.name.endswith(DAMAGED_SUFFIX):
             yield _state(path)
         elif path.name.endswith(PARTIAL_SUFFIX):
-            if path.with_name(path.name.removesuffix(PARTIAL_SUFFIX)).is_file():
+            if is_old(path) and _is_whole(path.with_name(path.name.removesuffix(PARTIAL_SUFFIX))):
                 yield FileState(path, PARTIAL, "the finished run is there")
-        elif path.parent.name == "tables":
-            if not _is_present_table(path):
-                yield FileState(path, STALE, "a table of older code")
-        elif _is_stale_run(path):
-            yield FileState(path, STALE, "a run of older code")
+        elif kind := _stale(path):
+            yield FileState(path, STALE, f"a {kind} of older code")
 
 
-def _is_stale_run(path: Path) -> bool:
-    """Whether the code would now store this run under another key; a file that is no run is left alone."""
+def _stale(path: Path) -> str:
+    """Whether older code of ours made a file, as "run" or "table"; "" for any other, a damaged one too."""
     try:
-        stored = read_entry(path).run_key
-        inputs = _inputs(path)
+        with opened(path, expected_format=None) as file:
+            kind, code = file.attrs.get("format"), str(file.attrs.get("code", ""))
+        if kind == FORMAT:
+            return "run" if is_older_engine(code) else ""
+        return "table" if read_provenance(path).get(SOURCES, evidence_version()) != evidence_version() else ""
     except RunFileError:
-        return False
-    words = inputs["world"].split()  # the label of a run may add the rendering to the name of its world
-    worlds = [" ".join(words[:count]) for count in range(1, len(words) + 1)]
-    return bool(stored) and all(stored != run_key({**inputs, "world": world}) for world in worlds)
+        return ""
 
 
-def _inputs(path: Path) -> dict[str, Any]:
-    """What determined a run, as its runner gave it to the key."""
-    names = {"scene": "scene/resolved", "law": "law/name", "law settings": "law/settings", "coupling": "coupling/name",
-             "coupling settings": "coupling/settings", "world": "law/world"}  # fmt: skip
-    with opened(path) as file:
-        texts = {name: str(file[place].asstr()[()]) for name, place in names.items()}
-    return {name: json.loads(text) if name in _AS_JSON else text for name, text in texts.items()}
-
-
-def _is_present_table(path: Path) -> bool:
-    """Whether the present code made this table."""
-    try:
-        return read_provenance(path).get(SOURCES) == evidence_version()
-    except RunFileError:
-        return False
-
-
-def collect_garbage(folder: Path | str) -> tuple[FileState, ...]:
-    """Remove what `garbage` lists; return it, sizes as they were taken before."""
-    found = garbage(folder)
+def collect_garbage(found: Iterable[FileState]) -> None:
+    """Remove what `garbage` has found."""
     for state in found:
-        state.path.unlink()
-    for index in Path(folder).rglob(INDEX_NAME):
-        read_index(index.parent)
-    return found
+        state.path.unlink(missing_ok=True)

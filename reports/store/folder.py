@@ -24,8 +24,8 @@ from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import append_line, read_lines, remove_abandoned, written_aside
-from reports.store.keys import run_key
+from reports.store.io import abandoned, append_line, mark_store, read_lines, written_aside
+from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
 PARTIAL_SUFFIX = ".partial"
@@ -100,7 +100,8 @@ class RunStore:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
-        remove_abandoned(self.folder)
+        for path in abandoned(self.folder):
+            path.unlink(missing_ok=True)
 
     def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
         """Return the key of `inputs`, and the file that their run has or will have.
@@ -163,6 +164,7 @@ class RunStore:
         stored = self._read(place)
         if stored is not None:
             return stored
+        mark_store(self.folder)
         run = compute(Checkpoint(place.partial, place.key))
         if not isinstance(run, Run):
             raise ArgumentError("compute", run, "a function that returns a Run")
@@ -175,11 +177,12 @@ class RunStore:
         if not run.complete:
             raise ArgumentError("run.complete", run.complete, "True: unfinished runs are kept by Checkpoint")
         place = self.place_of(inputs, label)
+        mark_store(self.folder)
         self._keep(place, run)
         return place.path
 
     def _keep(self, place: Place, run: Run) -> RunEntry:
-        entry = store_run(place.path, run, key=place.key)
+        entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
         place.partial.unlink(missing_ok=True)
         append_line(self.folder / INDEX_NAME, asdict(entry))
         return entry

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -20,15 +21,23 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
-from reports.store.schema import FORMAT, FORMAT_VERSION
+from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
+MARK_NAME = "iapb-store.json"
+_STORE: dict[str, Any] = {
+    "format": "iapb store", "format_version": 1,
+    "note": "iapb store gc and repair act on the sealed files of iapb in this folder, and on nothing else",
+}  # fmt: skip
 WRITING = ".writing"  # ends the name of a file that is not yet whole
+_ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|index\.jsonl|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
 # A write takes seconds; what is older than this was left by a writer that was killed.
 _ABANDONED_AFTER_SECONDS = 3600.0
 
 _MARK = b"\niapb sha256 "
 _LENGTH = len(_MARK) + 64 + 1  # the mark, 64 hexadecimal digits, a newline
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_FORMATS = (FORMAT.encode(), TABLE_FORMAT.encode())
+_HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
@@ -76,12 +85,48 @@ def _move_if_absent(aside: Path, target: Path) -> None:
             os.rename(aside, target)
 
 
-def remove_abandoned(folder: Path) -> None:
-    """Remove what killed writers left in `folder`; files of writers still at work are younger."""
-    for path in folder.glob(f".*{WRITING}"):
-        with suppress(FileNotFoundError):
-            if time.time() - path.stat().st_mtime > _ABANDONED_AFTER_SECONDS:
-                path.unlink()
+def mark_store(folder: Path) -> None:
+    """Make a folder, if it is not there, and say in it that it is a store: only there is a file ever removed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if not is_store(folder):
+        with written_aside(folder / MARK_NAME, replace=False) as aside:
+            aside.write_text(json.dumps(_STORE) + "\n", encoding="utf-8")
+
+
+def is_store(folder: Path) -> bool:
+    """Whether a folder is marked as a store of a format that this version knows."""
+    try:
+        mark = json.loads((folder / MARK_NAME).read_text(encoding="utf-8"))
+        return bool(mark["format"] == _STORE["format"] and mark["format_version"] <= _STORE["format_version"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+
+
+def is_old(path: Path) -> bool:
+    """Whether a file is older than any writer takes; False where it is gone."""
+    with suppress(FileNotFoundError):
+        return time.time() - path.stat().st_mtime > _ABANDONED_AFTER_SECONDS
+    return False
+
+
+def abandoned(folder: Path) -> list[Path]:
+    """Return what killed writers left in a store, by the names that writers give; files still written are younger."""
+    found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
+    return [path for path in found if is_aside(path) and not path.is_symlink() and is_old(path)]
+
+
+def is_aside(path: Path) -> bool:
+    """Whether a file has the name that our writers give to one that is not yet whole."""
+    return _ASIDE.fullmatch(path.name) is not None
+
+
+def is_ours(path: Path) -> bool:
+    """Whether a file is a run or a table of iapb, whole or damaged: it ends in a seal, or its HDF5 header says so."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+        file.seek(max(path.stat().st_size - _LENGTH, 0))
+        end = file.read()
+    return end.startswith(_MARK) or (head.startswith(_HDF5_SIGNATURE) and any(name in head for name in _FORMATS))
 
 
 def sealed(content: bytes) -> bytes:

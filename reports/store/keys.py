@@ -24,6 +24,7 @@ from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # What can change a number in a run: the engine, the reference worlds, and the numeric packages under them.
 _SOURCES = ("iapb", "reference")
+_ENGINE = "iapb"
 SOURCES = "sources"  # entry of a table's provenance: the `evidence_version` that made it
 _ROOT = Path(__file__).resolve().parents[2]
 _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
@@ -119,6 +120,16 @@ def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
         Version of the code; the engine's by default. Give your own to cover a law of your own.
     """
     return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
+
+
+def code_label(code: str | None = None) -> str:
+    """Return what a run file says of its code: the engine's version, or the label that its store was given."""
+    return f"{_ENGINE} {code_version()}" if code is None else code
+
+
+def is_older_engine(label: str) -> bool:
+    """Whether a run file's code is the engine's, in another version; never for a label of somebody's own."""
+    return label.startswith(f"{_ENGINE} ") and label != code_label()
 
 
 def add_array(digest: Any, name: str, array: Any) -> None:

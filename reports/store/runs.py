@@ -81,14 +81,15 @@ def store_run(
     run: Run,
     *,
     key: str,
+    code: str = "",
     provenance: Mapping[str, str] | None = None,
     replace: bool = False,
     more: Callable[[Any], None] | None = None,
 ) -> RunEntry:
-    """Write one run as `write_run` does; return what the new file says of itself."""
+    """Write one run as `write_run` does, with the label of its code; return what the new file says of itself."""
     path = Path(path)
     with new_file(path, replace=replace) as file:
-        _write_head(file, run, key)
+        _write_head(file, run, key, code)
         for group, name, attribute in TEXTS:
             value = getattr(run, attribute)
             write_text(file.require_group(group), name, _json(value) if attribute in JSON_TEXTS else value)
@@ -109,7 +110,7 @@ def _json(value: Any) -> str:
     return json.dumps(plain(value), ensure_ascii=False, indent=1)
 
 
-def _write_head(file: Any, run: Run, key: str) -> None:
+def _write_head(file: Any, run: Run, key: str, code: str) -> None:
     file.attrs["NX_class"] = "NXroot"
     file.attrs["default"] = "trajectory"
     file.attrs["format"] = FORMAT
@@ -118,6 +119,7 @@ def _write_head(file: Any, run: Run, key: str) -> None:
     file.attrs["status"] = "complete" if run.complete else "partial"
     file.attrs["stopped"] = run.stopped
     file.attrs["run_key"] = key
+    file.attrs["code"] = code
     file.attrs["content_hash"] = content_hash(run)
     file.attrs["dt"] = float(run.dt)
     file.attrs["tool_dofs"] = run.tool_dofs

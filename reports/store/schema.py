@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from iapb.run import STATE_NAMES, Run
 
 FORMAT = "iapb run"
+TABLE_FORMAT = "iapb table"
 FORMAT_VERSION = 2  # 2: names and units of velocities, which quaternions need
 
 # Units of generalized quantities follow the unit of their coordinate or of their velocity.

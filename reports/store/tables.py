@@ -29,9 +29,8 @@ from reports.store.io import (
     write_text,
 )
 from reports.store.keys import add_array
-from reports.store.schema import FORMAT_VERSION
+from reports.store.schema import FORMAT_VERSION, TABLE_FORMAT
 
-TABLE_FORMAT = "iapb table"
 ROW = "row"
 
 

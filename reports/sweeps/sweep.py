@@ -28,7 +28,7 @@ from reference.worlds import find_world, require_complete
 from reports.batches import Scheduler, do_missing, here
 from reports.runner import run_inputs
 from reports.store.folder import Checkpoint, Place, RunStore, file_name
-from reports.store.io import append_line, read_lines
+from reports.store.io import append_line, mark_store, read_lines
 from reports.store.keys import code_version, run_key
 from reports.store.runs import RunEntry
 from reports.store.tables import Column, Table, write_table
@@ -88,6 +88,7 @@ def run_sweep(
     progress : called as progress(points done, points in all)
     """
     folder = Path(out).resolve() / study.name
+    mark_store(folder)
     RunStore(folder / RUNS)  # makes the folder
     code = _code(scene)
     points = list(points_of(study, str(Path(scene).resolve())))

@@ -196,7 +196,7 @@ def test_the_store_checks_a_file_that_is_named_and_cares_for_folders_only(iapb, 
     path = tmp_path / "notes.txt"
     path.write_text("not HDF5")
     status, out, _ = iapb("store", "check", path)
-    assert status == 1 and "1 files: 1 damaged" in out
+    assert status == 1 and "1 files: 1 foreign" in out
     for action in ("gc", "repair"):
         status, _, err = iapb("store", action, path)
         assert status == 1 and f"a folder of results: {action} is not for one file" in err and path.is_file()

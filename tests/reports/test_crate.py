@@ -25,6 +25,7 @@ from reports.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.records import Claim, Evidence
 from reports.report import build_report, write_report
 from reports.runner import Runner
+from reports.store.io import MARK_NAME
 from verification.finding import REPRODUCED, titled
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
@@ -69,8 +70,9 @@ def test_the_crate_says_what_ro_crate_1_1_asks_for(out: Path) -> None:
     root, action = entities["./"], entities["#reproduce"]
     assert {"@type", "name", "description", "datePublished"} <= set(root) and root["license"]["@id"].endswith("MIT")
     on_disk = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    marks = {"runs/index.jsonl", f"runs/{MARK_NAME}", f"tables/{MARK_NAME}"}
     parts = {part["@id"] for part in root["hasPart"]}
-    assert parts == on_disk - {CRATE_NAME, "runs/index.jsonl"} == {part["@id"] for part in action["result"]}
+    assert parts == on_disk - {CRATE_NAME} - marks == {part["@id"] for part in action["result"]}
     assert action["@type"] == "CreateAction" and "claims 20050601" in action["description"]
     needs = entities["#iapb"]["softwareRequirements"]
     assert f"lock {provenance.lock_hash()}" in needs and any(need.startswith("mujoco ") for need in needs)

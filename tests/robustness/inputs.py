@@ -252,7 +252,7 @@ _LINES = (
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
     "run peg_corner --rendering scale --set duration=0.05 --set bodies.peg.position=[0.03,-0.01,0]",
     "effects peg_corner --world ideal", "effects arm_obstacles", "inspect run.h5 --impacts 1", "schema",
-    "store check results", "store gc results --dry-run", "sweep no_study --workers 1", "verify --recheck run.h5",
+    "store check results", "store gc results", "sweep no_study --workers 1", "verify --recheck run.h5",
     "reproduce --figure fig99",
 )  # fmt: skip
 _LONG = ("verify", "prove", "reproduce", "compare", "bench")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,11 +14,21 @@ import pytest
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
+from reports.cli import main
 from reports.evidence.runs import shipped_scene
 from reports.evidence.stage import Stage
 from reports.resimulate import differences, repeat_run
 from reports.runner import Runner
-from reports.store import Column, Table, content_hash, read_run, write_run, write_table
+from reports.store import (
+    Column,
+    RunStore,
+    Table,
+    content_hash,
+    read_run,
+    write_run,
+    write_table,
+    write_tables,
+)
 from reports.store.care import (
     DAMAGED,
     DAMAGED_SUFFIX,
@@ -29,8 +40,13 @@ from reports.store.care import (
     check_store,
     collect_garbage,
     garbage,
+    mark_stores,
     repair_store,
 )
+from reports.store.folder import INDEX_NAME
+from reports.store.io import MARK_NAME
+from reports.store.keys import SOURCES
+from reports.store.runs import store_run
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
 SHORT = {"duration": 0.05}
@@ -66,8 +82,8 @@ def test_a_sound_store_is_whole(filled: Path) -> None:
 def test_every_kind_of_file_is_told(filled: Path) -> None:
     import h5py
 
-    damage(runs(filled)[0])
-    whole = runs(filled)[1]
+    spoilt, whole = runs(filled)
+    damage(spoilt)
     run = read_run(whole)
     write_run(whole.with_name("unfinished.h5.partial"), run)
     (filled / "runs" / ".x.h5.1.writing").write_bytes(b"half")
@@ -75,11 +91,10 @@ def test_every_kind_of_file_is_told(filled: Path) -> None:
     with h5py.File(filled / "runs" / "other.h5", "w") as file:
         file["x"] = 1
     found = states(filled)
-    assert found[runs(filled)[0].name] == DAMAGED or DAMAGED in found.values()
+    assert found[spoilt.name] == DAMAGED
     assert found["unfinished.h5.partial"] == PARTIAL
     assert found[".x.h5.1.writing"] == LEFTOVER
-    assert found["text.h5"] == DAMAGED
-    assert found["other.h5"] in (FOREIGN, DAMAGED)
+    assert found["text.h5"] == found["other.h5"] == FOREIGN
     assert found[whole.name] == WHOLE
 
 
@@ -98,21 +113,108 @@ def test_a_damaged_run_is_set_aside_and_computed_again(filled: Path) -> None:
     assert [entry.file for entry in Runner(filled / "runs").store.entries()] == [p.name for p in runs(filled)]
 
 
+def aged(path: Path) -> Path:
+    """Older than any writer takes."""
+    os.utime(path, (0, 0))
+    return path
+
+
+OLDER = f"iapb {'0' * 64}"  # what a run of an older engine says of its code
+
+
 def test_garbage_is_what_no_present_code_asks_for(filled: Path) -> None:
     assert garbage(filled) == ()
-    run = read_run(runs(filled)[0])
-    write_run(filled / "runs" / "old-0000000000000000.h5", run, key="0" * 64)
-    (filled / "runs" / ".y.h5.1.writing").write_bytes(b"half")
-    write_run(runs(filled)[0].with_name(runs(filled)[0].name + ".partial"), run)
-    (filled / "tables").mkdir()
-    (filled / "tables" / "claims-0123456789abcdef.h5").write_bytes(b"old")
+    folder, (first, second) = filled / "runs", runs(filled)
+    run = read_run(first)
+    store_run(folder / "old-0000000000000000.h5", run, key="0" * 64, code=OLDER)
+    for name in (".y.h5.1.writing", ".young.h5.1.writing"):
+        (folder / name).write_bytes(b"half")
+    for path in (first, second):
+        write_run(path.with_name(path.name + ".partial"), run)
+    aged(folder / ".y.h5.1.writing"), aged(first.with_name(first.name + ".partial"))
     made = Stage(filled / "tables", "cost", tuple[float, ...], {"depth": "quick"}, {"a package": "2.1"})
     made.get_or_compute(lambda: (1.0,))
-    kept = {path.name for path in runs(filled)} - {"old-0000000000000000.h5"} | {made.path.name}
-    assert sorted(state.state for state in garbage(filled)) == sorted([STALE, LEFTOVER, PARTIAL, STALE])
-    collect_garbage(filled)
-    assert {path.name for path in filled.rglob("*.h5*")} == kept
+    table = Table("t", (Column("x", (1.0,), "1", "x"),))
+    write_tables(filled / "tables" / "claims-0123456789abcdef.h5", (table,), {SOURCES: "older code"})
+    found = garbage(filled)
+    assert sorted(state.state for state in found) == sorted([STALE, LEFTOVER, PARTIAL, STALE])
+    collect_garbage(found)
+    young = {".young.h5.1.writing", second.name + ".partial"}
+    assert {path.name for path in filled.rglob("*.h5*")} == {first.name, second.name, made.path.name} | young
     assert garbage(filled) == ()
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Every file below a folder, hidden ones too, with its hash."""
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(folder.rglob("*")) if path.is_file()}  # fmt: skip
+
+
+def strew(folder: Path) -> None:
+    """Put somebody else's files into a folder, of every name that ours have, and old enough to go."""
+    import h5py
+
+    names = ("thesis_results.h5", "mine-0123456789abcdef.h5", "big.iso.partial", "mine-0123456789abcdef.h5.partial",
+             "notes.h5.damaged", ".report.odt.7.writing", "half.writing", "text.h5")  # fmt: skip
+    for place in (folder, folder / "tables", folder / "deep" / "runs"):
+        place.mkdir(parents=True, exist_ok=True)
+        for name in names:
+            (place / name).write_bytes(b"somebody else's")
+        with h5py.File(place / "measured.h5", "w") as file:
+            file["x"] = np.arange(5.0)
+        if place != folder:
+            (place / INDEX_NAME).write_text('{"file": "thesis_results.h5"}')
+        (place / "link.h5").symlink_to(place / "thesis_results.h5")
+    for path in folder.rglob("*"):
+        if not path.is_symlink() and path.is_file():
+            aged(path)
+
+
+def test_nothing_of_somebody_elses_is_touched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    strew(tmp_path / "theirs")
+    before = tree(tmp_path)
+    for words in (["gc", "--delete"], ["repair"], ["mark"], ["gc"], ["check"]):
+        status = main(["store", words[0], str(tmp_path / "theirs"), *words[1:]])
+        assert status == (1 if words[0] in ("gc", "repair") else 0)
+    assert tree(tmp_path) == before and "iapb store mark" in capsys.readouterr().err
+
+
+def test_nothing_of_somebody_elses_in_a_store_is_touched_either(filled: Path) -> None:
+    spoilt = runs(filled)[0]
+    mine = RunStore(filled / "runs", code="my law v1").put({"law": "mine"}, read_run(spoilt))
+    strew(filled / "runs")
+    before = tree(filled)
+    store_run(filled / "runs" / "old-0000000000000000.h5", read_run(mine), key="0" * 64, code=OLDER)
+    write_run(filled / "runs" / "of-no-code.h5", read_run(mine), key="1" * 64)  # as by a version that did not say it
+    before |= {"runs/of-no-code.h5": tree(filled)["runs/of-no-code.h5"]}
+    damage(spoilt)
+    RunStore(filled / "runs")
+    assert main(["store", "repair", str(filled)]) == 0
+    assert main(["store", "gc", str(filled)]) == 0
+    assert spoilt.with_name(spoilt.name + DAMAGED_SUFFIX).is_file()  # it only lists
+    assert main(["store", "gc", str(filled), "--delete"]) == 0
+    ours = {f"runs/{spoilt.name}": "", f"runs/{INDEX_NAME}": ""}  # the one that went, and the index of the store
+    assert {**tree(filled), **ours} == {**before, **ours}
+
+
+def test_stores_of_older_versions_are_marked_when_asked_to_or_written_to(filled: Path) -> None:
+    (filled / "runs" / MARK_NAME).unlink()
+    with pytest.raises(ArgumentError, match="iapb store mark"):
+        garbage(filled)
+    assert mark_stores(filled) == (filled / "runs",) and mark_stores(filled) == ()
+    (filled / "runs" / MARK_NAME).write_text('{"format": "iapb store", "format_version": 2}')  # of a later version
+    with pytest.raises(ArgumentError):
+        repair_store(filled)
+    (filled / "runs" / MARK_NAME).unlink()
+    Runner(filled / "runs")(shipped_scene("peg_corner", SHORT), "CBuc")
+    assert garbage(filled) == ()
+
+
+def test_a_file_cut_short_is_set_aside(filled: Path) -> None:
+    path = runs(filled)[0]
+    path.write_bytes(path.read_bytes()[:5000])
+    repair_store(filled)
+    assert not path.exists() and path.with_name(path.name + DAMAGED_SUFFIX).is_file()
 
 
 @pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc", "IAPB-friction"])
@@ -126,8 +228,6 @@ def test_a_run_comes_out_the_same_from_its_own_file(tmp_path: Path, world: str) 
 def test_a_run_that_does_not_come_out_the_same_is_told_with_what_differs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from reports.cli import main
-
     run = Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "IAPB")
     energy = {**run.energy, "impact_loss": run.energy["impact_loss"] + 6e-17}
     other = {"blas": "OpenBLAS of another processor"}
@@ -195,8 +295,6 @@ def test_a_difference_says_how_large_it_is(
 def test_a_run_that_cannot_be_made_again_costs_its_own_line(
     filled: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from reports.cli import main
-
     write_run(filled / "mine.h5", replace(read_run(runs(filled)[0]), law="mine"))
     write_table(filled / "table.h5", Table("t", (Column("x", np.arange(3.0), "1", "x"),)))
     assert main(["store", "again", str(filled)]) == 1
@@ -229,16 +327,14 @@ def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path: Path, mo
 
 
 def test_the_command_speaks_and_its_status_tells(filled: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from reports.cli import main
-
     assert main(["store", "check", str(filled)]) == 0
     assert main(["store", "again", str(runs(filled)[0])]) == 0
     assert "the same to the last bit" in capsys.readouterr().out
     damage(runs(filled)[0])
     assert main(["store", "check", str(filled)]) == 1
     assert main(["store", "repair", str(filled)]) == 0
-    assert main(["store", "gc", str(filled), "--dry-run"]) == 0
-    assert any(name.endswith(DAMAGED_SUFFIX) for name in os.listdir(filled / "runs"))
     assert main(["store", "gc", str(filled)]) == 0
+    assert any(name.endswith(DAMAGED_SUFFIX) for name in os.listdir(filled / "runs"))
+    assert main(["store", "gc", str(filled), "--delete"]) == 0
     assert not any(name.endswith(DAMAGED_SUFFIX) for name in os.listdir(filled / "runs"))
     assert main(["store", "check", str(filled / "nowhere")]) == 1

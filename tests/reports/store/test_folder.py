@@ -19,6 +19,7 @@ from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store import Checkpoint, RunStore, folder, io, read_run, run_key, runs
 from reports.store.folder import INDEX_NAME
+from reports.store.io import mark_store
 from reports.store.keys import content_hash
 
 MakeRun = Callable[..., Run]
@@ -174,12 +175,15 @@ def test_a_killed_writer_leaves_its_last_checkpoint(tmp_path: Path, make_run: Ma
 
 
 def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Path) -> None:
-    old, young = tmp_path / ".a.h5.1.writing", tmp_path / ".b.h5.2.writing"
-    for path in (old, young):
+    old, young, theirs = (tmp_path / name for name in (".a.h5.1.writing", ".b.h5.2.writing", ".c.odt.1.writing"))
+    for path in (old, young, theirs):
         path.write_text("x")
-    os.utime(old, (0, 0))
+        os.utime(path, None if path == young else (0, 0))
     RunStore(tmp_path)
-    assert not old.exists() and young.exists()
+    assert old.exists()  # nobody has said that this is a store
+    mark_store(tmp_path)
+    RunStore(tmp_path)
+    assert not old.exists() and young.exists() and theirs.exists()
 
 
 def test_the_index_tells_the_truth(tmp_path: Path, make_run: MakeRun) -> None:
