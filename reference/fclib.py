@@ -19,7 +19,9 @@ from reference.complementarity.problem import ImpactProblem
 
 Floats = NDArray[np.float64]
 
-LARGEST_SIZE = 10_000  # a dense W of 0.8 GB; a larger number in a header is damage, not a problem
+LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a larger number in a header is damage, not a problem
+LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, which costs its entries alone
+WITH_MECHANICS = 2_000  # coordinates up to which a global problem keeps its dense M and J
 
 
 class DatasetError(IapbError, ValueError):
@@ -44,13 +46,15 @@ class StoredProblem:
     format: str = ""
 
 
+_BLOCK = 256  # columns of M⁻¹ H at a time: 25 MB for 12,000 coordinates
 _COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
 
 
 def read_fclib(path: Path | str) -> StoredProblem:
     """Read a local or global FCLIB problem as an ImpactProblem with friction.
 
-    A global problem is condensed: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f; its mechanics comes along (J = Hᵀ).
+    A global problem is condensed by sparse factors: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. Its mechanics (J = Hᵀ) comes along
+    up to WITH_MECHANICS coordinates.
 
     Parameters
     ----------
@@ -112,22 +116,29 @@ def _h5py() -> Any:
 
 def _read_local(path: Path, group: Any) -> ImpactProblem:
     q, mu = _vector(path, group, "vectors/q"), _vector(path, group, "vectors/mu")
-    w = _matrix(path, group["W"], "W")
+    w = _matrix(path, group["W"], "W").toarray()
     size = _spacedim(path, group, len(mu), len(q))
     return ImpactProblem.from_delassus(w, q, 0.0, mu, contact_size=size, name=path.name)
 
 
 def _read_global(path: Path, group: Any) -> ImpactProblem:
+    from scipy.sparse.linalg import splu
+
     mass, h = _matrix(path, group["M"], "M"), _matrix(path, group["H"], "H")
     f, w, mu = (_vector(path, group, f"vectors/{name}") for name in ("f", "w", "mu"))
     if mass.shape != (len(f), len(f)) or h.shape != (len(f), len(w)):
         raise DatasetError(path, f"shapes M {mass.shape}, H {h.shape}, f {f.shape}, w {w.shape} do not fit")
-    size, free = _spacedim(path, group, len(mu), len(w)), np.linalg.solve(mass, f)
-    problem = ImpactProblem.from_impact(mass, h.T, free, 0.0, mu, contact_size=size, name=path.name)
-    if not w.any():
-        return problem
-    shifted = problem.gamma_minus + w  # the constant w has no velocity of its own: keep W and q only
-    return ImpactProblem.from_delassus(problem.delassus, shifted, 0.0, mu, contact_size=size, name=path.name)
+    if len(w) > LARGEST_SIZE:
+        raise DatasetError(path, f"{len(w)} unknowns: expected at most {LARGEST_SIZE}")
+    size, factors = _spacedim(path, group, len(mu), len(w)), splu(mass)
+    free = factors.solve(f)
+    if not w.any() and len(f) <= WITH_MECHANICS:
+        dense, rows = mass.toarray(), h.T.toarray()
+        return ImpactProblem.from_impact(dense, rows, free, 0.0, mu, contact_size=size, name=path.name)
+    # the constant w has no velocity of its own, and a large dense M no room: W and q only
+    delassus = np.hstack([h.T @ factors.solve(h[:, k : k + _BLOCK].toarray()) for k in range(0, len(w), _BLOCK)]
+                         or [np.zeros((0, 0))])  # fmt: skip
+    return ImpactProblem.from_delassus(delassus, h.T @ free + w, 0.0, mu, contact_size=size, name=path.name)
 
 
 def _spacedim(path: Path, group: Any, contacts: int, components: int) -> int:
@@ -167,21 +178,22 @@ def _string(group: Any, name: str) -> str:
     return bytes(group[name][()]).decode("utf-8", "replace").rstrip("\0") if name in group else ""
 
 
-def _matrix(path: Path, group: Any, name: str) -> Floats:
-    """Return a CXSparse matrix as a dense array."""
+def _matrix(path: Path, group: Any, name: str) -> Any:
+    """Return a CXSparse matrix as a sparse one of compressed columns."""
     from scipy import sparse
 
     m, n, nz = (_whole(path, group, key) for key in ("m", "n", "nz"))
     i, p, x = (_numbers(path, group, key, kinds) for key, kinds in (("i", "iu"), ("p", "iu"), ("x", "iuf")))
-    if not (0 <= m <= LARGEST_SIZE and 0 <= n <= LARGEST_SIZE and (nz in (_ROWS, _COLUMNS) or 0 <= nz <= len(x))):
-        raise DatasetError(path, f"matrix {name} of {m} x {n} with nz = {nz}: expected at most {LARGEST_SIZE} rows and "
+    most = LARGEST_SIZE if name == "W" else LARGEST_MATRIX
+    if not (0 <= m <= most and 0 <= n <= most and (nz in (_ROWS, _COLUMNS) or 0 <= nz <= len(x))):
+        raise DatasetError(path, f"matrix {name} of {m} x {n} with nz = {nz}: expected at most {most} rows and "
                            "columns, and nz -1, -2 or the number of its entries")  # fmt: skip
     try:
         if nz in (_ROWS, _COLUMNS):
             compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
             compressed.check_format(full_check=True)  # an index out of range would write outside the array
-            return compressed.toarray()
-        return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).toarray()
+            return compressed.tocsc()
+        return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).tocsc()
     except (ValueError, IndexError) as error:
         raise DatasetError(path, f"matrix {name} is damaged: {error}") from error
 

@@ -14,6 +14,7 @@ Restitution that differs between bodies needs no world of its own: IAPB does as 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
@@ -21,7 +22,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling
 from iapb.names import one_of
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate
 from iapb.system import coupling_of
 from reference.time_stepping import RigidConstraints
@@ -75,7 +76,7 @@ def find_world(name: str, rendering: str = "full") -> World:
 
 
 def run_world(
-    scene: Scene,
+    scene: Scene | str | Path,
     name: str,
     rendering: str = "full",
     progress: Callable[[int, int], None] | None = None,
@@ -87,7 +88,7 @@ def run_world(
 
     Parameters
     ----------
-    scene : a checked scene
+    scene : a checked scene, the path of a scene file, or the name of a scene that comes with the project
     name, rendering : as `find_world` takes them
     progress : called with (steps done, steps) now and then
     partial : True: an incomplete run (interrupted, or out of range) is returned; False: it is raised
@@ -104,6 +105,8 @@ def run_world(
     IapbError
         The run stopped early, and `partial` is False.
     """
+    if not isinstance(scene, Scene):
+        scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
     label = name if rendering == "full" else f"{name} {rendering}"
     run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -119,11 +120,22 @@ def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
         return np.zeros(len(mass)), np.zeros(0), 0.0
     length = np.linalg.norm(rows, axis=1)
     unit = np.where(length > 0.0, length, 1.0)[:, None]
-    change = np.linalg.lstsq(rows / unit, target / unit[:, 0])[0]
-    impulse = np.linalg.lstsq(rows.T, change)[0]
+    dependent = _dependent(rows, cholesky)
+    change = np.linalg.lstsq(rows / unit, target / unit[:, 0], rcond=dependent)[0]
+    shortest = float(unit.min() / unit.max())  # least norm asks for the rows as they are
+    impulse = np.linalg.lstsq(rows.T, change, rcond=dependent * shortest)[0]
     scale = np.abs(target).max() or 1.0
     residual = float(np.abs(rows @ change - target).max() / scale)
     return np.linalg.solve(cholesky.T, change), impulse, residual
+
+
+def _dependent(rows: Floats, cholesky: NDArray[Any]) -> float:
+    """Share of the largest singular value of the unit rows below which a direction counts as none.
+
+    A = J L⁻ᵀ comes from a triangular solve whose relative error is up to n ε κ(L): what is smaller than that may be the
+    rounding of rows that depend on one another, and dividing by it would make impulses out of noise.
+    """
+    return float(max(rows.shape) * np.finfo(np.float64).eps * np.linalg.cond(cholesky))
 
 
 def _known(mechanics: Floats | None) -> Floats:

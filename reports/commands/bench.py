@@ -39,6 +39,10 @@ def bench(
     console.print(_methods(methods), highlight=False, markup=False)
     if not tables:
         console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
+    if topic.failures:
+        for one in topic.failures:
+            print(f"Not computed: {one.case}: {one.error}: {one.reason}")
+        raise typer.Exit(1)
 
 
 def _print(console: Console, title: str, numbers: Table) -> None:

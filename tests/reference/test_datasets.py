@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from iapb.errors import ArgumentError
 from reference.complementarity import ImpactProblem, Solution, solve
 from reference.datasets import DatasetError, problem_files, read_problem
-from reference.fclib import write_fclib
+from reference.fclib import WITH_MECHANICS, write_fclib
 
 PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
 shared = pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")
@@ -126,6 +127,35 @@ def test_missing_files_and_folders(tmp_path: Path) -> None:
         problem_files(tmp_path / "absent")
     (tmp_path / "README.md").write_text("x")
     assert problem_files(tmp_path) == []
+
+
+def write_global(path: Path, mass: Any, h: Any, f: np.ndarray, w: np.ndarray, mu: np.ndarray) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fclib_global")
+        for name, matrix in (("M", mass.tocsc()), ("H", h.tocsc())):
+            for key, value in (("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", -1), ("nzmax", matrix.nnz)):
+                group[f"{name}/{key}"] = np.array([value], np.int32)
+            group[f"{name}/i"], group[f"{name}/p"], group[f"{name}/x"] = matrix.indices, matrix.indptr, matrix.data
+        group["vectors/f"], group["vectors/w"], group["vectors/mu"] = f, w, mu
+        group["spacedim"] = np.array([3], np.int32)
+
+
+@pytest.mark.parametrize("coordinates", [60, 12_000])
+def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(tmp_path: Path, coordinates: int) -> None:
+    """A dense M of 12,000 coordinates would take 1.2 GB; its 12,000 entries give the same W, entry by entry."""
+    from scipy import sparse
+
+    rng, contacts = np.random.default_rng(0), 8
+    mass = rng.uniform(0.5, 2.0, coordinates)
+    h = sparse.random(coordinates, 3 * contacts, 0.05, random_state=1, format="csc")
+    f, mu = rng.normal(size=coordinates), np.full(contacts, 0.3)
+    write_global(tmp_path / "large.hdf5", sparse.diags(mass), h, f, np.zeros(3 * contacts), mu)
+    problem, dense = read_problem(tmp_path / "large.hdf5").problem, h.toarray()
+    assert (problem.mass_matrix is None) == (coordinates > WITH_MECHANICS)
+    assert problem.delassus == pytest.approx(dense.T @ (dense / mass[:, None]), rel=1e-12, abs=1e-14)
+    assert problem.gamma_minus == pytest.approx(dense.T @ (f / mass), rel=1e-12, abs=1e-14)
 
 
 def test_a_damaged_fclib_matrix_is_named(tmp_path: Path) -> None:

@@ -40,6 +40,13 @@ def test_a_world_runs_as_its_parts_do(name):
     assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
 
 
+def test_a_scene_may_be_given_by_name_or_path():
+    for scene in ("peg_corner", find_scene("peg_corner"), str(find_scene("peg_corner"))):
+        assert np.array_equal(run_world(scene, "PB", steps=3).q, run_world(PEG, "PB", steps=3).q)
+    with pytest.raises(ArgumentError, match="peg_corner"):
+        run_world("peg_cornre", "PB")
+
+
 def test_without_hand_or_gains_there_is_no_coupling():
     for name in WORLDS:
         assert find_world(name).coupling_in(load_scene(find_scene("two_discs"))).name == "none"

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
+from reports.commands import bench as command
 from reports.evidence.effects import summary
 from reports.evidence.haptic_rate import topic_of
 from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
@@ -22,7 +24,7 @@ from verification.cost.start_up import StartUp
 from verification.cost.step_cost import IAPB, KERNEL, CostRow
 from verification.cost.study import HapticStudy
 from verification.cost.trajectories import TrajectoryRun
-from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table
 from verification.mechanics.robot_timing import MANY, ONE
 
 
@@ -115,3 +117,19 @@ def test_the_front_of_effects_is_pareto() -> None:
     table = summary(effects)
     assert {row[1]: row[4] for row in table.rows} == {"cheap": "yes", "dear": "yes", "bad": "no"}
     assert len(effect_costs.draw({effect_costs.INPUT: table}).panels) == 1
+
+
+def test_bench_ends_with_1_where_a_row_failed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failed = Failure("impact of 4 contacts", "SolverError", "no solution")
+    topic = Finding("haptic-rate", "The haptic rate", "", "", NOT_COMPUTED, failures=(failed,))
+    monkeypatch.setattr(command, "haptic_study", lambda *_: None)
+    monkeypatch.setattr(command, "topic_of", lambda _: topic)
+    monkeypatch.setattr(command.accuracy, "compute", lambda _: Table(()))
+    monkeypatch.setattr(command, "_methods", lambda _: "")
+    with pytest.raises(typer.Exit) as ended:
+        command.bench(False, False)
+    assert ended.value.exit_code == 1 and "Not computed: impact of 4 contacts: SolverError" in capsys.readouterr().out
+    monkeypatch.setattr(command, "topic_of", lambda _: replace(topic, failures=()))
+    command.bench(False, False)

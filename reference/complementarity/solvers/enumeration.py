@@ -1,7 +1,9 @@
 """Enumeration: every choice of active contacts, for small n; finds all solutions, or that there is none.
 
 On an active set a:  W_aa p_a = -b_a, p_a >= 0, p elsewhere 0, w elsewhere >= 0. Where W_aa is singular the
-solutions of the piece form a polyhedron: a linear program decides whether it is empty and returns one point.
+solutions of the piece form a polyhedron: a linear program decides whether it is empty and returns one point. Its
+tolerances are absolute, so everything is computed for D W D and D b with D_i = 1/√W_ii, b of size one: the same
+complementarity problem in other units.
 Source: Cottle, Pang, Stone (1992), section 1.3 (complementary cones).
 """
 
@@ -22,6 +24,7 @@ LARGEST_SIZE = 14  # 16384 active sets, some of them linear programs: seconds
 _SAME = 1e-9  # two solutions closer than this share of the larger are one
 _ACCEPTED = 1e-9  # residual below which a candidate is a solution: solves of small systems reach 1e-13
 _SINGULAR = 1e-12  # reciprocal condition below which W_aa is taken as singular
+_FEASIBLE = 1e-10  # of the linear program, the least that HiGHS takes: a tenth of _ACCEPTED, by default 1e-7
 
 
 def all_solutions(problem: ImpactProblem) -> list[Floats]:
@@ -29,12 +32,19 @@ def all_solutions(problem: ImpactProblem) -> list[Floats]:
     if np.count_nonzero(~problem.two_sided) > LARGEST_SIZE:
         raise SolverError(f"refused: {problem.size} contacts, enumeration takes at most {LARGEST_SIZE}")
     found: list[Floats] = []
+    diagonal = np.diag(problem.delassus)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    w, b = scale[:, None] * problem.delassus * scale, scale * problem.offset
+    speed = float(np.abs(b).max(initial=0.0)) or 1.0
     joints: list[int] = np.flatnonzero(problem.two_sided).tolist()
     contacts: list[int] = np.flatnonzero(~problem.two_sided).tolist()
     subsets = (combinations(contacts, k) for k in range(len(contacts) + 1))
     for chosen in chain.from_iterable(subsets):
-        p = _candidate(problem, sorted([*joints, *chosen]))
-        if p is None or residuals(problem, p).worst > _ACCEPTED:
+        unit = _candidate(w, b / speed, problem.two_sided, sorted([*joints, *chosen]))
+        if unit is None:
+            continue
+        p = speed * scale * unit
+        if residuals(problem, p).worst > _ACCEPTED:
             continue
         if not any(np.allclose(p, q, rtol=0.0, atol=_SAME * np.abs(q).max()) for q in found):
             found.append(p)
@@ -45,32 +55,30 @@ def solve(problem: ImpactProblem) -> Answer:
     """Return the solution with the fewest active contacts; the note says how many there are."""
     found = all_solutions(problem)
     if not found:
-        return Answer(None, "no active set gives a solution: the problem has none")
+        return Answer(None, f"no active set gives a solution whose residual is at most {_ACCEPTED:.0e}")
     return Answer(found[0], f"{len(found)} solutions found")
 
 
-def _candidate(problem: ImpactProblem, active: list[int]) -> Floats | None:
-    p = np.zeros(problem.size)
-    if not active:
-        return p
-    block = problem.delassus[np.ix_(active, active)]
-    if np.linalg.cond(block) * _SINGULAR < 1.0:
-        p[active] = np.linalg.solve(block, -problem.offset[active])
-        return p
-    return _feasible_point(problem, active)
+def _candidate(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[int]) -> Floats | None:
+    p = np.zeros(len(b))
+    if active:
+        block = w[np.ix_(active, active)]
+        regular = np.linalg.cond(block) * _SINGULAR < 1.0
+        found = np.linalg.solve(block, -b[active]) if regular else _feasible_point(w, b, two_sided, active)
+        if found is None:
+            return None
+        p[active] = found
+    return p
 
 
-def _feasible_point(problem: ImpactProblem, active: list[int]) -> Floats | None:
+def _feasible_point(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[int]) -> Floats | None:
     """Decide by a linear program whether the singular piece holds a solution; return the one of least sum."""
     from scipy.optimize import linprog
 
-    passive = [i for i in range(problem.size) if i not in active]
-    w, b = problem.delassus[:, active], problem.offset
-    bounds = [(None if problem.two_sided[i] else 0.0, None) for i in active]
-    cost = np.where(problem.two_sided[active], 0.0, 1.0)
-    result = linprog(cost, -w[passive], b[passive], w[active], -b[active], bounds, method="highs")
-    if result.x is None:
-        return None
-    p = np.zeros(problem.size)
-    p[active] = result.x
-    return p
+    passive = [i for i in range(len(b)) if i not in active]
+    columns = w[:, active]
+    bounds = [(None if two_sided[i] else 0.0, None) for i in active]
+    cost = np.where(two_sided[active], 0.0, 1.0)
+    accuracy = {"primal_feasibility_tolerance": _FEASIBLE, "dual_feasibility_tolerance": _FEASIBLE}
+    found = linprog(cost, -columns[passive], b[passive], columns[active], -b[active], bounds, "highs", options=accuracy)
+    return None if found.x is None else np.asarray(found.x, np.float64)

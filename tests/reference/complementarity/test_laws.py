@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.errors import SolverError
-from reference.complementarity import ImpactProblem
+from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
 from reference.complementarity.laws import LAWS, newton_equality, newton_lcp, per_body_rows, poisson
+from reference.complementarity.solvers import daqp_qp
+from reference.datasets import read_problem
+from reference.event_driven import LinearSystem, event_driven
 from reference.exact import bulk_energy_gain, exact_impact
+from reference.rigid_step import nearest_velocity
 
+BOWL = Path(__file__).parents[4] / "shared" / "problems" / "lcp" / "bowl.1.dynamics.lcp.gz"
 BAR = np.diag([1.0, 1.0 / 12.0])  # a bar struck at x = 0.5 and 0.4 (design of the counterexample)
 BAR_ROWS = np.array([[1.0, 0.5], [1.0, 0.4]])
 
@@ -112,6 +118,56 @@ def test_adhesion_is_told_from_an_artefact() -> None:
     assert found.exists and np.abs(rows.T @ found.impulse - given).max() <= 1e-14
     assert adhesion(rows, [1.0, 0.0, 2.0], np.eye(2)) == NONE
     assert adhesion(rows[:2], [1.0, -0.5], np.eye(2)) == ADHESIVE
+
+
+def cycling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let daqp end as it does on some redundant rows."""
+
+    def cycle(*_: object) -> np.ndarray:
+        raise SolverError("daqp: exit flag -2")
+
+    monkeypatch.setattr(daqp_qp, "multipliers", cycle)
+
+
+def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Newton LCP, Poisson, steps and event-driven motions ask other solvers, and say so where none is left."""
+    problem = random_problem(7, 8, 0.5)
+    row = LinearSystem(np.eye(2), [0.0, -9.81], [[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0]], [0.0, 0.0, 1.0], 0.5)
+
+    def outcomes() -> list[np.ndarray]:
+        step = nearest_velocity(problem.mass_matrix, problem.velocity, problem.contact_jacobian, np.zeros(8))
+        return [newton_lcp(problem).velocity, poisson(problem).velocity, step.velocity,
+                event_driven(row, [0.0, 0.5], [1.0, 0.0], 1.2).v[-1]]  # fmt: skip
+
+    usual = outcomes()
+    cycling(monkeypatch)
+    assert all(found == pytest.approx(expected, abs=1e-9) for found, expected in zip(outcomes(), usual, strict=True))
+    with pytest.raises(SolverError, match="exit flag -2"):
+        newton_lcp(problem, "daqp")
+
+
+@pytest.mark.skipif(not BOWL.exists(), reason="shared problem files are not here")
+def test_the_recorded_pile_on_which_daqp_cycles_is_solved() -> None:
+    w = read_problem(BOWL).problem
+    velocity = np.linalg.lstsq(w.factor, w.offset)[0]
+    problem = ImpactProblem.from_impact(np.eye(w.size), w.factor, velocity, 0.0)
+    assert not solve(problem, "daqp").solved(), "daqp no longer cycles here: look for another pile"
+    assert newton_lcp(problem).residual <= 1e-12 and poisson(problem).residual <= 1e-12
+    nearest = nearest_velocity(problem.mass_matrix, velocity, problem.contact_jacobian, np.zeros(problem.size))
+    assert nearest.residual <= 1e-12
+
+
+@pytest.mark.parametrize("condition", [1.0, 1e6, 1e12])
+def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: float) -> None:
+    """Twice the same rows on an ill-conditioned M: the impulses of each pair are equal, as least norm says."""
+    rng = np.random.default_rng(3)
+    axes, _ = np.linalg.qr(rng.normal(size=(6, 6)))
+    mass = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T
+    rows = rng.normal(size=(3, 6))
+    both = np.vstack([rows, rows @ axes @ axes.T])  # the same up to rounding
+    problem = ImpactProblem.from_impact(0.5 * (mass + mass.T), both, rng.normal(size=6), 0.5)
+    p = newton_equality(problem).impulse
+    assert p[:3] == pytest.approx(p[3:], rel=1e-4)
 
 
 def test_every_law_says_what_it_is() -> None:

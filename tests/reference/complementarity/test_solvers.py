@@ -111,6 +111,16 @@ def test_two_sided_rows_are_met_by_all_that_take_them() -> None:
     assert not Solution(joint, np.zeros(2)).solved()
 
 
+@pytest.mark.parametrize("scale", [1e-12, 1e-9, 1.0, 1e9])
+def test_enumeration_finds_solutions_at_every_scale(scale: float) -> None:
+    """Rank one, W = s·1, b = −1: every p >= 0 with the sum 1/s solves it, as joints and as contacts."""
+    for bilateral in (None, [True, True, True]):
+        problem = ImpactProblem.from_delassus(scale * np.ones((3, 3)), -np.ones(3), bilateral=bilateral)
+        assert solve(problem, "enumeration").solved(1e-12)
+        assert not solve(ImpactProblem.from_delassus(scale * np.ones((2, 2)), [-1.0, -2.0], bilateral=[True, True]),
+                         "enumeration").solved()  # fmt: skip
+
+
 def test_zero_contacts() -> None:
     problem = ImpactProblem.from_impact(np.eye(2), np.zeros((0, 2)), [1.0, 2.0], 0.5)
     for name in installed(solver_names(problem)):
