@@ -16,14 +16,18 @@ __all__ = ["INPUT", "compute", "summary"]
 
 COLUMNS = (
     "method", "outcome", "energy gain", "gain allowed", "restitution residual", "forward error", "error allowed",
-    "rank", "exact rank", "time [µs]", "note",
+    "smallest fault seen", "rank", "exact rank", "time [µs]", "note",
 )
 TIME = "time [µs]"
 _NOTES = {
-    "impact": "Gain exact, (KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric; median time of a call.",
-    "motion": "Gain: the most energy ever made, as a share of what was there or was fed in; error: distance from the "
-              "law, in the case's own unit; restitution of its collisions, weighted by the impulses; median time of "
-              "a step.",
+    "impact": "Stable: gain at most 10 d ε √κ(M), restitution to 1e-8, error within what is allowed. Gain exact, "
+              "(KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric, allowed 10 n ε √κ (√κ + κ(A)), "
+              "n = max(c, d), κ of M scaled to a unit diagonal. Smallest fault: the least relative error of impulse or "
+              "velocity, planted in the answer, that is not stable any more. Median time of a call.",
+    "motion": "Stable: no energy made, restitution to 1e-8, error within what the step excuses. Gain: the most energy "
+              "ever made, as a share of what was there or was fed in; error: distance from the law as a share of the "
+              "answer; restitution of its collisions, weighted by the impulses. Smallest fault: all displacements and "
+              "changes of velocity too large, or too small, by that share. Median time of a step.",
 }  # fmt: skip
 
 
@@ -73,6 +77,7 @@ def _row(found: Any) -> tuple[Any, ...]:
     return (
         found.method, found.verdict, _known(found.energy_gain), _known(found.energy_bound),
         _known(found.restitution_residual), _known(found.forward_error), _known(found.forward_bound),
+        _known(found.smallest_fault),
         None if found.note else found.rank, found.exact_rank, _known(found.seconds * 1e6), found.note,
     )  # fmt: skip
 

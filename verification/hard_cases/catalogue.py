@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from verification.hard_cases import (
-    chatter,
-    kane_levinson,
-    mechanical,
-    numerical,
-    rough_floor,
-    shared_problems,
-    stiff_wall,
-    wedged_peg,
-)
+from verification.hard_cases import bodies, friction, mechanical, motions, numerical, shared_problems
 from verification.hard_cases.case import AnyCase
 
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
@@ -36,20 +27,31 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         mechanical.subnormal_speeds,
         mechanical.light_direction,
         mechanical.bar_with_unequal_restitution,
-        wedged_peg.wedged_peg,
-        kane_levinson.double_pendulum_without_friction,
-        kane_levinson.double_pendulum_with_friction,
+        mechanical.wedged_peg,
+        bodies.touching_cradle_impact,
+        bodies.break_shot,
+        bodies.rocking_block,
+        bodies.superball,
+        bodies.stack_of_mass_ratio,
+        bodies.wedge,
+        bodies.painleve_impact,
+        friction.double_pendulum_without_friction,
+        friction.double_pendulum_with_friction,
         shared_problems.bowl_of_low_rank,
         shared_problems.bowl_of_mixed_scales,
-        stiff_wall.wall_at_the_bound,
-        stiff_wall.wall_beyond_the_bound,
-        stiff_wall.wall_far_beyond_the_bound,
-        wedged_peg.wedged_peg_motion,
-        kane_levinson.double_pendulum_motion,
-        rough_floor.sticking_threshold,
-        rough_floor.sliding_threshold,
-        rough_floor.painleve_rod,
-        chatter.chatter,
+        motions.wall_at_the_bound,
+        motions.wall_beyond_the_bound,
+        motions.wall_far_beyond_the_bound,
+        motions.wedged_peg_motion,
+        motions.touching_cradle,
+        motions.cradle_a_micrometre_apart,
+        motions.cradle_a_micrometre_sunk,
+        friction.double_pendulum_motion,
+        friction.sticking_threshold,
+        friction.sliding_threshold,
+        friction.creep_of_the_regularised_law,
+        friction.painleve_rod,
+        motions.chatter,
         shared_problems.two_balls_and_a_wall,
     )
 }

@@ -1,25 +1,46 @@
-"""Judge an impact method on a hard case: energy, restitution and motion against the exact truth."""
+"""Judge an impact method on a hard case: energy, restitution and motion against the exact truth.
+
+A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and a C routine cannot be
+interrupted from Python: such a call gets a process of its own. Its clock starts when the process has compiled; what
+exceeds the limit is killed and reported as timed out, never waited for.
+"""
 
 from __future__ import annotations
 
+import os
+import pickle
 import statistics
+import subprocess
+import sys
 import time
+from collections.abc import Callable
 from fractions import Fraction
-from functools import cache
-from typing import Any
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from iapb.errors import IapbError
-from verification.hard_cases.bounded import Answer, OutOfMemory, TimedOut, bounded_impact
-from verification.hard_cases.case import EPS, Floats, HardCase
-from verification.hard_cases.frictional import FrictionalCase
-from verification.hard_cases.verdict import HANGS_ON_ROUNDING, RESTITUTION_TOLERANCE, HardCaseVerdict
+from reference.one_thread import one_thread
+from verification.hard_cases.case import (
+    EPS,
+    HANGS_ON_ROUNDING,
+    NEWTON_COULOMB,
+    RESTITUTION_TOLERANCE,
+    Floats,
+    FrictionalCase,
+    HardCase,
+    HardCaseVerdict,
+    smallest_fault,
+)
+from verification.hard_cases.exact import dot, fractions
 
 WITHOUT_CLAMP = "factored, no clamp"
-NEWTON_COULOMB = "Newton with Coulomb"  # friction at an impact as Kane and Levinson found it
 METHODS = ("factored", WITHOUT_CLAMP, "gram_pinv", "gram_cholesky", "damped", "svd")
-_MARGIN = 100.0  # constant before d ε √κ(M) (√κ(M) + κ(A)), the first-order error of whitening and of the basis
+# Constant before n ε √κ (√κ + κ(A)), n = max(c, d): Cholesky's backward error and the two solves with its factor
+# (Higham 2002, theorems 10.3 and 8.5), and the basis of the rows, each a few n ε; 1 + e = 2 doubles them. κ is that of
+# M scaled to a unit diagonal, since rounding goes component by component (van der Sluis 1969).
+_MARGIN = 10.0
 _REPEATS = 5  # their median is reported; the first call, which fills caches, is not among them
 _SLOW = 0.2  # a call of more seconds is not repeated
 _HALF_SUBNORMAL = Fraction(1, 2**1075)  # rounding of the smallest numbers, which no relative bound covers
@@ -32,31 +53,86 @@ _NOISE = 10.0  # factor about the tolerance within which such a residual decides
 _ALL_NOISE = 0.5
 _MANY_CONTACTS = 2000  # from here on those get a process that can be cut: W has 4e6 entries, its SVD takes a second
 
+LIMIT_SECONDS = 2.0  # two thousand haptic steps: a method beyond this is of no use to anyone here
+LIMIT_BYTES = 6 << 30  # address space: seven matrices of 10,000 x 10,000 doubles and the libraries
+_READY = b"ready\n"
+
+
+class TimedOut(IapbError):
+    """A call took more than its limit of time."""
+
+
+class OutOfMemory(IapbError):
+    """A call needed more than its limit of memory."""
+
+
+class Answer(NamedTuple):
+    """What is judged of an impact: v⁺, rank, clamp; and the time of the call [s]."""
+
+    velocity: Any
+    rank: int
+    clamp: float
+    seconds: float
+
+
+class Found(NamedTuple):
+    """The three numbers of an answer, each over its bound decides the verdict."""
+
+    gain: float
+    residual: float
+    distance: float
+
 
 def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
     """Return the verdict of one method on one impact."""
-    d, truth = len(case.velocity), case.truth
-    root = float(np.sqrt(truth.condition))
-    energy_bound = 10.0 * d * EPS * root
-    forward_bound = _MARGIN * d * EPS * root * (root + truth.row_condition) + _rounding_of_small_numbers(case)
+    truth = case.truth
+    energy_bound = 10.0 * len(case.velocity) * EPS * float(np.sqrt(truth.condition))
+    forward_bound = allowed_error(case)
     try:
         answer = _answer(case, method)
     except IapbError as error:
         return HardCaseVerdict(case.name, method, _word(error), str(error), energy_bound=energy_bound,
                                forward_bound=forward_bound, exact_rank=truth.rank)  # fmt: skip
-    from reference.exact import relative_energy_gain
-
-    gain = relative_energy_gain(case.mass_matrix, case.velocity, answer.velocity)
-    residual, distance = _unmet(case, answer.velocity), _forward_error(case, answer.velocity)
-    verdict = _verdict(case, gain, energy_bound, residual, distance, forward_bound)
-    undecided = verdict != "gains energy" and _near_tolerance(residual)
-    noise = verdict in ("gains energy", "restitution unmet") and distance > _ALL_NOISE
+    word = partial(_verdict, case, energy_bound, forward_bound)
+    found = _found(case, answer.velocity)
+    verdict, fault = word(found), np.nan
+    undecided = verdict != "gains energy" and _near_tolerance(found.residual)
+    noise = verdict in ("gains energy", "restitution unmet") and found.distance > _ALL_NOISE
     if method in _THROUGH_LAPACK and (undecided or noise):
         verdict = HANGS_ON_ROUNDING
+    if verdict == "stable":
+        fault = max(smallest_fault(partial(_is_seen, case, word, answer.velocity, wrong))
+                    for wrong in faulty_answers(case, answer.velocity))  # fmt: skip
     return HardCaseVerdict(
-        case.name, method, verdict, "", gain, energy_bound, residual, distance, forward_bound, answer.rank,
-        truth.rank, answer.clamp, answer.seconds,
+        case.name, method, verdict, "", found.gain, energy_bound, found.residual, found.distance, forward_bound,
+        answer.rank, truth.rank, answer.clamp, answer.seconds, fault,
     )  # fmt: skip
+
+
+def allowed_error(case: HardCase) -> float:
+    """The share of |v⁻| by which rounding may move v⁺ in the kinetic metric."""
+    truth, n = case.truth, max(case.contact_jacobian.shape)
+    root = float(np.sqrt(truth.scaled_condition))
+    return _MARGIN * n * EPS * root * (root + truth.row_condition) + _rounding_of_small_numbers(case)
+
+
+def _found(case: HardCase, v_plus: Floats) -> Found:
+    from reference.exact import relative_energy_gain
+
+    gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
+    return Found(gain, _unmet(case, v_plus), _forward_error(case, v_plus))
+
+
+def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
+    """What a fault adds to the answer, times its size: the impulse's effect, and the velocity unless it is stopped."""
+    change = v_plus - case.velocity
+    stopped = _form(case, v_plus) <= _form(case, case.velocity) / 10**6
+    return ([change] if change.any() else []) + ([] if stopped else [v_plus])
+
+
+def _is_seen(case: HardCase, word: Callable[[Found], str], answer: Floats, wrong: Floats, fault: float) -> bool:
+    """Whether a fault of that size turns the verdict."""
+    return word(_found(case, answer + fault * wrong)) != "stable"
 
 
 def _word(error: IapbError) -> str:
@@ -68,12 +144,12 @@ def _word(error: IapbError) -> str:
     return "refused" if isinstance(error, ValueError) else "failed"
 
 
-def _verdict(case: HardCase, gain: float, bound: float, residual: float, error: float, excused: float) -> str:
-    if not gain <= bound:
+def _verdict(case: HardCase, bound: float, excused: float, found: Found) -> str:
+    if not found.gain <= bound:
         return "gains energy"
-    if not residual <= RESTITUTION_TOLERANCE:
+    if not found.residual <= RESTITUTION_TOLERANCE:
         return "restitution unmet"
-    if case.well_posed and not error <= excused:
+    if case.well_posed and not found.distance <= excused:
         return "wrong motion"
     return "stable"
 
@@ -146,18 +222,74 @@ def _unmet(case: HardCase, v_plus: Floats) -> float:
 def _forward_error(case: HardCase, v_plus: Floats) -> float:
     """|v⁺ − truth| / |v⁻| in the kinetic metric, exactly up to the last root."""
     error = [Fraction(x) - t for x, t in zip(v_plus, case.truth.velocity, strict=True)]
-    before = [Fraction(x) for x in case.velocity]
-    return float(np.sqrt(float(_form(case, error) / _form(case, before))))
+    return float(np.sqrt(float(_form(case, error) / _form(case, case.velocity))))
 
 
 def _rounding_of_small_numbers(case: HardCase) -> float:
     """Share of |v⁻| that rounding every component to the grid of subnormals can be."""
     diagonal = sum((Fraction(x) for x in np.diag(case.mass_matrix)), Fraction(0)) * _HALF_SUBNORMAL**2
-    energy = _form(case, [Fraction(x) for x in case.velocity])
-    return float(np.sqrt(float(len(case.velocity) * diagonal / energy)))
+    return float(np.sqrt(float(len(case.velocity) * diagonal / _form(case, case.velocity))))
 
 
-def _form(case: HardCase, x: list[Fraction]) -> Fraction:
+def _form(case: HardCase, vector: Any) -> Fraction:
     """xᵀ M x."""
-    M, d = case.mass_matrix, len(x)
-    return sum((x[i] * Fraction(M[i, j]) * x[j] for i in range(d) for j in range(d)), Fraction(0))
+    x, M = fractions(vector), case.mass_matrix
+    return dot(x, [dot(row, x) for row in fractions(M)])
+
+
+def bounded_impact(
+    case: HardCase, method: str, limit: float = LIMIT_SECONDS, most_bytes: int = LIMIT_BYTES
+) -> Answer:
+    """Resolve one hard case by one method in a process of its own.
+
+    Raises
+    ------
+    TimedOut, OutOfMemory
+        Beyond `limit` [s] or `most_bytes` of address space (POSIX systems only).
+    IapbError
+        What the resolver itself raised.
+    """
+    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the packages that we run from
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
+    environment = {**os.environ, **paths, **threads}
+    command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) as process:
+        if process.stdout is None or process.stdout.readline() != _READY:
+            raise IapbError("the process for a bounded call did not start")
+        try:
+            out, _ = process.communicate(pickle.dumps((case, method, most_bytes)), timeout=limit)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise TimedOut(f"cut after {limit:g} s") from None
+    if process.returncode != 0:
+        raise IapbError(f"the process for a bounded call ended with code {process.returncode}")
+    found = pickle.loads(out)
+    if isinstance(found, Exception):
+        raise found
+    answer: Answer = found
+    return answer
+
+
+def serve() -> None:
+    """Warm up, say so, then read one call and write its answer: what the other process runs."""
+    with one_thread():
+        warm_up()
+        sys.stdout.buffer.write(_READY)
+        sys.stdout.buffer.flush()
+        case, method, most_bytes = pickle.loads(sys.stdin.buffer.read())
+        _limit_memory(most_bytes)
+        try:
+            found: Any = resolve_once(case, method)
+        except MemoryError:
+            found = OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
+        except IapbError as error:
+            found = IapbError(str(error))
+    sys.stdout.buffer.write(pickle.dumps(found))
+
+
+def _limit_memory(most_bytes: int) -> None:
+    try:
+        import resource
+    except ImportError:  # not a POSIX system: time alone limits the call
+        return
+    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))

@@ -87,15 +87,15 @@ def face_at_three_points() -> HardCase:
 
 
 def grazing() -> HardCase:
-    """Fast sliding with a normal velocity of 1e-12 m/s."""
+    """Fast sliding with a normal velocity of 1e-8 m/s."""
     return HardCase(
         "Grazing impact",
         "a fast tool brushing a wall; Nordmark, J. Sound and Vibration 145 (1991), on grazing",
-        "the approach is twelve digits below the speed",
+        "the approach is ten digits below the speed",
         "the sliding keeps every digit, the approach is reversed to ε of the speed",
         np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.25], [0.0, 0.25, 3.0]]),
         np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.5]]),
-        np.array([100.0, -1e-12, 0.0]),
+        np.array([100.0, -1e-8, 0.0]),
         0.7,
     )
 
@@ -147,4 +147,26 @@ def bar_with_unequal_restitution() -> HardCase:
         np.array([-1.0, 0.0]),
         np.array([1.0, 0.0]),
         methods=("factored",),
+    )
+
+
+def wedged_peg() -> HardCase:
+    """The six rows of a peg whose sides have the slope 200 : 9999 (a triangle of whole numbers), pushed in askew."""
+    n, t = Fraction(200, 10001), Fraction(9999, 10001)
+    half, reach = Fraction(1, 200), Fraction(21, 2000)
+    points = [(x, -reach, Fraction(0), Fraction(1)) for x in (-half, half)]
+    for y in (-reach, reach):
+        points += [(-half, y, t, n), (half, y, -t, n)]
+    exact = np.array([[nx, ny, x * ny - y * nx] for x, y, nx, ny in points], dtype=object)
+    return HardCase(
+        "A peg wedged in its hole",
+        "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
+        "six rows of rank three, a fiftieth of whose approach is along the peg: the sides pull where they should push",
+        "stopped in all three coordinates at once",
+        np.diag([2.0, 2.0, 0.005]),
+        exact.astype(float),
+        np.array([1e-4, -0.04, 1e-3]),
+        0.0,
+        exact_jacobian=exact,
+        methods=("factored", "gram_pinv", "damped", "svd"),
     )

@@ -9,8 +9,7 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.scene import scene_from_text
-from verification.hard_cases.case import CaseAbsent, HardCase, Measured, TrajectoryCase
-from verification.hard_cases.energy import largest_gain
+from verification.hard_cases.case import NO_GAIN, CaseAbsent, HardCase, Measured, TrajectoryCase, largest_gain
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
 _NOISE = 1e-10  # of the largest eigenvalue of W: below it the bowls' spectra hold what their authors' rounding left
@@ -81,7 +80,7 @@ def two_balls_and_a_wall() -> TrajectoryCase:
 
     def measure(run: Run) -> Measured:
         """Distance of the last velocities from the law's, relative to the speed before."""
-        return Measured(largest_gain(run), 1e-12, float(np.abs(run.v[-1] - [-speed, 0.0]).max()) / speed, 1e-12)
+        return Measured(largest_gain(run), NO_GAIN, float(np.abs(run.v[-1] - [-speed, 0.0]).max()) / speed, 1e-12)
 
     return TrajectoryCase(
         "Two balls and a wall, elastic", f"{given['source']}: {given['expected']}",

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge_hard_case
-from verification.hard_cases.chatter import exact_height
-from verification.hard_cases.frictional import FrictionalCase
-from verification.hard_cases.poisson import exact_poisson
+from verification.hard_cases.case import FrictionalCase
+from verification.hard_cases.exact import exact_poisson
+from verification.hard_cases.judge import restitution_residual, run_in_world
+from verification.hard_cases.motions import exact_height
 
 
 def _impact(name: str) -> HardCase:
@@ -81,11 +83,6 @@ def test_the_chattering_ball_reaches_a_quarter_of_the_height_each_time(bounce: i
 
 def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
     """The engine's collisions meet e exactly; a planted fault, the impulse a tenth too large, does not."""
-    from dataclasses import replace
-
-    from verification.hard_cases.judge_trajectory import run_in_world
-    from verification.hard_cases.restitution import restitution_residual
-
     case = HARD_CASES["chatter"]()
     assert isinstance(case, TrajectoryCase)
     run = run_in_world(case.scene, "IAPB")
@@ -96,3 +93,55 @@ def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
     assert restitution_residual(faulty) == pytest.approx(0.1 / 1.1)
     assert judge_hard_case(case, "IAPB", lambda scene, world: faulty).verdict == "restitution unmet"
     assert np.isnan(restitution_residual(run_in_world(case.scene, "PB")))
+
+
+def test_the_break_shot_is_that_of_billiards() -> None:
+    """Striker: 1 − 4 n²/(1 + 2 n²) of its speed, with n = 4/5 between the balls' line and the way; energy kept."""
+    case = _impact("break_shot")
+    after, n = case.truth.velocity, Fraction(4, 5)
+    assert after[0] == -(1 - 4 * n**2 / (1 + 2 * n**2)) and after[1] == 0
+    assert after[2] == after[4] and after[3] == -after[5]
+    assert _energy(case, after) == Fraction(1, 2)
+
+
+def test_the_cradle_returns_three_fifths() -> None:
+    after = _impact("touching_cradle_impact").truth.velocity
+    assert after == (Fraction(-3, 5), *(Fraction(2, 5),) * 4)
+
+
+def test_the_rocking_block_keeps_housners_share() -> None:
+    """ω⁺/ω⁻ = 1 − 3/2 sin² α, sin α = 3/5, so that ¾ (…)² of its energy is left after each rock."""
+    case = _impact("rocking_block")
+    after, share = case.truth.velocity, 1 - Fraction(3, 2) * Fraction(9, 25)
+    assert float(after[2] - share) == pytest.approx(0.0, abs=1e-15)  # the inertia 25/3 is a double
+    left = _energy(case, after) / _energy(case, tuple(Fraction(x) for x in case.velocity))
+    assert float(left) == pytest.approx(float(share) ** 2, abs=1e-14)
+
+
+def test_the_superball_returns_its_point_of_contact() -> None:
+    case = _impact("superball")
+    before, after = (tuple(map(Fraction, v)) for v in (case.velocity, case.truth.velocity))
+    for row in case.contact_jacobian:
+        assert sum(Fraction(a) * (x + y) for a, x, y in zip(row, before, after, strict=True)) == 0
+    assert _energy(case, before) == _energy(case, after)
+
+
+def test_the_stack_moves_as_its_momentum_says() -> None:
+    case = _impact("stack_of_mass_ratio")
+    masses = [Fraction(x) for x in np.diag(case.mass_matrix)]
+    momentum = sum((m * Fraction(v) for m, v in zip(masses, case.velocity, strict=True)), Fraction(0))
+    assert set(case.truth.velocity) == {momentum / sum(masses)}
+
+
+def test_the_wedged_point_returns_half_its_velocity() -> None:
+    case = _impact("wedge")
+    assert case.truth.velocity == tuple(Fraction(-1, 2) * Fraction(x) for x in case.velocity)
+
+
+def test_the_struck_rod_sticks() -> None:
+    """Painlevé's rod: the friction needed to stop the slip lies in the cone, and the whole impact loses energy."""
+    case = _impact("painleve_impact")
+    assert isinstance(case, FrictionalCase)
+    rows = [[Fraction(x) for x in row] for row in case.all_rows]
+    assert [sum((a * v for a, v in zip(row, case.truth.velocity, strict=True)), Fraction(0)) for row in rows] == [0, 0]
+    assert case.truth.velocity == case.newton_with_coulomb()

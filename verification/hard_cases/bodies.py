@@ -1,0 +1,100 @@
+"""Collisions with a certain answer in closed form: cradle, break shot, rocking block, superball, stack, wedge, rod."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from verification.hard_cases.case import FrictionalCase, HardCase
+from verification.impacts import cradle_rows
+
+
+def touching_cradle_impact() -> HardCase:
+    """Five equal balls in a row that touch: all four contacts in one impact."""
+    return HardCase(
+        "Newton's cradle, all contacts at once",
+        "textbook; paper (12) with assumption (i)",
+        "three contacts do not approach: equalities hold them at rest against each other",
+        "the first ball returns with 3/5, the other four leave together with 2/5",
+        np.eye(5), cradle_rows(5), np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 1.0,
+    )  # fmt: skip
+
+
+def break_shot() -> HardCase:
+    """A ball strikes two that touch, along normals of the triangle 3-4-5; those two do not approach each other."""
+    n, t = Fraction(4, 5), Fraction(3, 5)
+    exact = np.array([[n, t, -n, -t, 0, 0], [n, -t, 0, 0, -n, t]], dtype=object)
+    return HardCase(
+        "Three-ball break shot",
+        "billiards: Coriolis, Théorie mathématique des effets du jeu de billard (1835)",
+        "two contacts share one ball: resolved one after the other, the outcome depends on the order",
+        "symmetric: the striker keeps 1 − 4 n² / (1 + 2 n²) of its speed, n the cosine of the normals",
+        np.eye(6), exact.astype(float), np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 1.0, exact_jacobian=exact,
+    )  # fmt: skip
+
+
+def rocking_block() -> HardCase:
+    """A block of half sides 3 and 4 that turns about one lower corner, as the other strikes."""
+    half, high = 3.0, 4.0
+    inertia = (half**2 + high**2) / 3.0
+    turning = np.array([-high, half, 1.0])  # about the corner at (−half, −high), one radian a second
+    return HardCase(
+        "Rocking block, one rock",
+        "Housner, Bull. Seismological Society of America 53 (1963)",
+        "the struck corner holds in both directions, the other one leaves: energy goes by geometry alone",
+        "angular momentum about the struck corner is kept: ω⁺ = ω⁻ (1 − 3/2 sin² α), α the block's slenderness",
+        np.diag([1.0, 1.0, inertia]), np.array([[0.0, 1.0, half], [1.0, 0.0, high]]), turning, 0.0,
+    )  # fmt: skip
+
+
+def superball() -> HardCase:
+    """A ball of radius 1/8 whose point of contact returns along and across the wall."""
+    radius = 0.125
+    return HardCase(
+        "Superball with grip",
+        "Garwin, American J. of Physics 37 (1969)",
+        "the tangential row is elastic as well: spin and sliding trade energy without loss",
+        "both velocities of the point are reversed, energy kept",
+        np.diag([1.0, 1.0, 0.4 * radius**2]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, radius]]),
+        np.array([2.0, -1.0, 3.0]), 1.0,
+    )  # fmt: skip
+
+
+def stack_of_mass_ratio() -> HardCase:
+    """Eight bodies in a column, heavy and a million times lighter by turns, stopped against each other."""
+    masses = np.array([1.0, 1e-6] * 4)
+    return HardCase(
+        "Stack of eight bodies, mass ratio 1e6",
+        "stacks are where penalties and iterative solvers fail first: Acary and Brogliato (2008), chapter 1",
+        "light bodies carry the blow between heavy ones: W couples 1 and 1e6",
+        "one velocity for all, that of the momentum",
+        np.diag(masses), cradle_rows(8), np.array([-1.0, 0.5, 0.0, 0.0, 0.25, 0.0, 0.0, 2.0]), 0.0,
+    )  # fmt: skip
+
+
+def wedge() -> HardCase:
+    """A point driven into the corner of two walls that open by 4e-6: a triangle of whole numbers."""
+    m = 10**6
+    n, t = Fraction(m * m - 1, m * m + 1), Fraction(2 * m, m * m + 1)
+    exact = np.array([[n, t], [-n, t]], dtype=object)
+    return HardCase(
+        "Wedging between walls 4e-6 apart in angle",
+        "a wedge: friction cones and normals nearly opposite",
+        "the rows are nearly opposite: what pushes out is a millionth of what presses",
+        "both speeds reversed, to rounding over the angle",
+        np.eye(2), exact.astype(float), np.array([0.5, -1.0]), 0.5, exact_jacobian=exact,
+    )  # fmt: skip
+
+
+def painleve_impact() -> FrictionalCase:
+    """The rod of Painlevé struck at its lower end, sliding, at μ = 2."""
+    sine, cosine = 0.8, 0.6
+    return FrictionalCase(
+        "Painlevé's rod, its impact",
+        "Painlevé (1895); Génot and Brogliato (1999)",
+        "sliding friction alone would press the end harder than it holds it: the slip stops within the impact",
+        "restitution met, no gain: tangential impulse up to sticking, reduced to what the impact can pay for",
+        np.diag([1.0, 1.0, 1.0 / 12.0]), np.array([[0.0, 1.0, -0.5 * cosine]]), np.array([-1.0, -0.1, 0.0]), 0.0,
+        methods=("factored", "Newton with Coulomb"), tangent=np.array([[1.0, 0.0, 0.5 * sine]]), friction=2.0,
+    )  # fmt: skip

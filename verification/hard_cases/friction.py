@@ -1,0 +1,328 @@
+"""Dry friction at its edges: Kane and Levinson's double pendulum, just below and above sliding, Painlevé's rod.
+
+Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with friction makes energy. Two
+uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from the vertical, angles of the triangles 5-12-13 and
+8-15-17, near the 20° and 30° of the source: every sine and cosine is a fraction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.run import Run
+from iapb.scene import Scene, scene_from_text
+from verification.hard_cases.case import (
+    COULOMB,
+    NEWTON_COULOMB,
+    NO_GAIN,
+    FrictionalCase,
+    HardCase,
+    Measured,
+    TrajectoryCase,
+    largest_gain,
+)
+
+_G = 9.81
+_WORLDS = ("IAPB", "PB", COULOMB)
+
+# --- Kane and Levinson's double pendulum -----------------------------------------------------------------------
+_SOURCE = "Kane and Levinson, Dynamics: Theory and Applications (1985); Kane (1984); angles and speeds ours"
+_S1, _C1, _S2, _C2 = 5 / 13, 12 / 13, 8 / 17, 15 / 17
+_MASS = np.array([[4 / 3, 0.5 * (_C1 * _C2 + _S1 * _S2)], [0.5 * (_C1 * _C2 + _S1 * _S2), 1 / 3]])
+_NORMAL, _TANGENT = np.array([[_S1, _S2]]), np.array([[_C1, _C2]])
+_VELOCITY = np.array([-0.1, -0.2])
+_RESTITUTION, _FRICTION = 0.5, 0.5
+_FLOOR = -(_C1 + _C2) - 1e-3  # [m] height of the floor: a millimetre below the tip
+
+
+def double_pendulum_without_friction() -> HardCase:
+    """The paper's collision: assumption (iii) leaves friction out."""
+    return HardCase(
+        "Kane and Levinson's double pendulum, frictionless impact",
+        _SOURCE,
+        "the two rods turn each other: the tip's effective mass is a fifth of a rod's",
+        "½ (1 − e²) γ²/W is lost, as Theorem 1 says",
+        _MASS,
+        _NORMAL,
+        _VELOCITY,
+        _RESTITUTION,
+    )
+
+
+def double_pendulum_with_friction() -> HardCase:
+    """The famous gain: Newton's law in the normal, Coulomb's in the tangential direction."""
+    return FrictionalCase(
+        "Kane and Levinson's double pendulum, impact with friction",
+        _SOURCE,
+        "friction reverses the slip: with Newton's and Coulomb's laws as they stand the energy triples",
+        "restitution is met and no energy gained: friction is reduced to what the impact can pay for",
+        _MASS,
+        _NORMAL,
+        _VELOCITY,
+        _RESTITUTION,
+        methods=("factored", NEWTON_COULOMB),
+        tangent=_TANGENT,
+        friction=_FRICTION,
+    )
+
+
+_SCENE = f"""
+name: kane_levinson
+title: Kane and Levinson's double pendulum on a rough floor
+source: "{_SOURCE}"
+rate: 2000
+duration: 0.5
+gravity: [0, -{_G}]
+bodies:
+  - name: upper
+    joint: revolute
+    mass: 1.0
+    center_of_mass: [0.5, 0]
+    inertia: 0.08333333333333333
+    position: [{math.atan2(5, 12) - math.pi / 2!r}]
+  - name: lower
+    parent: upper
+    joint: revolute
+    origin: [1, 0]
+    mass: 1.0
+    center_of_mass: [0.5, 0]
+    inertia: 0.08333333333333333
+    shapes:
+      - {{kind: circle, radius: 1.0e-6, center: [1, 0]}}
+    position: [{math.atan2(8, 15) - math.atan2(5, 12)!r}]
+    velocity: [-0.1]
+walls:
+  - {{name: floor, kind: half_plane, point: [0, {_FLOOR!r}], normal: [0, 1]}}
+contact:
+  restitution: {_RESTITUTION}
+  friction: {_FRICTION}
+  stiffness: 1e4
+  damping: 100
+  coherence_distance: 1e-2
+"""
+
+
+def double_pendulum_motion() -> TrajectoryCase:
+    """The same pendulum falling on the floor from 1 mm, for half a second of bounces."""
+    return TrajectoryCase(
+        "Kane and Levinson's double pendulum, its motion",
+        _SOURCE,
+        "a bounce with friction may throw it higher than it fell",
+        "never more energy than it fell with; Newton's and Coulomb's laws step by step do not promise that",
+        "energy balance: kinetic and potential energy never exceed those of the start; until the tip touches, the "
+        "equations of two rods, integrated to twelve digits",
+        scene_from_text(_SCENE),
+        _measure_pendulum,
+        worlds=("IAPB", "PB", "ideal", COULOMB),
+    )
+
+
+def _measure_pendulum(run: Run) -> Measured:
+    """Distance from the flight that two rods make, at the last instant before the tip touches, as a share of it.
+
+    A first-order step of semi-implicit Euler is ahead by half a step's acceleration: at most a step in the time flown.
+    """
+    time, angles = _flight()
+    last = int(time / run.dt) - 1
+    q = run.q[last] @ np.array([[1.0, 1.0], [0.0, 1.0]])  # angles against the horizontal
+    start = run.q[0] @ np.array([[1.0, 1.0], [0.0, 1.0]])
+    truth = angles(last * run.dt)
+    off = float(np.abs(q - truth).max() / np.abs(truth - start).max())
+    return Measured(largest_gain(run), NO_GAIN, off, run.dt / (last * run.dt))
+
+
+@cache
+def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
+    """When the tip touches the floor [s], and the two angles against the horizontal up to then."""
+    from scipy.integrate import solve_ivp
+
+    start = np.array([math.atan2(5, 12) - math.pi / 2, math.atan2(8, 15) - math.pi / 2, 0.0, -0.1])
+
+    def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        (a, b), (u, w) = state[:2], state[2:]
+        c, s = 0.5 * math.cos(a - b), 0.5 * math.sin(a - b)
+        force = [-s * w * w - 1.5 * _G * math.cos(a), s * u * u - 0.5 * _G * math.cos(b)]
+        return np.concatenate([state[2:], np.linalg.solve([[4 / 3, c], [c, 1 / 3]], force)])
+
+    def touches(_: float, state: NDArray[np.float64]) -> float:
+        return float(np.sin(state[:2]).sum()) - _FLOOR - 1e-6  # the tip's radius
+
+    touches.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=touches, dense_output=True, rtol=1e-12, atol=1e-14)
+    return float(found.t_events[0][0]), lambda time: np.asarray(found.sol(time)[:2])
+
+
+# --- a block pushed along the floor ---------------------------------------------------------------------------
+_MU, _DURATION, _CREEP = 0.3, 0.2, 1e-3  # friction, [s], v_threshold of (6) [m/s]
+# Rounding over 800 steps, and what the springs' rest takes: no world that keeps its law is off by more.
+_KEPT = 1e-6
+# Coulomb's law by a rigid step of first order: half a step in the time of the push is 6e-4 of the distance.
+_FIRST_ORDER = 0.01
+
+_BLOCK = """
+name: pushed_block
+title: A block pushed along the floor
+source: textbook
+rate: 4000
+duration: {duration}
+gravity: [0, -{g}]
+bodies:
+  - name: block
+    joint: planar
+    mass: 1.0
+    inertia: 0.0020833333333333333
+    shapes: [{{kind: box, size: [0.15, 0.05]}}]
+    position: [0, {height}, 0]
+walls:
+  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+contact: {{stiffness: 1e4, damping: 100, friction: {mu}, friction_velocity: {creep}, coherence_distance: 2e-3}}
+hand: {{body: block, point: [0, -{level}], force: [{force}, 0, 0]}}
+"""
+
+
+def sticking_threshold() -> TrajectoryCase:
+    """A push of 0.99 μ m g."""
+    return _pushed(0.99, "Sticking, 1 % below the threshold", "it sticks; law (6) creeps at 0.99 v_threshold for ever")
+
+
+def sliding_threshold() -> TrajectoryCase:
+    """A push of 1.01 μ m g."""
+    expected = "it slides by ½ 0.01 μ g t²; law (6) runs ahead by nearly v_threshold t"
+    return _pushed(1.01, "Sliding, 1 % above the threshold", expected)
+
+
+def creep_of_the_regularised_law() -> TrajectoryCase:
+    """A push of 0.99 μ m g, judged by law (6) itself."""
+
+    def measure(run: Run) -> Measured:
+        """Distance from (6), as a share of the way it creeps."""
+        creep = _creep(0.99, run.steps, run.dt)
+        return Measured(largest_gain(run), NO_GAIN, abs(float(run.q[-1, 0]) / creep - 1.0), _KEPT)
+
+    return TrajectoryCase(
+        "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
+        "the printed law never sticks: it must creep exactly as it says, no faster",
+        "0.99 v_threshold after a few steps",
+        "(6) for one coordinate, step by step", _block(0.99), measure, ("IAPB", "PB"),
+    )  # fmt: skip
+
+
+def _creep(share: float, steps: int, dt: float) -> float:
+    """How far law (6) lets a block move that a share of μ m g pushes [m]."""
+    x = v = 0.0
+    for _ in range(steps):
+        v += dt * _MU * _G * (share - min(1.0, v / _CREEP))
+        x += dt * v
+    return x
+
+
+def _block(share: float) -> Scene:
+    depth = _G / (2.0 * 1e4)  # sunk in by its own weight on two springs; friction acts half way down
+    return scene_from_text(_BLOCK.format(duration=_DURATION, g=_G, height=0.025 - depth, level=0.025 - 0.5 * depth,
+                                         mu=_MU, creep=_CREEP, force=share * _MU * _G))  # fmt: skip
+
+
+def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
+    slide = 0.5 * max(share - 1.0, 0.0) * _MU * _G * _DURATION**2
+    scale = slide or _CREEP * _DURATION  # what sticks is compared with the way of a creep at v_threshold
+
+    def measure(run: Run) -> Measured:
+        """Distance from Coulomb's answer, as a share of it."""
+        off = abs(float(run.q[-1, 0]) - slide) / scale
+        return Measured(largest_gain(run), NO_GAIN, off, _FIRST_ORDER)
+
+    return TrajectoryCase(
+        name, "Coulomb's law; (6) of the paper is a regularized one",
+        "one per cent of the force decides whether it moves", expected,
+        f"Coulomb's law in closed form: {slide * 1e3:.4g} mm after {_DURATION:g} s",
+        _block(share), measure, _WORLDS,
+    )  # fmt: skip
+
+
+# --- Painlevé's rod -------------------------------------------------------------------------------------------
+_SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
+_STOPPED_SLIP = 1e-3  # [m/s] v_threshold of (6): below it friction falls
+
+_ROD = f"""
+name: painleve_rod
+title: Painlevé's rod
+source: Painlevé (1895)
+rate: 4000
+duration: 0.1
+gravity: [0, -{_G}]
+bodies:
+  - name: rod
+    joint: planar
+    mass: 1.0
+    inertia: 0.08333333333333333
+    shapes: [{{kind: circle, radius: 1.0e-6, center: [-0.5, 0]}}]
+    position: [0, {0.5 * _SINE + 1e-6!r}, {math.atan2(_SINE, _COSINE)!r}]
+    velocity: [-{_SPEED}, 0, 0]
+walls:
+  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+contact:
+  stiffness: {_STIFF}
+  damping: 0
+  friction: {_ROUGH}
+  friction_velocity: {_STOPPED_SLIP}
+  coherence_distance: 5e-3
+"""
+
+
+def painleve_rod() -> TrajectoryCase:
+    """A rod pushed over its lower end at μ = 2, where 1/m + … < 0: no finite force keeps the contact closed."""
+    return TrajectoryCase(
+        "Painlevé's rod: sliding without a finite answer",
+        "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
+        "the contact's inertia is negative while it slides: rigid bodies have no acceleration, springs blow up",
+        "it jams: a rigid contact at once, a spring after the time in which its force has grown enough",
+        f"springs: the slip of the rod's own equations, stopped after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
+        scene_from_text(_ROD),
+        _measure_rod,
+        _WORLDS,
+    )
+
+
+@cache
+def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float64]]]:
+    """When springs have stopped the slip [s], and its speed up to then [m/s]: the rod's equations on one spring."""
+    from scipy.integrate import solve_ivp
+
+    def slip(state: NDArray[np.float64]) -> Any:
+        return state[3] + 0.5 * np.sin(state[2]) * state[5]
+
+    def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        sine, cosine = math.sin(state[2]), math.cos(state[2])
+        push = _STIFF * max(0.0, 0.5 * sine + 1e-6 - state[1])
+        turn = 12.0 * push * (-0.5 * cosine + 0.5 * sine * _ROUGH)
+        return np.array([*state[3:], _ROUGH * push, push - _G, turn])
+
+    def stops(_: float, state: NDArray[np.float64]) -> float:
+        return float(slip(state)) + _STOPPED_SLIP
+
+    stops.terminal = True  # type: ignore[attr-defined]
+    start = [0.0, 0.5 * _SINE + 1e-6, math.atan2(_SINE, _COSINE), -_SPEED, 0.0, 0.0]
+    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=stops, dense_output=True, rtol=1e-11, atol=1e-13)
+    return float(found.t_events[0][0]), lambda time: slip(found.sol(time))
+
+
+def _measure_rod(run: Run) -> Measured:
+    """Largest distance of the slip from its law's until it stops, as a share of the first slip.
+
+    Rigid: no slip from the first step on, but for the turn of the rod within a step. Springs: a first-order step is a
+    step late or early at most, while the slip falls at its steepest.
+    """
+    slip = run.v[:, 0] + 0.5 * np.sin(run.q[:, 2]) * run.v[:, 2]
+    end, truth = _slipping()
+    if run.law == "rigid constraints":
+        return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[1:]).max()) / _SPEED, _FIRST_ORDER)
+    slipping = run.time < end
+    true = truth(run.time[slipping])
+    steepest = float(np.abs(np.diff(true)).max())
+    return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[slipping] - true).max()) / _SPEED, steepest / _SPEED)

@@ -1,0 +1,226 @@
+"""Motions with a law in closed form: contact chatter, a sampled wall about Colgate's bound, a wedged peg, a cradle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.run import Run
+from iapb.scene import find_scene, load_scene, scene_from_text
+from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain
+
+# --- a ball that chatters --------------------------------------------------------------------------------------
+_HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
+# Each bounce is found up to a step late: bounce k is k steps late at speed v eᵏ, in all v Δt Σ k eᵏ = 2 v Δt for e = ½;
+# the first is one step deep, and the height between two instants is off by as much.
+_STEPS_LATE = 4.0
+
+_SCENE = f"""
+name: chatter
+title: A ball that chatters to rest
+source: textbook
+rate: 1000
+duration: 1.0
+gravity: [0, {-_GRAVITY}]
+bodies:
+  - {{name: ball, joint: prismatic, axis: [0, 1], mass: 1.0, shapes: [{{kind: circle, radius: {_RADIUS}}}],
+     position: [{_RADIUS + _HEIGHT}]}}
+walls:
+  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+contact:
+  restitution: {_RESTITUTION}
+  stiffness: 1e5
+  damping: 200
+  coherence_distance: 5e-3
+"""
+
+
+def chatter() -> TrajectoryCase:
+    """Dropped from 0.1 m with e = ½."""
+    return TrajectoryCase(
+        "Contact chatter: infinitely many bounces in 0.43 s",
+        "Zeno's bouncing ball; textbook",
+        "the bounces accumulate: an event-driven method never gets past their end, one that steps may ring on",
+        "the parabolas as far as a step can follow them, then rest",
+        f"parabolas of heights h e²ᵏ in closed form, at rest from {_end():.4f} s on",
+        scene_from_text(_SCENE),
+        _measure_chatter,
+    )
+
+
+def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height of the ball above the floor [m] by the closed form."""
+    fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
+    height = np.where(time < fall, _HEIGHT - 0.5 * _GRAVITY * time**2, 0.0)
+    start, speed = fall, _GRAVITY * fall * _RESTITUTION
+    while speed * speed / (2.0 * _GRAVITY) > np.finfo(float).eps * _HEIGHT:
+        flown = time - start
+        height = np.where((flown >= 0.0) & (flown < 2.0 * speed / _GRAVITY),
+                          speed * flown - 0.5 * _GRAVITY * flown**2, height)  # fmt: skip
+        start, speed = start + 2.0 * speed / _GRAVITY, speed * _RESTITUTION
+    return np.asarray(height, np.float64)
+
+
+def _end() -> float:
+    """When the last bounce ends [s]: the geometric series of flights."""
+    fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
+    return fall * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))
+
+
+def _measure_chatter(run: Run) -> Measured:
+    """Largest distance from the closed form, as a share of the drop."""
+    off = float(np.abs(run.q[:, 0] - _RADIUS - exact_height(run.time)).max()) / _HEIGHT
+    late = _STEPS_LATE * math.sqrt(2.0 * _GRAVITY * _HEIGHT) * run.dt / _HEIGHT
+    return Measured(largest_gain(run), NO_GAIN, off, late)
+
+
+# --- a sampled wall: at b > K T / 2 + |B| it is passive, beyond it a spring becomes a source of energy ----------
+_PHYSICAL_DAMPING = 0.5  # b [N s/m] of the device of scenes/wall_1d.yaml
+_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, the hand, the coupling
+_RADIUS_OF_HANDLE = 0.01
+_BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
+# Rounding over 1,536 steps, which each new contact multiplies: 1e-9 of the way, measured; a fault is far above.
+_SAME_NUMBERS = 1e-6
+
+
+def wall_at_the_bound() -> TrajectoryCase:
+    """K = 2 b / T exactly."""
+    return _wall(1, "the last stiffness for which passivity is proved", "no energy from the wall in any world")
+
+
+def wall_beyond_the_bound() -> TrajectoryCase:
+    """Five hundred times that."""
+    return _wall(500, "a penalty wall bounces the handle back faster than it came",
+                 "an impulse takes the speed before the spring sees it: no energy from the wall")  # fmt: skip
+
+
+def wall_far_beyond_the_bound() -> TrajectoryCase:
+    """Two thousand times that: T² K / m = 1.95, half of where the step itself diverges."""
+    return _wall(2000, "the spring alone carries lasting contact, and one step of it is as long as a bounce",
+                 "impulses do not save a spring this stiff: only the rigid wall is passive")  # fmt: skip
+
+
+def _wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
+    values = {"contact.stiffness": factor * _BOUND, "contact.damping": 0.0, "duration": 3.0}
+    name = "Stiff wall at the Colgate bound" if factor == 1 else f"Stiff wall, {factor:,} times the Colgate bound"
+
+    def measure(run: Run) -> Measured:
+        """Largest distance of the tool from the sampled law, as a share of its way to the wall."""
+        truth = sampled_wall(run.law, factor * _BOUND, run.steps, run.dt)
+        way = abs(float(run.q[0, 0])) - _RADIUS_OF_HANDLE
+        return Measured(largest_gain(run), NO_GAIN, float(np.abs(run.q[:, 0] - truth).max()) / way, _SAME_NUMBERS)
+
+    return TrajectoryCase(
+        name, "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml", why_hard, expected,
+        "Colgate and Schenkel's theorem: passive at the bound; beyond it no promise, so what is made is measured; "
+        "the motion: the sampled wall, tool and device written out for one coordinate",
+        load_scene(find_scene("wall_1d")).with_values(values), measure,
+    )  # fmt: skip
+
+
+def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[np.float64]:
+    """Positions of the tool (steps + 1,): two masses, their coupling, and a wall that is read once a step."""
+    x = [-0.03, -0.03]
+    v = [0.1, 0.1]
+    touching, path = False, [x[0]]
+    for _ in range(steps):
+        coupling = _COUPLING * (x[1] - x[0]) + _COUPLING_DAMPING * (v[1] - v[0])
+        depth = x[0] + _RADIUS_OF_HANDLE
+        struck = law == "impulse-augmented penalty" and depth >= 0.0 and not touching and v[0] > 0.0
+        touching = depth >= 0.0
+        impulse = -_MASS * v[0] if struck else 0.0
+        push = 0.0 if struck or law == "rigid constraints" else -stiffness * max(depth, 0.0)
+        v[0] += (impulse + dt * (_FORCE + push + coupling)) / _MASS
+        if law == "rigid constraints" and depth + dt * v[0] > 0.0:
+            impulse = -_MASS * (v[0] + depth / dt)
+            v[0] = -depth / dt
+        v[1] += dt * (_FORCE + push + impulse / dt - coupling - _PHYSICAL_DAMPING * v[1]) / _MASS
+        x = [place + dt * speed for place, speed in zip(x, v, strict=True)]
+        path.append(x[0])
+    return np.array(path)
+
+
+# --- a peg wedged in its hole ------------------------------------------------------------------------------------
+_STIFFNESS, _HAND, _DRAFT = 1000.0, 0.4, 0.01  # of scenes/peg_hole.yaml: wall [N/m], hand [N], slope of the sides
+_END = 0.0105  # y [m] of the peg's centre when its front meets the hole's end
+_STOPPED = 1e-9  # speed [m/s] of a body at rest: ten decades below that of the blow
+# The springs' rest position is met to a ten-thousandth: the coupling's own settling leaves 1e-8 after a second.
+_SETTLED = 1e-4
+
+
+def wedged_peg_motion() -> TrajectoryCase:
+    """The shipped scene: the hand pushes the peg to the end of its hole and keeps pushing."""
+    return TrajectoryCase(
+        "A peg wedged in its hole, its motion",
+        "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
+        "six gaps close in the same step; then a spring system of six contacts carries the hand's force",
+        "at rest at the end of the hole, no deeper than six springs allow",
+        "statics: 2 K δ + 4 K s² δ = F, s the sine of the draft; a rigid wall has δ = 0",
+        load_scene(find_scene("peg_hole")),
+        _measure_peg,
+    )
+
+
+def _measure_peg(run: Run) -> Measured:
+    """Distance from where the peg must rest, in units of the springs' static depth; one more where it moves still."""
+    sine = _DRAFT / math.hypot(1.0, _DRAFT)
+    depth = _HAND / (2.0 * _STIFFNESS + 4.0 * _STIFFNESS * sine**2)
+    place = _END if run.law == "rigid constraints" else _END - depth
+    off = float(np.abs(run.q[-1] - [0.0, place, 0.0]).max()) / depth
+    moving = float(np.abs(run.v[-1]).max() > _STOPPED)
+    return Measured(largest_gain(run), NO_GAIN, off + moving, _SETTLED)
+
+
+# --- Newton's cradle whose balls touch ---------------------------------------------------------------------------
+# Radii and places are binary fractions: touching is exact.
+_BALL = "{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1.0, shapes: [{{kind: circle, radius: 0.015625}}], "
+_CRADLE = """
+name: touching_cradle
+title: Newton's cradle whose balls touch
+source: textbook
+rate: 1000
+duration: 0.3
+bodies:
+{balls}
+contact: {{stiffness: {stiffness}, damping: 0, restitution: 1, coherence_distance: 2e-3}}
+"""
+_CRADLE_STIFFNESS = 1e4
+# Springs of damping 0, read once a step, keep their energy to second order: 2 K Δt² / m.
+_BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
+
+
+def touching_cradle() -> TrajectoryCase:
+    """Gaps of exactly 0: contacts that are there before the blow and carry nothing."""
+    return _cradle(0.0, "touching exactly")
+
+
+def cradle_a_micrometre_apart() -> TrajectoryCase:
+    """Gaps of 1e-6 m: found one after another, a blow each."""
+    return _cradle(1e-6, "a micrometre apart")
+
+
+def cradle_a_micrometre_sunk() -> TrajectoryCase:
+    """Overlaps of 1e-6 m: springs that push before the blow."""
+    return _cradle(-1e-6, "sunk by a micrometre")
+
+
+def _cradle(gap: float, words: str) -> TrajectoryCase:
+    places = [-0.053125] + [k * (0.03125 + gap) for k in range(4)]
+    balls = [f"  - {_BALL.format(k=k)}position: [{x!r}], velocity: [{float(k == 0)}]}}" for k, x in enumerate(places)]
+
+    def measure(run: Run) -> Measured:
+        """How far momentum and energy at the end are from those of the first ball, as shares."""
+        v = run.v[-1]
+        off = max(abs(float(v.sum()) - 1.0), abs(float(v @ v) - 1.0))
+        stored = 3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5  # by springs; read once a step, a tenth more
+        return Measured(largest_gain(run), NO_GAIN + 1.1 * stored, off, _BY_SPRINGS)
+
+    return TrajectoryCase(
+        f"Newton's cradle, {words}", "textbook; paper (12) for the rows",
+        "which rows collide decides the outcome: the blow is passed on by impulses or by springs",
+        "momentum kept and no energy made, whichever ball leaves",
+        "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
+        scene_from_text(_CRADLE.format(balls="\n".join(balls), stiffness=_CRADLE_STIFFNESS)), measure,
+    )  # fmt: skip
