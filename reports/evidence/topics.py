@@ -1,4 +1,4 @@
-"""The topics of the report, in reading order: one module with `compute(runner, depth, progress)`, and one line here."""
+"""The topics of the report in reading order: a study `function(run, depth, progress) -> Finding` and one line here."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from importlib import import_module
 from reports.runner import Runner
 from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
 
-# id of the topic -> module of reports.evidence
+# key of the finding -> module and function of its study
 TOPICS: dict[str, str] = {
-    "mechanics": "mechanics",
-    "scene-ledger": "scenes",
-    "stability": "stability",
-    "complementarity": "complementarity",
-    "engines": "engines",
-    "haptic-rate": "haptic_rate",
-    "survival": "survival",
+    "mechanics": "reports.evidence.mechanics:compute",
+    "scene-ledger": "verification.scenes.ledger:scene_ledger",
+    "stability": "reports.evidence.stability:compute",
+    "complementarity": "reports.evidence.complementarity:compute",
+    "engines": "reports.evidence.engines:compute",
+    "haptic-rate": "reports.evidence.haptic_rate:compute",
+    "survival": "reports.evidence.survival:compute",
 }
 
 
 def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Compute one topic."""
-    topic: Finding = import_module(f"reports.evidence.{TOPICS[name]}").compute(runner, depth, progress)
+    module, function = TOPICS[name].split(":")
+    topic: Finding = getattr(import_module(module), function)(runner, depth, progress)
     return topic
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from iapb import find_scene, load_scene
-from reports.evidence import engines, haptic_rate, scenes, stability
+from iapb import find_scene
+from reports.evidence import engines, haptic_rate, stability
 from reports.runner import Runner
 from verification.cost import (
     against_mujoco,
@@ -27,6 +27,7 @@ from verification.cost import (
 from verification.cost import haptic_rate as rate
 from verification.engines import study as engines_study
 from verification.finding import Finding
+from verification.scenes import ledger
 from verification.stability import device_port, maps, peg, waveforms
 
 
@@ -92,10 +93,10 @@ def test_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
     """The second is the scene whose step is the unit of time."""
     names = ("peg_corner", "two_discs", "tumbling_body")
-    monkeypatch.setattr("iapb.scene.scene_names", lambda: names)
-    monkeypatch.setattr(scenes, "shipped_scene", broken(lambda scene: load_scene(find_scene(scene)), name.__eq__))
-    monkeypatch.setattr(scenes, "TIMED_AGAIN", 0)
-    topic = scenes.compute(Runner(tmp_path), "quick", nothing)
+    monkeypatch.setattr(ledger, "scene_names", lambda: names)
+    monkeypatch.setattr(ledger, "find_scene", broken(find_scene, name.__eq__))
+    monkeypatch.setattr(ledger, "TIMED_AGAIN", 0)
+    topic = ledger.scene_ledger(Runner(tmp_path), "quick", nothing)
     assert lost(topic) == [name]
     assert [row[0] for row in topic.tables["energy ledger"].rows] == [each for each in names if each != name]
     assert len(topic.parts) == 8

@@ -7,7 +7,7 @@ import pytest
 
 from reference.worlds import run_world
 from verification.mechanics.false_collisions import FalseCollisions, socket, study_false_collisions
-from verification.scenes.open_books import open_books
+from verification.scenes.energy_books import open_books
 
 
 def by_filters(damping: float) -> dict[tuple[bool, bool], FalseCollisions]:

@@ -1,0 +1,214 @@
+"""The energy books of a run: what it held, was given and lost, and what the steps in time leave open, by size.
+
+The normal force (5) of a contact is a spring K s and a damper −B v_n, together never pulling. The spring's energy is
+K s² / 2; the damper's work is its force, held over the step, times the distance that the touching points moved apart.
+
+A force held over a step does not do the work of the force that changes within it. That error is the integrator's, and
+falls with its declared order; anything in the books that does not fall is a fault. It has two channels, the motion and
+the contact springs, which may have opposite signs: their sizes are added, so that one cannot hide the other.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.mechanics.integrators import INTEGRATORS
+from iapb.run import Run
+from iapb.scene import Scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of
+
+Floats = NDArray[np.float64]
+Book = Mapping[str, float]
+
+REFINEMENTS = (1, 2, 4)  # steps of the scene's length, of half and of a quarter of it
+ROUNDING = 1e-12  # share of all energy in the books: some thousand sums in double precision stay below
+ORDER_SLACK = 0.25  # by which a measured order may fall short: collisions come at other instants at another step
+BOOK = (
+    "kinetic, start [J]", "potential, start [J]", "in contact springs, start [J]", "kinetic, end [J]",
+    "potential, end [J]", "in contact springs, end [J]", "work of the hand [J]", "work of the coupling [J]",
+    "lost in impacts [J]", "lost in contact damping [J]", "lost in friction [J]", "open: motion [J]",
+    "open: springs [J]", "energy turned over [J]", "open by size, share of the energy turned over [%]",
+    "most energy beyond what was put in [%]",
+)  # fmt: skip
+OPEN_SHARE, GAIN_SHARE = "open by size, share of the energy turned over", "most energy beyond what was put in"
+_HELD = ("kinetic", "potential", "in contact springs")
+
+
+@dataclass(frozen=True)
+class EnergySeries:
+    """The books at every instant (n + 1,) [J]: what is held, what was put in so far, what was lost so far."""
+
+    kinetic: Floats
+    potential: Floats
+    springs: Floats
+    given: Floats
+    lost_impacts: Floats
+    lost_damping: Floats
+    lost_friction: Floats
+
+
+def energy_series(run: Run) -> EnergySeries:
+    """Return the books of a run over time."""
+    ledger, (springs, damping_work) = run.energy, contact_energy(run, scene_of(run))
+
+    def so_far(sums: Floats) -> Floats:
+        return np.append(0.0, sums)
+
+    return EnergySeries(
+        ledger["kinetic"], ledger["potential"], springs, so_far(ledger["hand_work"] + ledger["coupling_work"]),
+        so_far(ledger["impact_loss"]), so_far(-damping_work), so_far(-ledger["friction_work"]),
+    )  # fmt: skip
+
+
+def scene_of(run: Run) -> Scene:
+    """Return the scene that the run carries with it."""
+    return scene_from_text(json.dumps(run.scene_resolved))
+
+
+def energy_book(run: Run) -> dict[str, float]:
+    """Close the books of a run: the quantities of BOOK by their keys.
+
+    The ledger (`iapb.mechanics.energy`) has the work of the penalties in one sum; here it is split into what the
+    springs hold at the end, what the dampers took, and the rest, which a spring felt only once a step makes up.
+    """
+    series, ledger, turned = energy_series(run), run.energy, turned_over(run)
+    parts = dict(zip(_HELD, (series.kinetic, series.potential, series.springs), strict=True))
+    held = series.kinetic + series.potential + series.springs
+    work_of_springs = float(ledger["penalty_work"][-1] + series.lost_damping[-1])
+    book = {f"{name}, {when}": float(values[place])
+            for name, values in parts.items() for when, place in (("start", 0), ("end", -1))}  # fmt: skip
+    book |= {
+        "work of the hand": float(ledger["hand_work"][-1]), "work of the coupling": float(ledger["coupling_work"][-1]),
+        "lost in impacts": float(series.lost_impacts[-1]) + 0.0,  # + 0.0: no minus before nothing
+        "lost in contact damping": float(series.lost_damping[-1]) + 0.0,
+        "lost in friction": float(series.lost_friction[-1]) + 0.0,
+        "open: motion": float(ledger["integration_residual"][-1]),
+        "open: springs": work_of_springs + float(series.springs[-1] - series.springs[0]),
+        "energy turned over": turned,
+    }  # fmt: skip
+    gain = float((held - held[0] - series.given).max())
+    return book | {OPEN_SHARE: 100 * share(left_open(book), turned), GAIN_SHARE: 100 * share(gain, turned)}
+
+
+def turned_over(run: Run) -> float:
+    """Return the largest of: kinetic energy at any time, range of the potential, work of hand and of coupling [J]."""
+    ledger = run.energy
+    candidates = [ledger["kinetic"].max(), np.ptp(ledger["potential"])]
+    candidates += [np.abs(ledger[name]).max(initial=0.0) for name in ("hand_work", "coupling_work")]
+    return float(max(candidates))
+
+
+def share(part: float, whole: float) -> float:
+    """Return part / whole; nothing of nothing is no share."""
+    return part / whole if whole > 0.0 else 0.0
+
+
+def left_open(book: Book) -> float:
+    """Return the size [J] of what the motion and the springs make up, added without signs."""
+    return abs(book["open: motion"]) + abs(book["open: springs"])
+
+
+def total(book: Book, when: str) -> float:
+    """Return all energy [J] that is held at the "start" or the "end"."""
+    return sum(book[f"{name}, {when}"] for name in _HELD)
+
+
+def is_rounding(book: Book) -> bool:
+    """Tell whether what is open is no more than rounding of the energies in the books."""
+    scale = max(abs(total(book, "start")), abs(total(book, "end")), book["energy turned over"])
+    return left_open(book) <= ROUNDING * scale
+
+
+@dataclass(frozen=True)
+class OpenBooks:
+    """What a scene leaves open at shorter steps.
+
+    step : the scene's own [s]; refinements : by which it was divided
+    open_shares : at each refinement, by size, of the energy turned over; order : None where all is rounding
+    """
+
+    scene: str
+    step: float
+    refinements: tuple[int, ...]
+    open_shares: tuple[float, ...]
+    declared_order: int
+    order: float | None
+
+    @property
+    def falls_as_declared(self) -> bool:
+        """Whether what is open is rounding, or falls at least with the declared order."""
+        return self.order is None or self.order >= self.declared_order - ORDER_SLACK
+
+    def step_for(self, wanted: float) -> float | None:
+        """Return the step [s] at which a share `wanted` is left open: the tried one, else by the measured order."""
+        for factor, found in zip(self.refinements, self.open_shares, strict=True):
+            if found <= wanted:
+                return self.step / factor
+        if self.order is None or self.order <= 0.0:
+            return None
+        return self.step / self.refinements[-1] * (wanted / self.open_shares[-1]) ** (1.0 / self.order)
+
+
+def measured_order(first: float, last: float, refinement: float) -> float:
+    """Return p of an error that falls as step^p from `first` to `last`, over a refinement of the step."""
+    return math.log(first / last) / math.log(refinement) if last > 0.0 else math.inf
+
+
+def open_books(
+    scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequence[int] = REFINEMENTS
+) -> OpenBooks:
+    """Run a scene at shorter and shorter steps and return what its books leave open.
+
+    simulate : returns the run of a scene, in whatever world
+    """
+    books: list[dict[str, float]] = []
+    for factor in refinements:
+        run = simulate(scene.with_values({"rate": scene.rate * factor}))
+        books.append(energy_book(run))
+        if is_rounding(books[-1]):
+            break
+    done = tuple(refinements[: len(books)])
+    falls = None if len(done) < 2 else measured_order(left_open(books[0]), left_open(books[-1]), done[-1] / done[0])
+    return OpenBooks(scene.name, 1.0 / scene.rate, done, tuple(book[OPEN_SHARE] / 100 for book in books),
+                     INTEGRATORS[run.law_settings["integrator"]].order, falls)  # fmt: skip
+
+
+def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats]:
+    """Return the energy in the contact springs at each instant (n + 1,) and the work of the dampers so far (n,) [J]."""
+    contacts = run.contacts
+    step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))
+    overlap = np.maximum(-contacts.gap, 0.0)
+    spring = scene.contact.stiffness * overlap
+    # Spring and damper act where they push, or where the damper cancels the spring. In a group that collides
+    # neither acts: the impulse does. Where the damper would pull more than the spring pushes it is cut.
+    cancelled = spring <= scene.contact.damping * contacts.normal_velocity
+    acts = (contacts.normal_force != 0.0) | cancelled
+    damper = np.where(acts, contacts.normal_force - spring, 0.0)
+    held = np.bincount(step, 0.5 * scene.contact.stiffness * overlap**2 * acts, minlength=run.steps)
+    work = np.bincount(step, damper * separations(run, scene, step), minlength=run.steps)
+    return np.append(held, held[-1:]), np.cumsum(work)  # the last state has no contacts recorded
+
+
+def separations(run: Run, scene: Scene, step: NDArray[np.int64]) -> Floats:
+    """Return how far (m,) [m] the touching points of each contact moved apart along its normal during its step."""
+    contacts = run.contacts
+    if not len(step):
+        return np.zeros(0)
+    mechanism = mechanism_of(scene)
+    places = [mechanism.placements(q) for q in run.q]
+    rotation, position = (np.array(part) for part in zip(*places, strict=True))
+
+    def moved(body: NDArray[np.int64]) -> Floats:
+        own = np.maximum(body, 0)
+        arm = np.einsum("mji,mj->mi", rotation[step, own], contacts.point - position[step, own])
+        end = np.einsum("mij,mj->mi", rotation[step + 1, own], arm) + position[step + 1, own]
+        return np.where((body >= 0)[:, None], end - contacts.point, 0.0)
+
+    apart: Floats = np.einsum("mi,mi->m", contacts.normal, moved(contacts.body_a) - moved(contacts.body_b))
+    return apart

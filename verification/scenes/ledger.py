@@ -1,0 +1,334 @@
+"""The scenes that come with the project, in the world IAPB: how deep, where the energy went, how long a step takes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from iapb.run import Run
+from iapb.scene import find_scene, load_scene, scene_names
+from reference.worlds import run_world
+from verification.finding import (
+    MIXED,
+    NOT_COMPUTED,
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    attempt,
+    finding_of,
+    of_each,
+    table_of,
+    titled,
+)
+from verification.scenes.energy_books import (
+    BOOK,
+    GAIN_SHARE,
+    OPEN_SHARE,
+    ROUNDING,
+    OpenBooks,
+    energy_book,
+    energy_series,
+    open_books,
+    scene_of,
+    total,
+)
+
+Measure = Mapping[str, Any]
+
+TITLE = "The scenes"
+QUESTION = (
+    "Every scene file of the project, run in the world IAPB at the scene's own step. The energy books say where each "
+    "joule came from and went; what they leave open is energy that the steps in time made up or swallowed, and must "
+    "fall with the integrator's declared order when the step is shortened. It is added by size, over the motion and "
+    "the contact springs: opposite signs do not cancel. Other load on the machine lengthens the times per step: "
+    "compare the ratios."
+)
+WORLD = "IAPB"
+TIMED_AGAIN = 3  # short runs are timed in one piece, which may hold compilation
+REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
+YARDSTICK = "peg_corner"  # the paper's scene: its step is the unit of time
+INSTANTS = 90  # of the books over time: as many as a strip of the figure can show
+
+AT_REST = 1e-3  # share of the largest kinetic energy below which a scene is said to have come to rest
+NEVER_MOVED = 1e-9  # share of the energy turned over: a kinetic energy below it is rounding and settling springs
+LAST_PART = 0.1  # share of the run in which it has to be so
+RESTS, SETTLES, MOVES, STOPPED = "stays at rest", "comes to rest", "keeps moving", "stopped: "
+
+DEEP = 0.5  # share of the thinnest moving shape from where a contact would be pushed out on the wrong side
+WORTH_NAMING = 1.0  # [%] of the energy turned over from which open books are named one by one
+
+_TIMES = ("time per step [µs]", "time per step, peg in the corner = 1", "times faster than real time")
+CONTACTS = titled((
+    "scene", "dimensions", "steps", "step [ms]", "most penetration [mm]", "thinnest moving shape [mm]", "impacts",
+    "most rows in one impact", "most energy added by an impact, share of the energy turned over",
+    "most contacts in one step", *_TIMES, "how it ends", "energy turned over [J]",
+), timed=_TIMES).columns  # fmt: skip
+LEDGER = titled(("scene", *BOOK)).columns
+_ADDED = "most energy added by an impact, share of the energy turned over"
+_SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_damping", "lost_friction")
+
+
+def scene_ledger(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Run every scene, at shorter steps too, and keep the books of each.
+
+    Parameters
+    ----------
+    run : (scene, world, keep=True) -> Run; what need not be kept is asked for with keep=False
+    """
+    names, failures = scene_names(), list[Failure]()
+    done = iter(range(len(names)))
+
+    def studied(name: str) -> Iterator[tuple[Measure, OpenBooks, Table]]:
+        progress(next(done), len(names))
+        scene = load_scene(find_scene(name))
+        found = run(scene, WORLD)
+        measured = measure(found, [run_world(scene, WORLD) for _ in range(TIMED_AGAIN)])
+        refined = open_books(scene, lambda shorter: run(shorter, WORLD, keep=False), REFINEMENTS[depth])
+        yield measured, refined, over_time([found])
+
+    found = list(of_each(names, studied, failures))
+    progress(len(names), len(names))
+    measures, books, series = (list(part) for part in zip(*found, strict=True)) if found else ([], [], [])
+    return finding(measures, books, series, failures)
+
+
+def finding(
+    measures: Sequence[Measure], books: Sequence[OpenBooks], series: Sequence[Table], failures: Sequence[Failure] = ()
+) -> Finding:
+    """Return what these records say; the scene that is the unit of time may have failed."""
+    judges = {
+        "overlap": partial(_penetration, measures), "impacts": partial(_impacts, measures),
+        "order": partial(_order, books), "open books": partial(_open, measures, books),
+        "gains": partial(_gains, measures), "endings": partial(_endings, measures), "time": partial(_time, measures),
+    }  # fmt: skip
+    more = list(failures)
+    tried = [attempt(f"sentence on {name}", judge, more) for name, judge in judges.items()]
+    tables = {"contact and time": contacts(measures), "energy ledger": ledger(measures),
+              "what the books leave open": left_open_table(books),
+              "books over time": Table(over_time(()).columns, tuple(row for one in series for row in one.rows))}
+    deepest, widest = _deepest(measures), max(measures, key=_open_share)
+    answer = (
+        f"{len(measures)} scenes, {sum(m['dimensions'] == 3 for m in measures)} of them in space: at most "
+        f"{deepest['most penetration']:.2f} mm of overlap; the energy books close to rounding or to the integrator's "
+        f"order in {sum(each.falls_as_declared for each in books)}, and at the scene's own step leave "
+        f"{_open_share(widest):.1f} % open by size at worst ({widest['scene']})."
+    )
+    return finding_of("scene-ledger", TITLE, QUESTION, answer, [one for one in tried if one], tables, more)
+
+
+def measure(run: Run, again: Sequence[Run] = ()) -> dict[str, Any]:
+    """Return one row of both tables; `again`: the same simulation once more, to time its step with less chance.
+
+    The time is that of the quickest timed chunk: the first may hold compilation, and other load only adds.
+    """
+    pace = min(float((timed.chunk_seconds / timed.chunk_steps).min()) for timed in (run, *again))
+    book = energy_book(run)
+    turned = book["energy turned over"]
+    return {
+        "scene": run.scene_name, "dimensions": getattr(scene_of(run), "dimensions", 2), "steps": run.steps,
+        "step": 1e3 * run.dt, "most penetration": 1e3 * float(np.maximum(-run.contacts.gap, 0.0).max(initial=0.0)),
+        "thinnest moving shape": thinnest(run), "impacts": len(run.impacts.step),
+        "most rows in one impact": int(run.impacts.rows.max(initial=0)),
+        _ADDED: float(-run.impacts.energy_lost.min(initial=0.0)) / turned if turned else 0.0,
+        "most contacts in one step": int(np.diff(run.contacts.offsets).max(initial=0)), "time per step": 1e6 * pace,
+        "times faster than real time": run.dt / pace, "how it ends": ending(run, turned), **book,
+    }  # fmt: skip
+
+
+def ending(run: Run, turned: float) -> str:
+    """Return in words how the scene stands in the last tenth of the run."""
+    if not run.complete:
+        return STOPPED + run.stopped
+    kinetic = run.energy["kinetic"]
+    largest, last = kinetic.max(), kinetic[-max(int(LAST_PART * len(kinetic)), 1) :].max()
+    if largest <= NEVER_MOVED * max(turned, abs(run.energy["potential"][0])):
+        return RESTS
+    return SETTLES if last <= AT_REST * largest else MOVES
+
+
+def thinnest(run: Run) -> float | None:
+    """Return the smallest thickness [mm] of a moving shape; None where there is no shape."""
+    shapes = [shape for body in run.scene_resolved["bodies"] for shape in body["shapes"]]
+    return 1e3 * min(map(_thickness, shapes)) if shapes else None
+
+
+def _thickness(shape: Mapping[str, Any]) -> float:
+    if "radius" in shape:
+        return 2.0 * float(shape["radius"])
+    return float(min(shape["size"]) if "size" in shape else np.ptp(np.array(shape["vertices"]), axis=0).min())
+
+
+def contacts(measures: Sequence[Measure]) -> Table:
+    """How deep, how many collisions, how long a step takes, how it ends."""
+    unit = _pace(measures)
+    rows = ({**m, "time per step, peg in the corner = 1": unit and m["time per step"] / unit} for m in measures)
+    note = "Time of the quickest part of each run, measured on this machine: compare the ratios."
+    return table_of(CONTACTS, rows, digits=3, note=note)
+
+
+def _pace(measures: Sequence[Measure]) -> float | None:
+    """Time of the yardstick's step [µs]; None where that scene failed."""
+    return next((m["time per step"] for m in measures if m["scene"] == YARDSTICK), None)
+
+
+def ledger(measures: Sequence[Measure]) -> Table:
+    """Every joule of each run."""
+    note = (
+        "End − start = work of hand and coupling − losses + open. Open is energy that the steps in time made up (> 0) "
+        "or swallowed (< 0): by forces on the motion that are held over a step, and by springs that are felt once a "
+        "step; the share adds the sizes of both. A loss too is a force times a path, held over each step, and can so "
+        "come out a little below zero. Shares are of the energy turned over: the largest of kinetic energy, range of "
+        "the potential, work of hand and of coupling."
+    )
+    return table_of(LEDGER, measures, digits=3, note=note)
+
+
+def left_open_table(books: Sequence[OpenBooks]) -> Table:
+    """What is open at shorter and shorter steps, the order at which it falls, and the step where it is gone."""
+    refinements: tuple[int, ...] = max((each.refinements for each in books), key=len, default=())
+    headings = ["open at the scene's step [%]" if k == 1 else f"at 1/{k} of it [%]" for k in refinements]
+    rows = [
+        (each.scene, *(100 * value for value in each.open_shares),
+         *(None,) * (len(refinements) - len(each.open_shares)), each.declared_order, each.order, 1e3 * each.step,
+         _milliseconds(each))
+        for each in books
+    ]  # fmt: skip
+    note = ("By size, motion and springs added. No order: what is open is rounding, and no shorter step was tried. The "
+            f"step that leaves {WORTH_NAMING:g} % open is the longest that was tried, or follows from the order.")
+    columns = ("scene", *headings, "order declared", "order measured", "the scene's step [ms]",
+               f"step that leaves {WORTH_NAMING:g} % open [ms]")  # fmt: skip
+    return titled(columns, rows, digits=3, note=note)
+
+
+def _milliseconds(books: OpenBooks) -> float | None:
+    step = books.step_for(WORTH_NAMING / 100)
+    return None if step is None else 1e3 * step
+
+
+def over_time(runs: Sequence[Run]) -> Table:
+    """The books of each run at some instants, with the impacts since the instant before."""
+    rows: list[tuple[object, ...]] = []
+    for run in runs:
+        series = energy_series(run)
+        shown = np.unique(np.linspace(0, run.steps, INSTANTS + 1).round().astype(int))
+        struck = np.histogram(run.impacts.step + 1, [*shown, run.steps + 1])[0]
+        for place, impacts in zip(shown, [0, *struck[:-1]], strict=True):
+            values = (float(getattr(series, name)[place]) for name in _SERIES)
+            rows.append((run.scene_name, float(run.time[place]), *values, int(impacts)))
+    return titled(("scene", "time [s]", *(f"{name.replace('_', ' ')} [J]" for name in _SERIES), "impacts"), rows)
+
+
+def _deepest(measures: Sequence[Measure]) -> Measure:
+    return max(measures, key=lambda m: float(m["most penetration"]))
+
+
+def _open_share(m: Measure) -> float:
+    return float(m[OPEN_SHARE])
+
+
+def _penetration(measures: Sequence[Measure]) -> Part:
+    touching = [m for m in measures if m["most contacts in one step"]]
+    ratio, scene = max((m["most penetration"] / m["thinnest moving shape"], m["scene"]) for m in touching)
+    median, deepest = float(np.median([m["most penetration"] for m in touching])), _deepest(measures)
+    passes = "" if ratio >= DEEP else " Nothing passes through anything."
+    return Part(
+        f"Bodies overlap by at most {deepest['most penetration']:.2f} mm ({deepest['scene']}); the median of the "
+        f"{len(touching)} scenes with contacts is {median:.2f} mm. Measured by the thinnest moving shape of its "
+        f"scene, {scene} goes deepest: {ratio:.0%} of it.{passes}",
+        REPRODUCED if ratio < DEEP else MIXED,
+    )  # fmt: skip
+
+
+def _impacts(measures: Sequence[Measure]) -> Part:
+    gained, most = max(m[_ADDED] for m in measures), max(measures, key=lambda m: int(m["most rows in one impact"]))
+    rounding = gained <= ROUNDING
+    return Part(
+        f"Of {sum(m['impacts'] for m in measures)} impacts, with up to {most['most rows in one impact']} rows at once "
+        f"({most['scene']}), the one that adds most energy adds {gained:.0e} of what its scene turns over"
+        + (": rounding." if rounding else "."), REPRODUCED if rounding else REFUTED)  # fmt: skip
+
+
+def _order(books: Sequence[OpenBooks]) -> Part:
+    tried = [each for each in books if each.order is not None]
+    short = [each for each in tried if not each.falls_as_declared]
+    orders = sorted(float(each.order) for each in tried)  # type: ignore[arg-type]
+    below = ", ".join(f"{each.scene} ({each.order:.2f})" for each in short)
+    return Part(
+        f"What the books leave open is rounding in {len(books) - len(tried)} scenes. In the other {len(tried)} it "
+        f"falls as the step is shortened, at measured orders from {orders[0]:.2f} to {orders[-1]:.2f} (median "
+        f"{float(np.median(orders)):.2f}); the integrator declares {max(each.declared_order for each in tried)}."
+        + (f" Below the declared order: {below}." if short else ""), MIXED if short else REPRODUCED)  # fmt: skip
+
+
+def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
+    """By size: where the two channels have opposite signs, their sum would hide both."""
+    wide = sorted((m for m in measures if _open_share(m) > WORTH_NAMING), key=_open_share, reverse=True)
+    if not wide:
+        return Part(f"No books leave more than {WORTH_NAMING:.0f} % open at the scene's own step.", REPRODUCED)
+    of = {each.scene: each for each in books}
+    said = "; ".join(
+        f"{m['scene']} {_open_share(m):.1f} % of {m['energy turned over']:.3g} J (motion {m['open: motion']:+.2g} J, "
+        f"springs {m['open: springs']:+.2g} J; {_gone(of[m['scene']])})" for m in wide)  # fmt: skip
+    return Part(
+        f"At the scene's own step {len(wide)} of {len(measures)} books leave more than {WORTH_NAMING:.0f} % of the "
+        f"energy turned over open, the sizes of both channels added: {said}. Minus is energy that the steps swallow, "
+        "plus energy that they make up; behind it the order of the fall, and the step at which 1 % is left.", MIXED,
+    )  # fmt: skip
+
+
+def _gone(books: OpenBooks) -> str:
+    step = _milliseconds(books)
+    if step is None or books.order is None:
+        return "it does not fall with the step"
+    return f"order {books.order:.2f}, {WORTH_NAMING:.0f} % at {step:.2g} ms instead of {1e3 * books.step:.3g} ms"
+
+
+def _gains(measures: Sequence[Measure]) -> Part:
+    made = sorted((m for m in measures if m[GAIN_SHARE] > 100 * max(ROUNDING, _floor(m))),
+                  key=lambda m: float(m[GAIN_SHARE]), reverse=True)  # fmt: skip
+    if not made:
+        return Part("No scene ever holds more energy than it started with and was given.", REPRODUCED)
+    words = ", ".join(f"{m['scene']} {m[GAIN_SHARE]:.1f} %" for m in made)
+    return Part(
+        f"{len(measures) - len(made)} of {len(measures)} scenes never hold more energy than they started with and were "
+        f"given. The others do at some time, as a share of what they turn over: {words}. No impact adds it: the steps "
+        "in time do.", MIXED,
+    )  # fmt: skip
+
+
+def _floor(m: Measure) -> float:
+    """Rounding of all that is held, as a share of the energy turned over."""
+    held = max(abs(total(m, "start")), abs(total(m, "end")))
+    return ROUNDING * held / m["energy turned over"] if m["energy turned over"] else np.inf
+
+
+def _endings(measures: Sequence[Measure]) -> Part:
+    ends = Counter(m["how it ends"] for m in measures)
+    words = "; ".join(f"{count} {_plural(ending, count)}" for ending, count in sorted(ends.items()))
+    complete = sum(not m["how it ends"].startswith(STOPPED) for m in measures)
+    return Part(f"{complete} of {len(measures)} runs go to their end: {words}.",
+                REPRODUCED if complete == len(measures) else REFUTED)  # fmt: skip
+
+
+def _plural(ending: str, count: int) -> str:
+    first, _, rest = ending.partition(" ")
+    return f"{first.removesuffix('s')} {rest}" if count != 1 else ending
+
+
+def _time(measures: Sequence[Measure]) -> Part:
+    unit, slow = _pace(measures), max(measures, key=lambda m: float(m["time per step"]))
+    near = min(measures, key=lambda m: float(m["times faster than real time"]))
+    if unit is None:
+        return Part(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
+    return Part(
+        f"A step of {slow['scene']}, the dearest, takes {slow['time per step'] / unit:.0f} times as long as one of "
+        f"{YARDSTICK} ({unit:.1f} µs on this machine). Nearest to real time is {near['scene']}: a step is computed "
+        f"{near['times faster than real time']:.1f} times as fast as it lasts.",
+        REPRODUCED if near["times faster than real time"] > 1.0 else MIXED, timed=True)  # fmt: skip
