@@ -1,12 +1,20 @@
-"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse. It imports no engine."""
+"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse. It imports no engine.
+
+Whoever reaches the page moves the hand. So the server listens on this machine only, and answers only those who name
+it as this machine (Host), know the random word in its address and, to open the web socket, come from its own page
+(Origin): another website that the browser has open can make it call here, but not with these three.
+"""
 
 from __future__ import annotations
 
+import hmac
 import logging
 import os
+import secrets
 import time
-from collections.abc import Callable, Mapping
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
 from io import StringIO
 from multiprocessing.connection import Connection
 from typing import Any
@@ -22,6 +30,7 @@ from reports.live.window import Window
 Floats = NDArray[np.float64]
 
 HOST = "127.0.0.1"
+HOLD_SECONDS = 5.0  # without a movement of the mouse, after which the hand lets go
 FRAMES_PER_SECOND = 30.0
 
 _POLITENESS = 10  # niceness: the loop comes first
@@ -38,17 +47,18 @@ def show_in_browser(name: str, coordinates: int, scene: Mapping[str, Any], port:
 
 
 def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection, wanted: Callable[[], bool]) -> None:
-    """Serve the scene until nobody wants it any more; send the port when a browser can come."""
+    """Serve the scene until nobody wants it any more; send the address when a browser can come."""
     import viser
 
     # A browser opens connections that it never uses: a traceback each, were they logged where nobody has set up a log.
     logging.getLogger("websockets").setLevel(logging.CRITICAL)
-    with redirect_stdout(StringIO()):  # it would announce itself; the loop's own process says where to look
+    token = secrets.token_urlsafe(16)
+    with _guarded(token), redirect_stdout(StringIO()):  # the loop's own process says where to look
         server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
     server.gui.configure_theme(show_share_button=False)
     frames = _draw(server, scene)
     mouse = _Mouse(server, scene)
-    ready.send(server.get_port())
+    ready.send(f"http://{HOST}:{server.get_port()}/{token}/")
     while wanted():
         started = time.monotonic()
         q = window.shown()
@@ -57,9 +67,50 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
                 for name, (quaternion, position) in placements(scene, q).items():
                     frames[name].wxyz, frames[name].position = quaternion, position
                 mouse.follow(q)
-        window.want(mouse.target, time.monotonic())
+        window.want(mouse.target_at(time.monotonic()), time.monotonic())
         time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
     server.stop()
+
+
+@contextmanager
+def _guarded(token: str) -> Iterator[None]:
+    """Let the server that viser starts inside refuse every request that is not `allowed`; viser has no way to say so.
+
+    Raises
+    ------
+    RuntimeError
+        It was started in another way, by another version of viser: it must not serve unguarded.
+    """
+    from websockets.asyncio import server
+
+    serve, guarded = server.serve, list[bool]()
+
+    def serve_guarded(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            if not allowed(request.path, request.headers, connection.local_address[1], token):
+                return connection.respond(HTTPStatus.FORBIDDEN, "the address that iapb live printed leads here\n")
+            request.path = "/" + request.path.removeprefix(f"/{token}").lstrip("/")
+            return process_request(connection, request)
+
+        guarded.append(True)
+        return serve(*arguments, process_request=answer, **options)
+
+    server.serve = serve_guarded  # type: ignore[misc, assignment]
+    try:
+        yield
+    finally:
+        server.serve = serve  # type: ignore[misc]
+    if not guarded:
+        raise RuntimeError("viser started its server unguarded")
+
+
+def allowed(path: str, headers: Any, port: int, token: str) -> bool:
+    """Whether a request is for this machine, knows the token and, as a web socket, comes from our own page."""
+    names = [[f"{host}:{port}"] for host in (HOST, "localhost")]
+    origins = [[f"http://{name}"] for [name] in names] + ([] if headers.get_all("Upgrade") else [[]])
+    word = path.partition("?")[0].split("/")[1:2]
+    return (headers.get_all("Host") in names and headers.get_all("Origin") in origins
+            and hmac.compare_digest("".join(word).encode(), token.encode()))  # fmt: skip
 
 
 def _draw(server: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,6 +146,7 @@ class _Mouse:
 
     def __init__(self, server: Any, scene: Mapping[str, Any]) -> None:
         self.target: Floats | None = None
+        self._moved_at = 0.0
         self._scene, self._handle = scene, None
         if scene.get("hand") is None:
             return
@@ -106,7 +158,14 @@ class _Mouse:
         self._handle.on_update(self._moved)
         server.on_client_disconnect(self._gone)
 
+    def target_at(self, now: float) -> Floats | None:
+        """Where the mouse wants the hand; None once nobody has moved it for HOLD_SECONDS."""
+        if now - self._moved_at > HOLD_SECONDS:
+            self.target = None
+        return self.target
+
     def _moved(self, event: Any) -> None:
+        self._moved_at = time.monotonic()
         self.target = None if event.phase == "end" else np.array(event.target.position, dtype=float)
 
     def _gone(self, client: Any) -> None:

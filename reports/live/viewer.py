@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError, IapbError
 from iapb.simulation import Simulation
 from reports.batches import starting_a_process
-from reports.live.browser import HOST, show_in_browser
+from reports.live.browser import show_in_browser
 from reports.live.window import Window
 
 Floats = NDArray[np.float64]
@@ -107,7 +107,7 @@ class Viewer:
         self.process: Any = None
 
     def start(self) -> str:
-        """Start the process and return the address that it serves; raise IapbError if it does not come up."""
+        """Start the process and return the address that it serves, which is secret; raise IapbError if it does not."""
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self.window.name, self.window.coordinates, self._scene, self._port, theirs)
@@ -117,7 +117,7 @@ class Viewer:
         theirs.close()
         try:
             if ours.poll(_START_SECONDS):
-                return f"http://{HOST}:{ours.recv()}"
+                return str(ours.recv())
         except EOFError:
             pass
         self.stop()

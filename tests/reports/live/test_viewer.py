@@ -5,11 +5,19 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import time
+import urllib.error
 import urllib.request
+from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+import viser
+from websockets.exceptions import InvalidHandshake
+from websockets.sync.client import connect
 
+from reports.live import browser
 from reports.live.loop import Loop
 from reports.live.replay import replay
 from reports.live.viewer import SpringHand, Viewer
@@ -52,10 +60,65 @@ def test_it_serves_a_page_on_this_machine(viewer):
         assert page.status == 200 and b"<html" in page.read().lower()
 
 
+def status(address, **headers):
+    """HTTP status of a page."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=20) as page:
+            return page.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_nobody_comes_in_without_the_word_in_the_address_nor_under_another_name_of_the_machine(viewer):
+    place = urlsplit(viewer.address)
+    root = f"http://{place.netloc}"
+    assert len(place.path) > 20 and status(viewer.address) == 200
+    assert status(viewer.address, Host=f"localhost:{place.port}") == 200
+    for wrong in (root, f"{root}/", f"{root}/x{place.path}", f"{root}/?{place.path}", viewer.address[:-2]):
+        assert status(wrong) == 403, wrong
+    for host in ("evil.example", f"evil.example:{place.port}", "127.0.0.1", f"127.0.0.1.evil.example:{place.port}"):
+        assert status(viewer.address, Host=host) == 403, host  # a name of theirs that leads to this machine
+    assert status(viewer.address, Origin="https://evil.example") == 403
+
+
+def opened(address, origin):
+    """Whether the server takes a web socket from a page of this origin."""
+    try:
+        with connect(address, origin=origin, subprotocols=[f"viser-v{viser.__version__}"]) as socket:
+            return len(socket.recv(timeout=20)) > 0
+    except InvalidHandshake:
+        return False
+
+
+def test_no_other_website_opens_the_web_socket_that_moves_the_hand(viewer):
+    place = urlsplit(viewer.address)
+    address, own = viewer.address.replace("http:", "ws:").rstrip("/"), f"http://{place.netloc}"
+    assert opened(address, own)
+    for origin in ("https://evil.example", "null", None, f"http://127.0.0.1:{place.port + 1}", own + ".evil.example"):
+        assert not opened(address, origin), origin
+    for wrong in (f"ws://{place.netloc}", address[:-1], address + "x"):
+        assert not opened(wrong, own), wrong
+
+
+def test_the_hand_lets_go_of_a_mouse_that_does_not_move():
+    mouse = browser._Mouse.__new__(browser._Mouse)
+    now, moved = time.monotonic(), SimpleNamespace(phase="update", target=SimpleNamespace(position=(1.0, 2.0, 3.0)))
+    mouse._moved(moved)
+    assert mouse.target_at(now + 0.9 * browser.HOLD_SECONDS) is not None
+    assert mouse.target_at(now + 1.1 * browser.HOLD_SECONDS) is None and mouse.target is None
+    mouse._moved(moved)
+    assert mouse.target_at(now + 1.0) is not None
+
+
+def test_a_viser_that_starts_its_server_in_another_way_is_refused():
+    with pytest.raises(RuntimeError, match="unguarded"), browser._guarded("word"):
+        pass
+
+
 def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_its_end(module_peg, capfd):
     shown = Viewer(module_peg(), port=18090)
     address = shown.start()
-    port = int(address.rsplit(":", 1)[1])
+    port = urlsplit(address).port
     for sent in (b"", b"neither HTTP nor a web socket\r\n\r\n"):
         with socket.create_connection(("127.0.0.1", port)) as connection:
             connection.sendall(sent)
