@@ -14,6 +14,7 @@ import hashlib
 import inspect
 import struct
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,11 @@ class Block:
         words = [word for member in members for word in _layout(member)]
         self._memory = np.array(words, dtype=np.int64)
         self.address = self._memory.ctypes.data
+
+    def arrays(self) -> list[np.ndarray]:
+        """All arrays, those of nested blocks too."""
+        nested = [member.arrays() for member in self._content if isinstance(member, Block)]
+        return [*(member for member in self._content if isinstance(member, np.ndarray)), *chain(*nested)]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # not yet made, as when unpickling

@@ -4,30 +4,110 @@
         hand and coupling pull at the tool              (VI)   couple
         contacts → collisions → resting forces → move   (III-V, IV)   the law
         F_env is rendered, the device moves             (V-C, VI)   drive_device
+
+A step has two halves, with the world's own time between them where a device is real: `begin_step` (hand and coupling
+pull, the law advances, the device is given its force) and `end_step` (the device has moved: by its kernel, or by
+itself, and is read).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import Entry
+from iapb.compiled import Entry, kernel
+from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device
 from iapb.haptics.external import DeviceLink
+from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
 from iapb.recorder import Recorder
-from iapb.recording import Record
+from iapb.recording import Record, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, load_scene
-from iapb.stepping import FAILURES, Stepper, compiled_steps
 from iapb.system import System
+
+DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
+FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
+                                             "for this coupling and delay"}
+
+
+@kernel
+def compiled_steps(  # type: ignore[no-untyped-def]
+    world, state, port, record, first, steps
+):
+    """Do `steps` steps of an engine law; return (steps done, status)."""
+    for k in range(steps):
+        couple(world, state, port)
+        status = advance(world, state, port.applied)
+        if status:
+            return k, status
+        if not drive_device(world, state, port):
+            return k, DEVICE_NOT_FINITE
+        write_step(record, k, first + k, state, port)
+    return steps, 0
+
+
+class Stepper:
+    """The parts of a step of one simulation, entered without numba's look-up of types (some 10 µs a call).
+
+    Parameters
+    ----------
+    world, state, port : the simulation's blocks; they stay the same.
+    link : to a device of its own; None: the compiled device.
+    """
+
+    def __init__(self, world: Any, state: Any, port: Any, link: DeviceLink | None) -> None:
+        self._blocks, self._link = (world, state, port), link
+        self._couple: Any = Entry(couple)
+        self._advance: Any = Entry(advance)
+        self._render: Any = Entry(render)
+        self._move: Any = Entry(move_device)
+        self._write: Any = Entry(write_step)
+
+    def prepare(self, record: Record) -> None:
+        """Find the machine code of every part now, which takes milliseconds, rather than in the first step."""
+        world, state, port = blocks = self._blocks
+        self._couple = Entry(couple).taking(*blocks)
+        self._advance = Entry(advance).taking(world, state, port.applied)
+        self._render, self._move = Entry(render).taking(*blocks), Entry(move_device).taking(*blocks)
+        self._write = Entry(write_step).taking(record, 0, 0, state, port)
+
+    def couple(self) -> None:
+        """Forces of the hand and of the coupling on the tool: into ``port.applied``."""
+        self._couple(*self._blocks)
+
+    def advance(self) -> None:
+        """Advance an engine law by one step; raise IapbError where that cannot be done."""
+        world, state, port = self._blocks
+        status = self._advance(world, state, port.applied)
+        if status:
+            raise IapbError(FAILURES[status])
+
+    def render(self) -> None:
+        """What the device is to give (26); a device of its own is told so."""
+        self._render(*self._blocks)
+        if self._link is not None:
+            self._link.send()
+
+    def finish(self) -> None:
+        """The device moves; one of its own is read."""
+        if self._link is not None:
+            self._link.receive()
+        elif self._blocks[2].coupling != NO_COUPLING and not self._move(*self._blocks):
+            raise IapbError(FAILURES[DEVICE_NOT_FINITE])
+
+    def write(self, record: Record, k: int, step: int) -> None:
+        """Copy step number `step` into line k of the chunk."""
+        self._write(record, k, step, *self._blocks[1:])
+
 
 Floats = NDArray[np.float64]
 
@@ -154,14 +234,15 @@ class Simulation:
     def prepare(self, record: Record) -> None:
         """Load or compile the machine code of a step, which takes up to minutes, before the first one is timed.
 
-        A law in Python does so in a first step, here that of a twin; one that may keep a state of its own is let be.
+        A law in Python does so in a first step, which is undone; one that may keep a state of its own is let be.
         """
         if self.compiled and self.link is None:
             self._steps(self.world, self.state, self.port, record, self.steps_done, 0)
         elif self.link is None and _is_frozen(self.law):
-            with suppress(IapbError):  # this simulation's own first step will say so
-                twin = Simulation(self.scene, self.law, self.coupling)
-                twin.advance_chunk(Recorder(twin).blank(1)[0], 1)
+            with _undone(self.state, self.port), suppress(IapbError):  # the first step will say so
+                self.step()
+                self.stepper.write(record, 0, 0)
+            self.steps_done, record.used[:] = 0, 0
 
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
         """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
@@ -176,6 +257,17 @@ class Simulation:
                 return k, stop
             self.stepper.write(record, k, self.steps_done - 1)
         return steps, None
+
+
+@contextmanager
+def _undone(*blocks: Any) -> Iterator[None]:
+    """Put back what is written into the arrays of blocks."""
+    kept = [(array, array.copy()) for part in blocks for array in part.arrays()]
+    try:
+        yield
+    finally:
+        for array, before in kept:
+            array[...] = before
 
 
 def _checked_law(law: Any) -> Any:

@@ -6,19 +6,20 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Entry, block
-from iapb.contact.broadphase import WORTHWHILE_PAIRS, make_broad_phase
-from iapb.contact.geometry import contact_capacity, make_contact_buffer
+from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
+from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import make_friction_work
-from iapb.contact.kernels.step import advance
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import ImpactLog, State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import Port
 from iapb.haptics.waveforms import waveform_weights
@@ -86,6 +87,26 @@ class System:
             bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
             self._device = Mechanism([self.mechanism.bodies[b] for b in bodies])
         return self._device
+
+    def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> ContactBuffer:
+        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q: geometry only.
+
+        Raises
+        ------
+        ArgumentError
+            q is no configuration, or the margin is not a number.
+        IapbError
+            There are more contacts than `capacity`.
+        """
+        if np.isnan(margin):
+            raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
+        buffer, count = make_contact_buffer(self.capacity), 0
+        if len(self.pairs):
+            count = int(detect(self.shapes, self.pairs, *self.mechanism.placements(q), float(margin), buffer))
+        if count < 0:
+            raise IapbError(STATUS_TEXT[TOO_MANY_CONTACTS])
+        columns: list[Any] = [column[:count] for column in buffer]
+        return ContactBuffer(*columns)
 
     def world_under(self, law: Any) -> World:
         """The constant arrays of the step under one of the engine's laws (cached)."""

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.detection import detect_contacts
-from iapb.contact.geometry import make_contact_buffer
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
 from iapb.system import System
@@ -94,10 +92,9 @@ def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
     """How many contacts, and their largest differences (4,) of point, normal, gap, row; None where they are others."""
     axes, origins, frames = mechanics_of(system).bodies(q)
     theirs = find_contacts(system.shapes, system.pairs, axes, origins, np.inf)
-    buffer = make_contact_buffer(system.capacity)
-    placed = system.mechanism.placements(q)
-    count = detect_contacts(system.shapes, system.pairs, placed, np.inf, buffer) if len(system.pairs) else 0
-    ours = Contacts(*(getattr(buffer, name)[:count] for name in Contacts._fields))
+    found = system.contacts_at(q, np.inf)
+    count = len(found.gap)
+    ours = Contacts(*(getattr(found, name) for name in Contacts._fields))
     if count != len(theirs.gap):
         return None
     first, second = (_rows_of(found, origins, frames) for found in (ours, theirs))

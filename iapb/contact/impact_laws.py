@@ -16,16 +16,17 @@ outcome is Coulomb's.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.impact_laws_input import FrictionInput, check_friction
+from iapb.contact.impact_problem import ImpactInput, check_input
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction, make_friction_work
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.double_double import kinetic_energies
-from iapb.errors import RangeError
+from iapb.errors import ArgumentError, RangeError
 
 Floats = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def resolve_frictional_impact(
     Source: the split is ours; Coulomb's law at velocity level is Moreau's (1988); the gain it prevents is Kane and
     Levinson's (Dynamics, 1985). Which normal impulses limit friction at redundant contacts is not determined: here
     non-negative ones near those of least norm, and where some contact truly pulls, those of least norm. Both change
-    continuously with p_t, so that the limits settle (`iapb.contact.kernels.friction_limits`).
+    continuously with p_t, so that the limits settle (`iapb.contact.kernels.impact_friction`).
     """
     given = check_friction(mass_matrix, contact_jacobian, tangents, velocity, restitution, friction)
     problem, (c, m, d) = given.problem, given.tangents.shape
@@ -121,3 +122,58 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
         if not np.all(np.isfinite(getattr(found, name))):
             raise RangeError(name, "the impact of these magnitudes is above 1.8e308")
     return found
+
+
+# The arguments of an impact with friction, checked and scaled as `impact_problem` does.
+
+
+class FrictionInput(NamedTuple):
+    """A checked impact with friction: coordinates scaled as in `problem`, rows of unit normals and tangents as given.
+
+    normals : (c, d); tangents : (c, m, d); restitution in [0, 1]; friction : (c,)
+    """
+
+    problem: ImpactInput
+    normals: Floats
+    tangents: Floats
+    restitution: float
+    friction: Floats
+
+
+def check_friction(
+    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, tangents: ArrayLike, velocity: ArrayLike,
+    restitution: float, friction: ArrayLike,
+) -> FrictionInput:
+    """Check shapes, ranges and finiteness; raise ArgumentError by name."""
+    if np.ndim(restitution) != 0:
+        raise ArgumentError("restitution", restitution, "one number for all contacts")
+    problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
+    if not 0.0 <= problem.restitution <= 1.0:
+        raise ArgumentError("restitution", restitution, "a number in [0, 1]")
+    scale = problem.coordinate_exponent
+    rows = np.ldexp(problem.contact_jacobian, -problem.row_exponent[:, None].astype(np.int32))
+    along = np.ldexp(_tangents(tangents, problem.contacts, problem.coordinates), scale.astype(np.int32))
+    return FrictionInput(problem, rows, along, problem.restitution, _friction(friction, problem.contacts))
+
+
+def _tangents(tangents: ArrayLike, contacts: int, coordinates: int) -> Floats:
+    array = np.array(tangents, np.float64)
+    if contacts == 0 and array.size == 0:
+        return np.zeros((0, 1, coordinates))
+    if array.ndim == 2:
+        array = array[:, None, :]
+    expected = f"shape ({contacts}, {coordinates}) or ({contacts}, 1 or 2, {coordinates})"
+    if array.ndim != 3 or array.shape[0] != contacts or array.shape[1] not in (1, 2) or array.shape[2] != coordinates:
+        raise ArgumentError("tangents", np.shape(tangents), expected)
+    if not np.all(np.isfinite(array)):
+        raise ArgumentError("tangents", "a number that is not finite", "finite numbers")
+    return array
+
+
+def _friction(friction: ArrayLike, contacts: int) -> Floats:
+    array = np.array(friction, np.float64)
+    if array.shape not in ((), (contacts,)):
+        raise ArgumentError("friction", array.shape, f"a scalar or shape ({contacts},), one per contact")
+    if not np.all((array >= 0.0) & np.isfinite(array)):
+        raise ArgumentError("friction", friction, "finite numbers >= 0")
+    return np.ascontiguousarray(np.broadcast_to(array, contacts))

@@ -17,10 +17,8 @@ from iapb.contact.kernels.impact import (
     make_impact_work,
     rank_tolerance,
 )
-from iapb.contact.kernels.impact_unequal import poisson_impact
-from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
-from iapb.contact.kernels.projector import unit_columns
-from iapb.contact.kernels.unilateral import make_push_work
+from iapb.contact.kernels.projector import minimum_norm_impulses, unit_columns
+from iapb.contact.kernels.unilateral import make_push_work, poisson_impact
 from iapb.dense import product, solve
 from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.kernels.cholesky import to_whitened, whiten_columns

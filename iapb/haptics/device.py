@@ -13,8 +13,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.contacts import finite_vector
 from iapb.errors import ArgumentError
+from iapb.mechanics.bodies import finite_array
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 
 Floats = NDArray[np.float64]
@@ -82,8 +82,8 @@ class SimulatedDevice:
     ) -> None:
         mass = np.array(mass_matrix, np.float64)
         size = len(mass) if mass.ndim else 0
-        self.q = finite_vector("q", q, size).copy()
-        self.v = np.zeros(size) if v is None else finite_vector("v", v, size).copy()
+        self.q = finite_array("q", q, (size,))
+        self.v = np.zeros(size) if v is None else finite_array("v", v, (size,))
         self.hand_force = np.zeros(size)
         self._lower = _cholesky(mass)
         if not (np.isfinite(dt) and dt > 0.0):
@@ -103,7 +103,7 @@ class SimulatedDevice:
 
     def apply(self, force: ArrayLike) -> None:
         """Advance one step under the hand and the actuators, which get `force` clipped and `delay` steps late."""
-        commanded = finite_vector("force", force, len(self.q))
+        commanded = finite_array("force", force, self.q.shape)
         self._forces.append(np.clip(commanded, -self._limit, self._limit))
         total = self.hand_force + self._forces.popleft() - self._damping * self.v
         before = self._sensed()

@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import Device, SimulatedDevice
-from iapb.haptics.kernels.device import engage
-from iapb.haptics.kernels.port import NO_COUPLING, UNILATERAL
-from iapb.haptics.kernels.pulse import observe_work
+from iapb.haptics.kernels import NO_COUPLING, UNILATERAL, engage, observe_work
 
 
 class DeviceLink:

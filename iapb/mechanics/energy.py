@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import finite_array, float_rows
-from iapb.mechanics.kernels.energy import displacements_along, energies_along, impact_loss
+from iapb.mechanics.kernels.evaluation import displacements_along, energies_along, impact_loss
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 

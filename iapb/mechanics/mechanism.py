@@ -5,26 +5,51 @@ M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import Block, block
+from iapb.compiled import Block, Entry, block
 from iapb.errors import ArgumentError
-from iapb.mechanics import entries, structure
+from iapb.mechanics import kernels, structure
 from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
-from iapb.mechanics.kernels import MechanismArrays, Workspace, make_workspace
-from iapb.mechanics.layout import collect_arrays, tree_ranges
-from iapb.mechanics.moving_parts import moving_parts
+from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.structure import collect_arrays, moving_parts, tree_ranges
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
 Floats = NDArray[np.float64]
+
+# The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`).
+entries = SimpleNamespace(**{name: Entry(getattr(kernels, name)) for name in (
+    "all_finite", "bias_at", "biases_at", "centroidal_momentum", "difference", "forward_kinematics", "frame_jacobian",
+    "gravity", "integrate", "inverse_dynamics", "is_configuration", "kinetic_energy", "mass_matrices_at",
+    "mass_matrix_at", "misplaced_body", "point_jacobian", "potential_energy")})
+
+
+class _Scratch(threading.local):
+    """Where kernels write; made anew in each thread that asks.
+
+    Attributes
+    ----------
+    workspace : for the mechanism as it is
+    parts : the moving parts alone, with a workspace of their own
+    """
+
+    def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
+        self.workspace: Block = block(_copied(workspace))
+        self.parts: Block = block(Evaluation(parts, _copied(workspace)))
+
+
+def _copied(workspace: Workspace) -> Workspace:
+    return Workspace(*(array.copy() for array in workspace))
 
 
 class Mechanism:
@@ -66,7 +91,7 @@ class Mechanism:
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
         self._square = (self.nv, self.nv)
-        self._scratch = entries.Scratch(self.workspace(), moving_parts(self.arrays))
+        self._scratch = _Scratch(self.workspace(), moving_parts(self.arrays))
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
         self.tree_dofs: list[tuple[int, int]] = tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)

@@ -1,16 +1,19 @@
-"""Which terms of the equations of motion a mechanism has at all, read from its structure.
+"""What a mechanism is by its structure: bodies as arrays, the moving parts alone, and which terms it has at all.
 
-Both answers are exact zeros, never thresholds: a centre of mass 1e-17 m off its axis keeps the terms on.
+Both answers on terms are exact zeros, never thresholds: a centre of mass 1e-17 m off its axis keeps the terms on.
 A "no" is a theorem; a "yes" may be cautious (a balanced second link after a first one is not looked for).
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb.dense import product
+from iapb.mechanics.bodies import Body
 from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2, SPHERICAL, MechanismArrays
-from iapb.mechanics.moving_parts import point_inertia, turned_inertia
 
 
 def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
@@ -89,3 +92,147 @@ def _spins_without_bias(m: MechanismArrays, body: int) -> bool:
 def has_velocity_terms(m: MechanismArrays) -> bool:
     """False only if B(q, v) is zero everywhere."""
     return not has_constant_mass_matrix(m) or not all(_spins_without_bias(m, b) for b in _rotating_bodies(m))
+
+
+# A mechanism with every fixed body merged into the one that carries it: what M and B need, and no more.
+#
+# A robot's URDF has about two links for each that moves (flanges, covers, tool frames).
+
+
+Floats = NDArray[np.float64]
+
+
+def moving_parts(m: MechanismArrays) -> MechanismArrays:
+    """Return arrays of the moving bodies alone, each with the mass of what is fixed to it; the dofs are the same."""
+    carrier, rotation, position = _frames_in_carriers(m)
+    moving = [b for b in range(len(m.kind)) if m.v_count[b] > 0]
+    new_index = {b: i for i, b in enumerate(moving)} | {-1: -1}
+    masses = [_part_masses(m, b, np.flatnonzero(carrier == b), rotation, position) for b in moving]
+    parents = [int(m.parent[b]) for b in moving]
+    places = [_placement(m, b, rotation, position) for b in moving]
+    return m._replace(
+        kind=m.kind[moving],
+        parent=np.array([new_index[int(carrier[p]) if p >= 0 else -1] for p in parents], dtype=np.int64),
+        q_start=m.q_start[moving],
+        v_start=m.v_start[moving],
+        v_count=m.v_count[moving],
+        joint_axis=m.joint_axis[moving],
+        placement_rotation=np.array([R for R, _ in places]).reshape(-1, 3, 3),
+        placement_position=np.array([p for _, p in places]).reshape(-1, 3),
+        mass=np.array([mass for mass, _, _ in masses], dtype=np.float64),
+        center_of_mass=np.array([center for _, center, _ in masses]).reshape(-1, 3),
+        inertia=np.array([inertia for _, _, inertia in masses]).reshape(-1, 3, 3),
+        last_dof=m.last_dof[moving],
+        dof_body=np.array([new_index[int(b)] for b in m.dof_body], dtype=np.int64),
+    )
+
+
+def _frames_in_carriers(m: MechanismArrays) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Moving body that each body belongs to (-1: the world), and its axes and origin in that body's frame."""
+    count = len(m.kind)
+    carrier = np.full(count, -1, dtype=np.int64)
+    rotation, position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    for b in range(count):
+        if m.v_count[b] > 0:
+            carrier[b] = b
+            continue
+        rotation[b], position[b] = _placement(m, b, rotation, position)
+        if m.parent[b] >= 0:
+            carrier[b] = carrier[m.parent[b]]
+    return carrier, rotation, position
+
+
+def _placement(m: MechanismArrays, b: int, rotation: Floats, position: Floats) -> tuple[Floats, Floats]:
+    """Joint frame of b in the frame of the moving body (or the world) that carries its parent."""
+    parent = int(m.parent[b])
+    if parent < 0 or m.v_count[parent] > 0:
+        return m.placement_rotation[b], m.placement_position[b]
+    place = position[parent] + product(rotation[parent], m.placement_position[b])
+    return product(rotation[parent], m.placement_rotation[b]), place
+
+
+def turned_inertia(rotation: Floats, inertia: Floats) -> Floats:
+    """R I Rᵀ: the inertia in the axes that R turns to."""
+    return product(product(rotation, inertia), rotation.T)
+
+
+def point_inertia(place: Floats) -> Floats:
+    """|r|² 1 − r rᵀ: the inertia about the origin of a unit mass at r."""
+    return product(place[None], place) * np.eye(3) - np.outer(place, place)
+
+
+def _part_masses(
+    m: MechanismArrays, body: int, members: NDArray[np.int64], rotation: Floats, position: Floats
+) -> tuple[float, Floats, Floats]:
+    """Mass, centre of mass and inertia about it of a part, in its first body's frame: sums of positive terms."""
+    mass = sum(m.mass[members].tolist())
+    if len(members) == 1 or mass == 0.0:
+        turned = [turned_inertia(rotation[b], m.inertia[b]) for b in members]
+        return (
+            mass,
+            m.center_of_mass[body],
+            m.inertia[body] if len(members) == 1 else sum(turned, np.zeros((3, 3))),
+        )
+    centers = np.array([position[b] + product(rotation[b], m.center_of_mass[b]) for b in members])
+    center = product(centers.T, m.mass[members]) / mass
+    inertia = np.zeros((3, 3))
+    for b, place in zip(members, centers - center, strict=True):
+        inertia += turned_inertia(rotation[b], m.inertia[b]) + m.mass[b] * point_inertia(place)
+    return mass, center, inertia
+
+
+# Laying bodies out as arrays: where each joint's coordinates stand, which dofs move which body.
+
+
+def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
+    """Return the bodies as contiguous arrays; parents (n,) are body indices, -1 = world."""
+    layouts = [body.joint.layout for body in bodies]
+    v_count = np.array([layout.nv for layout in layouts], dtype=np.int64)
+    v_start = np.cumsum(v_count) - v_count
+    q_count = np.array([layout.nq for layout in layouts], dtype=np.int64)
+    last_dof, dof_body, dof_parent = _chains(v_start, v_count, parents)
+    return MechanismArrays(
+        kind=np.array([layout.code for layout in layouts], dtype=np.int64),
+        parent=np.array(parents, dtype=np.int64),
+        q_start=np.cumsum(q_count) - q_count,
+        v_start=v_start,
+        v_count=v_count,
+        joint_axis=_stack([body.joint.unit_axis for body in bodies], (3,)),
+        placement_rotation=_stack([body.placement[0] for body in bodies], (3, 3)),
+        placement_position=_stack([body.placement[1] for body in bodies], (3,)),
+        mass=np.array([body.mass for body in bodies], dtype=np.float64),
+        center_of_mass=_stack([body.center_of_mass for body in bodies], (3,)),
+        inertia=_stack([body.inertia for body in bodies], (3, 3)),
+        last_dof=np.array(last_dof, dtype=np.int64),
+        dof_body=np.array(dof_body, dtype=np.int64),
+        dof_parent=np.array(dof_parent, dtype=np.int64),
+        dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], dtype=np.bool_),
+    )
+
+
+def _stack(rows: list[Floats], shape: tuple[int, ...]) -> Floats:
+    return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(len(rows), *shape))
+
+
+def _chains(v_start: Any, v_count: Any, parents: list[int]) -> tuple[list[int], list[int], list[int]]:
+    """For each body its last dof on the way from the world; for each dof its body and the dof before it."""
+    last_dof: list[int] = []
+    dof_body: list[int] = []
+    dof_parent: list[int] = []
+    for b, parent in enumerate(parents):
+        last = last_dof[parent] if parent >= 0 else -1
+        for k in range(int(v_start[b]), int(v_start[b] + v_count[b])):
+            dof_body.append(b)
+            dof_parent.append(last)
+            last = k
+        last_dof.append(last)
+    return last_dof, dof_body, dof_parent
+
+
+def tree_ranges(m: MechanismArrays, tree_of_body: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Return (start, stop) in v of each tree; empty for a tree of fixed bodies."""
+    ranges = []
+    for tree in range(int(tree_of_body.max()) + 1 if len(tree_of_body) else 0):
+        members = np.flatnonzero(tree_of_body == tree)
+        ranges.append((int(m.v_start[members[0]]), int(m.v_start[members[-1]] + m.v_count[members[-1]])))
+    return ranges

@@ -4,15 +4,17 @@ Independent of Pinocchio's reader, so that a comparison of the two checks the re
 q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the alphabetical order of
 their joints' names; continuous joints (cos, sin); planar and floating joints as SE(2) and SE(3) with
 velocities in body axes; mimic joints independent. Fixed joints stay as bodies without degrees of freedom.
-What can touch (<collision>) is no part of a mechanism: `iapb.mechanics.urdf_collision` reads it.
+What can touch (<collision>) is no part of a mechanism: `read_collisions` reads it.
 Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML).
 """
 
 from __future__ import annotations
 
+import difflib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +22,8 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
-from iapb.mechanics.moving_parts import turned_inertia
-from iapb.mechanics.urdf_elements import elements_by_name, numbers_in, origin_of, parse_robot, where_of
+from iapb.mechanics.rotations import rotation_of
+from iapb.mechanics.structure import turned_inertia
 from iapb.names import one_of
 
 Floats = NDArray[np.float64]
@@ -157,3 +159,233 @@ def _depth_first(connections: list[_Connection], root: str) -> list[_Connection]
         order.append(connection)
         stack.extend(children.get(connection.child, []))
     return order
+
+
+# The <collision> elements of a URDF file: which shapes each link touches with, in link axes.
+#
+# All five geometries of the format are read; which of them a scene can hold is the scene's to say.
+# Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML/link); <capsule> as in ROS 2.
+
+# geometry -> its attributes that are lengths, and how many numbers each holds
+LENGTHS = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {},
+}
+
+
+class CollisionShape(NamedTuple):
+    """One <collision> element of a link.
+
+    kind : box, sphere, cylinder, capsule or mesh
+    lengths : [m] full sides of a box (3,), radius of a sphere (1,), radius and length (2,) of cylinder and capsule;
+    a mesh has none
+    rotation, center : (3, 3) and (3,) [m] of the shape's own axes, in link axes
+    """
+
+    kind: str
+    lengths: Floats
+    rotation: Floats
+    center: Floats
+
+
+def read_collisions(path: str | Path) -> dict[str, tuple[CollisionShape, ...]]:
+    """Return the shapes of every link, in the order of the file; links without any have an empty tuple.
+
+    Raises
+    ------
+    ArgumentError
+        The file is not a URDF robot, or a collision element is wrong; the message names link and element.
+    """
+    links = elements_by_name(parse_robot(Path(path)), "link")
+    return {
+        name: tuple(_shape(element, f"{where_of(link)} collision") for element in link.findall("collision"))
+        for name, link in links.items()
+    }
+
+
+def _shape(collision: ElementTree.Element, where: str) -> CollisionShape:
+    geometry = collision.find("geometry")
+    kinds = [] if geometry is None else list(geometry)
+    if len(kinds) != 1 or kinds[0].tag not in LENGTHS:
+        found = ", ".join(f"<{kind.tag}>" for kind in kinds) or "nothing"
+        raise ArgumentError(f"{where} geometry", found, one_of(found, [f"<{kind}>" for kind in LENGTHS]))
+    kind = kinds[0]
+    values = [
+        numbers_in(f"{where} {kind.tag} {name}", kind.get(name), count) for name, count in LENGTHS[kind.tag].items()
+    ]
+    lengths = np.concatenate([np.zeros(0), *values])
+    if (lengths <= 0.0).any():
+        raise ArgumentError(f"{where} {kind.tag}", lengths.tolist(), "lengths > 0 m")
+    return CollisionShape(kind.tag, lengths, *origin_of(collision, where))
+
+
+# Elements of a URDF file, by the standard library's XML parser: the robot, its named parts, numbers and origins.
+
+
+MAX_BYTES = 10_000_000  # the largest of known robots has a tenth
+MAX_DEPTH = 32
+
+
+def _refuse_doctype(*_: object) -> NoReturn:
+    raise ArgumentError("URDF file", "<!DOCTYPE", "no document type: it could declare entities without end")
+
+
+class _Depth:
+    """Counts the elements that are open; a URDF has five levels, a file without end as many as it likes."""
+
+    def __init__(self) -> None:
+        self.open = 0
+
+    def enter(self, *_: object) -> None:
+        self.open += 1
+        if self.open > MAX_DEPTH:
+            raise ArgumentError("URDF file", f"{self.open} levels", f"at most {MAX_DEPTH} levels of elements")
+
+    def leave(self, *_: object) -> None:
+        self.open -= 1
+
+
+def parse_robot(path: Path) -> ElementTree.Element:
+    """Return the robot element; document types, endless depth and slips of spelling are refused.
+
+    Parameters
+    ----------
+    path : of the URDF file
+
+    Raises
+    ------
+    ArgumentError
+        The file cannot be read, is larger than MAX_BYTES, is no well-formed XML, or no URDF robot.
+    """
+    try:
+        with path.open("rb") as file:
+            text = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        why = getattr(error, "strerror", None) or error
+        raise ArgumentError("path", str(path), f"a readable URDF file ({why})") from None
+    if len(text) > MAX_BYTES:
+        raise ArgumentError("URDF file", str(path), f"at most {MAX_BYTES} bytes")
+    try:
+        depth, scanner = _Depth(), expat.ParserCreate()
+        scanner.StartDoctypeDeclHandler = _refuse_doctype
+        scanner.StartElementHandler, scanner.EndElementHandler = depth.enter, depth.leave
+        scanner.Parse(text, True)
+        robot = ElementTree.fromstring(text)
+    except (expat.ExpatError, ElementTree.ParseError) as error:
+        raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
+    if robot.tag != "robot":
+        raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")
+    check_spelling(robot)
+    return robot
+
+
+def elements_by_name(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:
+    """Return the robot's elements of that tag by name."""
+    found: dict[str, ElementTree.Element] = {}
+    for element in robot.findall(tag):
+        name = element.get("name")
+        if not name:
+            raise ArgumentError(f"<{tag}> number {len(found) + 1}: name", name, "a name")
+        if name in found:
+            raise ArgumentError(f"<{tag} name={name!r}>", name, f"a name that no other {tag} has")
+        found[name] = element
+    return found
+
+
+def where_of(element: ElementTree.Element) -> str:
+    """Return how messages name an element."""
+    return f"<{element.tag} name={element.get('name')!r}>"
+
+
+def numbers_in(where: str, text: str | None, count: int) -> Floats:
+    """Return `count` finite numbers from an attribute."""
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise ArgumentError(where, text, f"{count} finite number{'s' if count > 1 else ''}")
+    return values
+
+
+def origin_of(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
+    """Return (rotation, position) of an optional <origin xyz rpy>; rpy turns about fixed x, then y, then z."""
+    element = owner.find("origin")
+    if element is None:
+        return np.eye(3), np.zeros(3)
+    if "quat_xyzw" in element.attrib:
+        raise ArgumentError(f"{where} origin quat_xyzw", element.get("quat_xyzw"), "the rotation as rpy")
+    position = numbers_in(f"{where} origin xyz", element.get("xyz", "0 0 0"), 3)
+    angles = numbers_in(f"{where} origin rpy", element.get("rpy", "0 0 0"), 3)
+    return rotation_of(angles) + 0.0, position  # + 0.0: no negative zeros
+
+
+# Slips in a URDF file that would otherwise pass for absent: a misspelt element, an unknown attribute, one given twice.
+#
+# Elements of others (<gazebo>, <transmission>, <contact> …) are let through, as the format intends; one that is spelt
+# nearly like an element that is read is taken for a slip: the alternative is a link without mass and no word said.
+
+# element: (children that are read, children of the format that are not)
+_CHILDREN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "robot": (("link", "joint"), ("material", "transmission", "gazebo")),
+    "link": (("inertial", "collision"), ("visual", "contact", "sensor")),
+    "inertial": (("origin", "mass", "inertia"), ()),
+    "joint": (("origin", "parent", "child", "axis"),
+              ("calibration", "dynamics", "limit", "mimic", "safety_controller", "hardwareInterface")),
+    "collision": (("origin", "geometry"), ("material", "verbose")),
+}
+_ATTRIBUTES: dict[str, tuple[str, ...]] = {
+    "origin": ("xyz", "rpy", "quat_xyzw"),
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",),
+    "parent": ("link",),
+    "child": ("link",),
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+}
+_MANY = ("link", "joint", "collision")  # of these an element may hold several
+_NEAR = 0.75  # share of letters that agree: inertail and colision are slips, contact is a word of its own
+
+
+def check_spelling(robot: ElementTree.Element) -> None:
+    """Raise ArgumentError for the first slip in the parts of a robot that are read."""
+    _check(robot, "<robot>")
+    for part in robot:
+        if part.tag in ("link", "joint"):
+            _check(part, f"<{part.tag} name={part.get('name')!r}>")
+
+
+def _check(element: ElementTree.Element, where: str) -> None:
+    read, others = _CHILDREN.get(str(element.tag), ((), ()))
+    seen: set[str] = set()
+    for child in element:
+        tag = str(child.tag)
+        if tag in seen and tag not in _MANY:
+            raise ArgumentError(f"{where} <{tag}>", "given twice", "one of them")
+        near = difflib.get_close_matches(tag, read, n=1, cutoff=_NEAR)
+        if tag not in read and tag not in others and near:
+            raise ArgumentError(f"{where} <{tag}>", tag, f"<{near[0]}>, or a name less like it")
+        if tag not in read:
+            continue
+        seen.add(tag)
+        _check_attributes(child, f"{where} {tag}")
+        if element.tag != "robot":
+            _check(child, f"{where} {tag}")
+        if tag == "geometry":
+            for shape in child:
+                _check_attributes(shape, f"{where} {shape.tag}")
+
+
+def _check_attributes(element: ElementTree.Element, where: str) -> None:
+    known = _ATTRIBUTES.get(str(element.tag))
+    if known is None:
+        return
+    for name, value in element.attrib.items():
+        if name not in known and not name.startswith("{"):  # another XML namespace: somebody else's
+            raise ArgumentError(f"{where} {name}", value, one_of(name, known, "one of its attributes: "))

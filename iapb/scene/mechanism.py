@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact import geometry, spatial_geometry
+from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs
 from iapb.dense import product
 from iapb.elementary import sine_cosine
@@ -52,7 +52,7 @@ def shapes_of(scene: Scene) -> Shapes:
     frames = _frames(scene)
     described = [_described(shape, frames[owner]) for owner, shape in _owned_shapes(scene)]
     if isinstance(scene, SpatialScene):
-        return spatial_geometry.make_spatial_shapes(described)
+        return geometry.make_spatial_shapes(described)
     return geometry.make_shapes(described)
 
 
@@ -156,15 +156,15 @@ def _described(shape: Any, frame: _Frame) -> Any:
     if shape.kind == "half_plane":
         return geometry.HalfPlane(shape.point, shape.normal)
     if shape.kind == "half_space":
-        return spatial_geometry.HalfSpace(shape.point, shape.normal)
+        return geometry.HalfSpace(shape.point, shape.normal)
     center = product(frame.rotation, shape.center) + frame.shift
     if shape.kind == "circle":
         return geometry.Circle(shape.radius, center, frame.body)
     if shape.kind == "sphere":
-        return spatial_geometry.Sphere(shape.radius, center, frame.body)
+        return geometry.Sphere(shape.radius, center, frame.body)
     turn = product(frame.rotation, _turn(shape))
     if len(turn) == 3:
-        return spatial_geometry.SpatialBox(shape.size, center, turn, frame.body)
+        return geometry.SpatialBox(shape.size, center, turn, frame.body)
     corners = _box_corners(*shape.size) if shape.kind == "box" else np.array(shape.vertices)
     return geometry.Polygon(product(corners, turn.T) + center, frame.body)
 

@@ -82,7 +82,7 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
 
 def _collisions_of(robot: Robot, path: Path) -> dict[str, list[dict[str, Any]]]:
     """Return the URDF file's collision shapes by link, for the links that `shapes` says nothing about."""
-    from iapb.mechanics.urdf_collision import read_collisions
+    from iapb.mechanics.urdf import read_collisions
 
     read = {link: shapes for link, shapes in read_collisions(path).items() if link not in robot.shapes}
     foreign = [f"{link} <{shape.kind}>" for link, shapes in read.items() for shape in shapes if shape.kind not in HELD]

@@ -125,3 +125,20 @@ def test_gains_that_are_no_gains_are_refused(value):
 def test_a_device_needs_a_hand():
     with pytest.raises(ArgumentError, match="has no hand, so no device"):
         System(load_scene(find_scene("two_discs"))).make_port(FourChannel((1.0,), (1.0,)))
+
+
+def test_contacts_at_a_pose_are_those_within_the_margin() -> None:
+    """A polygon of forty corners on a wall that it is all inside of, beside it, and above it."""
+    corners = [[float(np.cos(t)), float(np.sin(t))] for t in 2.0 * np.pi * np.arange(40) / 40]
+    peg = PEG.resolved()["bodies"][0]
+    wheel = peg | {"shapes": [{"kind": "polygon", "vertices": corners}], "position": [0.0, 0.0, 0.1]}
+    floor = {"name": "floor", "kind": "half_plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    system = System(PEG.with_values({"bodies": [wheel], "walls": [floor]}))
+    inside, beside = system.contacts_at([0.0, -5.0, 0.1]), system.contacts_at([3.0, 0.5, 0.1])
+    heights = -5.0 + np.sin(0.1 + 2.0 * np.pi * np.arange(40) / 40)
+    assert np.sort(inside.gap) == pytest.approx(np.sort(heights), abs=1e-14)
+    assert 0 < len(beside.gap) < 40 and np.all(beside.gap <= 0.0)
+    assert len(system.contacts_at([0.0, 5.0, 0.1]).gap) == 0
+    assert len(system.contacts_at([0.0, 5.0, 0.1], np.inf).gap) == 40
+    with pytest.raises(ArgumentError, match="margin"):
+        system.contacts_at([0.0, 5.0, 0.1], np.nan)

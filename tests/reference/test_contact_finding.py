@@ -7,8 +7,7 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from iapb.contact.geometry import candidate_pairs
-from iapb.contact.spatial_geometry import SpatialBox, make_spatial_shapes
+from iapb.contact.geometry import SpatialBox, candidate_pairs, make_spatial_shapes
 from iapb.scene import find_scene, load_scene, scene_names
 from reference import contact_finding, engine_differences
 from reference.contact_finding import find_contacts

@@ -25,8 +25,7 @@ import numpy as np
 
 from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
-from iapb.mechanics.urdf import read_urdf
-from iapb.mechanics.urdf_collision import read_collisions
+from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import scene_folder
 from iapb.scene.document import read_document
 from reference.complementarity.problem import ImpactProblem

@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from iapb.errors import ArgumentError, IapbError, SceneError
-from iapb.mechanics.urdf import read_urdf
-from iapb.mechanics.urdf_collision import read_collisions
+from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import load_scene, scene_folder
 from iapb.scene.document import read_document
 from reference.datasets import DatasetError, read_problem

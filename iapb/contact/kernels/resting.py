@@ -6,7 +6,7 @@ import math
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.rows import add_body_row
-from iapb.mechanics.kernels.jacobians import add_point_force
+from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import dot, load, scale, store
 
 
@@ -32,20 +32,13 @@ def friction_share(normal_force, speed, friction, friction_velocity):
 
 
 @kernel
-def resting_forces(m, w, contacts, count, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
-    """Add the forces of all contacts with gap <= 0 to `penalty` and `drag` (d,), generalized forces Jᵀ F.
+def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
+    """Add the forces of contact i, if its gap <= 0, to `penalty` and `drag` (d,), generalized forces Jᵀ F.
 
     m, w : mechanism arrays and workspace at the current configuration
     contacts : velocities up to date (`contact_velocities`); normal_force and friction_force are written
     stiffness K [N/m], damping B [N s/m], friction μ, friction_velocity v_threshold [m/s]
     """
-    for i in range(count):
-        resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag)
-
-
-@kernel
-def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
-    """The same for contact i alone."""
     contacts.normal_force[i] = 0.0
     store(contacts.friction_force, i, (0.0, 0.0, 0.0))
     if contacts.gap[i] > 0.0:

@@ -82,13 +82,6 @@ def tangent_of(n, which, tangents):
 
 
 @kernel
-def relative_jacobian_rows(m, w, contacts, count, out):
-    """out (count, d) <- the rows (11), (12) of the first `count` contacts."""
-    for i in range(count):
-        contact_row(m, w, contacts, i, out[i])
-
-
-@kernel
 def twist(m, w, body, v):
     """Origin p of a body, velocity of p and angular velocity; zeros for the static world.
 

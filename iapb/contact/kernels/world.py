@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.contact.broadphase import BroadPhase
 from iapb.contact.geometry import ContactBuffer, Shapes
+from iapb.contact.kernels.broadphase import BroadPhase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.unilateral import PushWork

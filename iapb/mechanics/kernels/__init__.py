@@ -8,18 +8,25 @@ Order of calls: `forward_kinematics` fills the workspace, everything else reads 
 from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.kernels.configuration import difference, integrate
 from iapb.mechanics.kernels.dynamics import bias, gravity, inverse_dynamics, mass_matrix
-from iapb.mechanics.kernels.energy import centroidal_momentum, kinetic_energy, potential_energy
 from iapb.mechanics.kernels.evaluation import (
     all_finite,
     bias_at,
     biases_at,
+    centroidal_momentum,
     is_configuration,
+    kinetic_energy,
     mass_matrices_at,
     mass_matrix_at,
     misplaced_body,
+    potential_energy,
 )
-from iapb.mechanics.kernels.jacobians import add_point_force, frame_jacobian, point_jacobian, point_velocity
-from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.mechanics.kernels.kinematics import (
+    add_point_force,
+    forward_kinematics,
+    frame_jacobian,
+    point_jacobian,
+    point_velocity,
+)
 
 __all__ = [
     "Evaluation",

@@ -10,10 +10,19 @@ import pytest
 
 import iapb.system
 from iapb.compiled import block
-from iapb.contact.broadphase import make_broad_phase
-from iapb.contact.geometry import Circle, HalfPlane, Shapes, box, candidate_pairs, make_shapes
-from iapb.contact.kernels.broadphase import near_pairs
-from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+from iapb.contact.geometry import (
+    Circle,
+    HalfPlane,
+    HalfSpace,
+    Shapes,
+    SpatialBox,
+    Sphere,
+    box,
+    candidate_pairs,
+    make_shapes,
+    make_spatial_shapes,
+)
+from iapb.contact.kernels.broadphase import make_broad_phase, near_pairs
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
 

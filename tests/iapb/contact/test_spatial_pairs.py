@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.geometry import ContactBuffer, candidate_pairs, contact_capacity, make_contact_buffer
-from iapb.contact.kernels.box_faces import MOST_POINTS, keep_widest
-from iapb.contact.kernels.box_pair import EDGE_SHARE
+from iapb.contact.geometry import (
+    ContactBuffer,
+    HalfSpace,
+    SpatialBox,
+    SpatialShape,
+    Sphere,
+    candidate_pairs,
+    contact_capacity,
+    make_contact_buffer,
+    make_spatial_shapes,
+)
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, SpatialShape, Sphere, make_spatial_shapes
+from iapb.contact.kernels.spatial_pairs import EDGE_SHARE, MOST_POINTS, keep_widest
 
 coal = pytest.importorskip("coal")
 Pose = tuple[np.ndarray, np.ndarray]

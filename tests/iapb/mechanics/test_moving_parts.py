@@ -10,7 +10,7 @@ from iapb.compiled import block
 from iapb.mechanics import kernels
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from iapb.mechanics.moving_parts import moving_parts
+from iapb.mechanics.structure import moving_parts
 from reference.random_mechanisms import random_mechanism, random_state
 
 AGREEMENT = 1e-12  # of the largest entry: the same sums in another order, over ten bodies

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, SceneError
-from iapb.mechanics.urdf_collision import read_collisions
+from iapb.mechanics.urdf import read_collisions
 from iapb.scene import load_scene, scene_from_text
 from iapb.simulation import simulate
 

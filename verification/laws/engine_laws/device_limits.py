@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from iapb.contact.kernels.collide import largest_share
 from verification.impacts import Floats, ImpactCase, draw_case
 from verification.laws.bounds import KIT, LawResidual
 from verification.laws.impact_laws import relative_gain
@@ -39,18 +40,13 @@ def draw(rng: np.random.Generator) -> LimitedImpact:
 
 def ours(impulse: Floats, dt: float, force_limit: Floats) -> tuple[Floats, Floats]:
     """The engine's scaling."""
-    from iapb.haptics.rendering import render_impulse
-
-    rendered = render_impulse(impulse, dt, force_limit, "scale")
-    return rendered.tool_impulse, rendered.device_force
+    share = largest_share(impulse, np.arange(len(impulse)), len(impulse), dt, force_limit)
+    return share * impulse, share * impulse / dt
 
 
 def saturated(impulse: Floats, dt: float, force_limit: Floats) -> tuple[Floats, Floats]:
     """The paper's first strategy: the tool gets all, the device each component clipped. Not passive."""
-    from iapb.haptics.rendering import render_impulse
-
-    rendered = render_impulse(impulse, dt, force_limit, "saturate")
-    return rendered.tool_impulse, rendered.device_force
+    return impulse, np.clip(impulse / dt, -force_limit, force_limit)
 
 
 def saturation_counterexample() -> LimitedImpact:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.geometry import make_contact_buffer
-from iapb.contact.kernels.box_faces import clip_faces, keep_widest
-from iapb.contact.spatial_geometry import SpatialBox, make_spatial_shapes
+from iapb.contact.geometry import SpatialBox, make_contact_buffer, make_spatial_shapes
+from iapb.contact.kernels.spatial_pairs import clip_faces, keep_widest
 
 ROOM = 30
 HALF, OTHER = np.array([0.5, 0.4, 0.3]), np.array([0.35, 0.45, 0.25])

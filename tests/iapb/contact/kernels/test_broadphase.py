@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.broadphase import make_broad_phase
-from iapb.contact.geometry import Circle, Shapes, box, make_shapes
-from iapb.contact.kernels.broadphase import LARGEST_CELL, cell_number, near_pairs, sort_keys
-from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+from iapb.contact.geometry import (
+    Circle,
+    HalfSpace,
+    Shapes,
+    SpatialBox,
+    Sphere,
+    box,
+    make_shapes,
+    make_spatial_shapes,
+)
+from iapb.contact.kernels.broadphase import LARGEST_CELL, cell_number, make_broad_phase, near_pairs, sort_keys
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 7, 50])

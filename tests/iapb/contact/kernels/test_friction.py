@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.kernels.friction import combine, friction_sweeps
-from iapb.contact.kernels.friction_limits import _inertia
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import (
+    _inertia,
+    combine,
+    friction_sweeps,
     make_friction_work,
     passive_share,
     share_within_cone,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.kernels.device_limit import largest_share
+from iapb.contact.kernels.collide import largest_share
 from iapb.contact.kernels.impact import (
     RANK_TOLERANCE,
     apply_change,

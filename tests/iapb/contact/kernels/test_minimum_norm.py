@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.minimum_norm import minimum_norm_impulses
+from iapb.contact.kernels.projector import minimum_norm_impulses
 
 
 def impulses_of(rows: np.ndarray, basis: np.ndarray, change: np.ndarray) -> np.ndarray:

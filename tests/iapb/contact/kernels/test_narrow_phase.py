@@ -9,12 +9,20 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.geometry import Circle, HalfPlane, Polygon, box, make_contact_buffer, make_shapes
-from iapb.contact.kernels.box_pair import boxes
-from iapb.contact.kernels.narrow_phase import circle_polygon, circles, detect, vertices_half_plane
-from iapb.contact.kernels.polygon_pair import polygons
-from iapb.contact.kernels.spatial_pairs import spatial_pair
-from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+from iapb.contact.geometry import (
+    Circle,
+    HalfPlane,
+    HalfSpace,
+    Polygon,
+    SpatialBox,
+    Sphere,
+    box,
+    make_contact_buffer,
+    make_shapes,
+    make_spatial_shapes,
+)
+from iapb.contact.kernels.narrow_phase import circle_polygon, circles, detect, polygons, vertices_half_plane
+from iapb.contact.kernels.spatial_pairs import boxes, spatial_pair
 
 Pose = tuple[np.ndarray, np.ndarray]
 GROUND, FLOOR = HalfPlane((0.0, 0.0), (0.0, 1.0)), HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from iapb.compiled import block
 from iapb.contact.geometry import Polygon, make_contact_buffer, make_shapes
-from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.polygon_pair import height_at
+from iapb.contact.kernels.narrow_phase import detect, height_at
 
 ROUNDING = 1e-12  # shapes and positions are of size 1
 Corners = np.ndarray  # (n, 2) counter-clockwise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.refine import refine_change
+from iapb.contact.kernels.impact import refine_change
 
 
 def refined(error: float, rank: int, seed: int) -> tuple[np.ndarray, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.gather import gather_restitution, pair_restitution
+from iapb.contact.kernels.collide import gather_restitution, largest_share, pair_restitution
 from iapb.contact.kernels.step import OK, advance
 from iapb.contact.laws import ImpulseAugmented
 from iapb.scene import scene_from_text
@@ -86,6 +86,19 @@ def test_a_group_gets_the_largest_share_that_the_device_can_give(rendering: str)
             assert state.impacts.approaching[line] == still
         scaled, whole = scaled + (factor < 1.0), whole + (factor == 1.0 and len(chosen) > 0)
     assert scaled > 2 and whole > 2
+
+
+@pytest.mark.parametrize(("restitution", "leaves_with", "steps"), [(0.0, 0.0, 7), (0.5, 0.0025, None)])
+def test_spreading_delivers_the_prescribed_velocity_for_plastic_impacts_only(
+    restitution: float, leaves_with: float, steps: int | None
+) -> None:
+    """Erratum 5, with its numbers: 2 kg at 0.1 m/s, 15 N and 512 Hz leave with 0.0025 m/s instead of 0.05 m/s."""
+    velocity, share, done = -0.1, 0.0, 0
+    while velocity < 0.0 and share < 1.0:
+        impulse = -(1.0 + restitution) * 2.0 * velocity
+        share = largest_share(np.array([impulse]), np.zeros(1, np.int64), 1, 1.0 / 512.0, np.array([15.0]))
+        velocity, done = velocity + share * impulse / 2.0, done + 1
+    assert velocity == pytest.approx(leaves_with, abs=5e-5) and steps in (None, done)
 
 
 def test_of_two_shapes_the_smaller_restitution_counts_and_the_scene_s_where_neither_has_one() -> None:

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from iapb.compiled import block
-from iapb.contact.geometry import make_contact_buffer
-from iapb.contact.kernels.box_pair import PARALLEL_SINE
-from iapb.contact.kernels.spatial_pairs import spatial_pair
-from iapb.contact.spatial_geometry import HalfSpace, SpatialBox, Sphere, make_spatial_shapes
+from iapb.contact.geometry import HalfSpace, SpatialBox, Sphere, make_contact_buffer, make_spatial_shapes
+from iapb.contact.kernels.spatial_pairs import PARALLEL_SINE, spatial_pair
 
 SIGNS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
 

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.contacts import find_contacts
 from iapb.contact.laws import Penalty
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.kernels.device import engage, inside, move_device
+from iapb.haptics.kernels import engage, inside, move_device
 from iapb.run import FREE, RESTING
 from iapb.scene import scene_from_text
 from iapb.system import System
@@ -75,7 +74,7 @@ def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_someth
         port.device_q[:], port.device_v[:] = [*(start + 0.3 * rng.normal(size=2)), rng.normal()], rng.normal(size=3)
         at_device = state.q.copy()
         at_device[6:] = port.device_q
-        found = find_contacts(system.mechanism, system.shapes, at_device, np.zeros(9))
+        found = system.contacts_at(at_device)
         within = bool(np.any((found.body_a == 2) | (found.body_b == 2)))
         q, v = state.q.copy(), state.v.copy()
         assert bool(inside(world, state, port)) == within

@@ -9,9 +9,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.kernels import couple
-from iapb.haptics.kernels.device import command, render
-from iapb.haptics.kernels.pulse import observe_work, shape_impulse
+from iapb.haptics.kernels import command, couple, observe_work, render, shape_impulse
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
 

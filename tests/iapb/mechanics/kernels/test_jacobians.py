@@ -10,7 +10,7 @@ import pytest
 from iapb.compiled import block
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.kernels import add_point_force, forward_kinematics, vectors
-from iapb.mechanics.kernels.jacobians import frame_jacobian, motion_at, point_jacobian, point_velocity
+from iapb.mechanics.kernels.kinematics import frame_jacobian, motion_at, point_jacobian, point_velocity
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
 

@@ -1,0 +1,322 @@
+"""The hand's side of one step, compiled: hand force, coupling, rendering, device (paper V-C and VI)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.compiled import copy_into, kernel
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.step import LARGEST_SPEED
+from iapb.mechanics.kernels import (
+    MechanismArrays,
+    Workspace,
+    add_point_force,
+    bias,
+    difference,
+    forward_kinematics,
+    integrate,
+    mass_matrix,
+)
+from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
+from iapb.mechanics.kernels.vectors import add, dot, load, transform
+from iapb.run import FREE
+
+NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
+
+
+class Port(NamedTuple):
+    """Hand, coupling and device of one world; d velocities of the world, d_t of the tool and the device."""
+
+    coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
+    tool_tree: int  # -1: nobody holds anything
+    q_start: int  # the tool's range in q
+    q_stop: int
+    v_start: int  # and in v
+    v_stop: int
+    hand_body: int  # held body in the world
+    device_body: int  # the same in the device
+    hand_point: np.ndarray  # (3,) [m] held point in the body's frame
+    wrench: np.ndarray  # (6,) force [N] and torque [N m] of the hand, world axes
+    stiffness: np.ndarray  # (d_t,) K [N/m, N m/rad]
+    damping: np.ndarray  # (d_t,) B [N s/m, N m s/rad]
+    mechanism: MechanismArrays  # the device: kinematically the tool
+    body: Workspace
+    varying_inertia: bool
+    device_q: np.ndarray  # (nq_t,)
+    device_v: np.ndarray  # (d_t,)
+    device_mass: np.ndarray  # (d_t, d_t)
+    device_lower: np.ndarray  # (d_t, d_t)
+    device_damping: np.ndarray  # (d_t,) physical damping b of the device
+    damped: bool
+    force_limit: np.ndarray  # (d_t,) [N, N m], inf = none
+    limited: bool  # the actuators clip what they are asked for to force_limit
+    resolution: np.ndarray  # (nq_t,) [m, rad] of the position sensors
+    quantised: bool
+    pulsed: bool  # an impulse is rendered over more than one step
+    pulse_weights: np.ndarray  # (w,) shares of an impulse in the w steps after it, sum 1
+    pulse_pending: np.ndarray  # (w, d_t) ring of what is still to be given [N, N m]
+    pulse_force: np.ndarray  # (d_t,) given in this step
+    pulse_balance: np.ndarray  # (1,) [J] lost in the tool's collisions less what the pulses gave the device
+    pulse_held: np.ndarray  # (1,) int64: steps in which the observer held a pulse back
+    delayed_force: np.ndarray  # (n + 1, d_t) ring of actuator forces on their way; n = 0: no delay
+    delayed_q: np.ndarray  # (n + 1, nq_t) ring of measured positions on their way
+    delayed_v: np.ndarray  # (n + 1, d_t)
+    sensed_q: np.ndarray  # (nq_t,) what the sensors read
+    measured_q: np.ndarray  # (nq_t,) what the simulation knows of the device
+    measured_v: np.ndarray  # (d_t,)
+    hand_force: np.ndarray  # (d,) of the hand on the tool
+    device_hand_force: np.ndarray  # (d_t,) of the hand on the device
+    coupling_force: np.ndarray  # (d,) on the tool
+    environment_force: np.ndarray  # (d,) F_env (26)
+    device_force: np.ndarray  # (d_t,) of the actuators on the device
+    applied: np.ndarray  # (d,) hand and coupling together
+    error: np.ndarray  # (d_t,) scratch
+    acceleration: np.ndarray  # (d_t,) scratch
+    engaged: np.ndarray  # (1,) bool: the unilateral coupler is on
+    clock: np.ndarray  # (1,) int64: steps done
+
+
+# What the simulation knows of the device: through quantised sensors, and late.
+
+
+@kernel
+def measure(world, port):
+    """What the simulation knows of the device: its state, through quantised sensors and the delay."""
+    slots = port.delayed_q.shape[0]
+    now = port.clock[0] % slots
+    arriving = (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0  # nothing older than the start
+    if port.quantised:
+        sense(world, port, port.delayed_v[now])
+    else:
+        copy_into(port.sensed_q, port.device_q)
+        copy_into(port.delayed_v[now], port.device_v)
+    copy_into(port.delayed_q[now], port.sensed_q)
+    copy_into(port.measured_q, port.delayed_q[arriving])
+    copy_into(port.measured_v, port.delayed_v[arriving])
+
+
+@kernel
+def sense(world, port, velocity):
+    """Positions rounded to the sensors' resolution, and their difference over one step as velocity.
+
+    Exact where the resolution is 0; at the first reading, which has none to differ from, the velocity is exact too.
+    """
+    first = port.clock[0] == 0
+    for k in range(port.sensed_q.shape[0]):
+        step = port.resolution[k]
+        read = round(port.device_q[k] / step) * step if step > 0.0 else port.device_q[k]
+        exact = first or step == 0.0
+        velocity[k] = port.device_v[k] if exact else (read - port.sensed_q[k]) / world.dt
+        port.sensed_q[k] = read
+
+
+# The forces on the tool in one step: the hand's and the position channels' (paper VI).
+
+
+@kernel
+def couple(world, state, port):
+    """Forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
+    if port.tool_tree < 0:
+        return  # `applied` holds the zeros that it was made with
+    feel_hand(world, state, port)
+    if port.coupling != NO_COUPLING:
+        measure(world, port)
+        coordinate(state, port)
+    for k in range(port.applied.shape[0]):
+        port.applied[k] = port.hand_force[k] + port.coupling_force[k]
+    if port.coupling == UNILATERAL and port.engaged[0]:
+        for k in range(port.v_start, port.v_stop):  # the hand reaches a coupled tool through the coupler only
+            port.applied[k] = port.coupling_force[k]
+
+
+@kernel
+def feel_hand(world, state, port):
+    """J_hᵀF_h on the tool where it is, and on the device where it is; nothing while the hand holds still."""
+    port.hand_force[:] = 0.0
+    port.device_hand_force[:] = 0.0
+    if not pushes(port):
+        return
+    forward_kinematics(world.mechanism, state.q, state.body)
+    press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
+    if port.coupling != NO_COUPLING:
+        forward_kinematics(port.mechanism, port.device_q, port.body)
+        press(port.mechanism, port.body, port.device_body, port, port.device_hand_force)
+
+
+@kernel
+def pushes(port):
+    """Does the hand do anything?"""
+    pushing = False
+    for k in range(port.wrench.shape[0]):
+        pushing = pushing or port.wrench[k] != 0.0
+    return pushing
+
+
+@kernel
+def press(mechanism, body, held, port, out):
+    """out += J_hᵀF_h for the wrench at the held point."""
+    wrench, arm = port.wrench, port.hand_point
+    force, torque = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    point = add(load(body.position, held), transform(body.rotation, held, (arm[0], arm[1], arm[2])))
+    add_point_force(mechanism, body, held, point, force, out)
+    k = mechanism.last_dof[held]
+    while k >= 0:
+        if mechanism.dof_rotates[k]:
+            out[k] += dot(load(body.axis, k), torque)
+        k = mechanism.dof_parent[k]
+
+
+@kernel
+def coordinate(state, port):
+    """Position channels: PD between tool and device, as a force on the tool (its opposite on the device)."""
+    port.coupling_force[:] = 0.0
+    if port.coupling == UNILATERAL and not port.engaged[0]:
+        return
+    difference(port.mechanism, state.q[port.q_start : port.q_stop], port.measured_q, port.error)
+    for i in range(port.error.shape[0]):
+        k = port.v_start + i
+        port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * (
+            port.measured_v[i] - state.v[k]
+        )
+
+
+# An impulse handed out over many steps, and the observer that keeps it from making energy.
+
+
+@kernel
+def shape_impulse(world, state, port):
+    """Hand the step's impulse out by the waveform's weights, and give what is due now in its place.
+
+    Passivity observer: the pulses may give the device no more energy than the tool's collisions took. Where they
+    would, this step's share waits for the next step: no momentum is lost.
+    """
+    slots = port.pulse_weights.shape[0]
+    now = port.clock[0] % slots
+    power = hand_out(world, state, port, now)
+    for line in range(state.impacts.logged[0]):
+        if state.impacts.group[line] == state.island_of_tree[port.tool_tree]:
+            port.pulse_balance[0] += state.impacts.energy_lost[line]
+    hold = power > 0.0 and port.pulse_balance[0] < world.dt * power
+    port.pulse_held[0] += hold
+    for i in range(port.pulse_force.shape[0]):
+        due = port.pulse_pending[now, i]
+        port.pulse_pending[now, i] = 0.0
+        if hold:
+            port.pulse_pending[(now + 1) % slots, i] += due
+            due = 0.0
+        port.pulse_force[i] = due
+        port.environment_force[port.v_start + i] += due - state.impulse[port.v_start + i] / world.dt
+
+
+@kernel
+def hand_out(world, state, port, now):
+    """Add the step's impulse to what is pending; return the power [W] of what is due now on the moving device."""
+    slots = port.pulse_weights.shape[0]
+    power = 0.0
+    for i in range(port.pulse_force.shape[0]):
+        force = state.impulse[port.v_start + i] / world.dt
+        if force != 0.0:
+            for j in range(slots):
+                port.pulse_pending[(now + j) % slots, i] += port.pulse_weights[j] * force
+        power += port.pulse_pending[now, i] * port.device_v[i]
+    return power
+
+
+@kernel
+def observe_work(world, port):
+    """Take the work of the step's pulses from the balance: force times the mean velocity of the step."""
+    for i in range(port.pulse_force.shape[0]):
+        mean = port.device_v[i] - 0.5 * world.dt * port.acceleration[i]
+        port.pulse_balance[0] -= world.dt * port.pulse_force[i] * mean
+
+
+# Rendering and device: F_env (26), what the actuators give of it, and how the device moves (paper V-C, VI).
+
+
+@kernel
+def drive_device(world, state, port):
+    """Render F_env (26) and move the device. False: it left all bounds."""
+    render(world, state, port)
+    return port.coupling == NO_COUPLING or move_device(world, state, port)
+
+
+@kernel
+def render(world, state, port):
+    """F_env (26) of this step, and what the actuators are to give of it."""
+    for k in range(port.environment_force.shape[0]):
+        contact = state.penalty_force[k] + state.friction_force[k]
+        port.environment_force[k] = contact + state.impulse[k] / world.dt
+    if port.coupling == NO_COUPLING:
+        return
+    if port.pulsed:
+        shape_impulse(world, state, port)
+    command(port)
+
+
+@kernel
+def command(port):
+    """Actuator force: F_env (four channels only) minus the PD, within the device's limits, after the delay."""
+    slots = port.delayed_force.shape[0]
+    now = port.clock[0] % slots
+    for i in range(port.device_force.shape[0]):
+        k = port.v_start + i
+        force = port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0
+        force -= port.coupling_force[k]
+        if port.limited:
+            force = min(max(force, -port.force_limit[i]), port.force_limit[i])
+        port.delayed_force[now, i] = force
+        port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
+
+
+@kernel
+def move_device(world, state, port):
+    """M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler. False: it left all bounds."""
+    a = port.acceleration
+    for i in range(a.shape[0]):
+        a[i] = port.device_hand_force[i] + port.device_force[i]
+        if port.damped:
+            a[i] -= port.device_damping[i] * port.device_v[i]
+    finite = True
+    if port.varying_inertia:
+        forward_kinematics(port.mechanism, port.device_q, port.body)
+        mass_matrix(port.mechanism, port.body, port.device_mass)
+        finite = cholesky(port.device_mass, port.device_lower) == 0
+        bias(port.mechanism, port.body, port.device_v, port.error)
+        for i in range(a.shape[0]):
+            a[i] -= port.error[i]
+    solve_mass(port.device_lower, a, a)
+    for i in range(a.shape[0]):
+        port.device_v[i] += world.dt * a[i]
+        finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
+    if port.pulsed:
+        observe_work(world, port)
+    integrate(port.mechanism, port.device_q, port.device_v, world.dt, port.device_q)
+    port.clock[0] += 1
+    if port.coupling == UNILATERAL and finite:
+        engage(world, state, port)
+    return finite
+
+
+@kernel
+def engage(world, state, port):
+    """The coupler is on while the tool touches or the device is inside a body; else the tool follows the device."""
+    port.engaged[0] = state.state_of_tree[port.tool_tree] != FREE or inside(world, state, port)
+    if not port.engaged[0]:
+        copy_into(state.q[port.q_start : port.q_stop], port.device_q)
+        copy_into(state.v[port.v_start : port.v_stop], port.device_v)
+
+
+@kernel
+def inside(world, state, port):
+    """Would the tool penetrate something at the device's pose? Uses the stage scratch of the state."""
+    copy_into(state.start_q, state.q)
+    copy_into(state.start_q[port.q_start : port.q_stop], port.device_q)
+    forward_kinematics(world.mechanism, state.start_q, state.body)
+    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.stage_contacts)
+    for i in range(max(count, 0)):
+        a, b = state.stage_contacts.body_a[i], state.stage_contacts.body_b[i]
+        if world.tree_of_body[a] == port.tool_tree or (b >= 0 and world.tree_of_body[b] == port.tool_tree):
+            return True
+    return False
