@@ -55,10 +55,7 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
             yield f"claims/{claim.id}", claim.numbers
     yield from _checks(evidence)
     yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Table))
-    for scene, effects in evidence.effects.items():
-        rows = tuple((one.name, one.active, one.change, one.cost) for one in effects)
-        columns = ("effect", "active", "change", "cost")
-        yield f"effects/{scene}", titled(columns, rows, timed=("cost",), prose=("change",))
+    yield from ((f"effects/{scene}", table) for scene, table in evidence.effects.items())
     for topic in evidence.topics:
         found = enumerate(topic.parts, 1)
         yield from _outcomes(topic.key, ((number, one.verdict, one.sentence, one.timed) for number, one in found))

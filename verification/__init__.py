@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from verification.cost.measure import work_precision as work_precision
+    from verification.cost.impacts import work_precision as work_precision
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
@@ -19,7 +19,7 @@ _HOME = {
     "check_passivity": "verification.laws",
     "bulk_impacts": "verification.laws",
     "judge_hard_cases": "verification.hard_cases",
-    "work_precision": "verification.cost.measure",
+    "work_precision": "verification.cost.impacts",
 }
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

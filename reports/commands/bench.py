@@ -10,9 +10,8 @@ from rich.console import Console
 from rich.table import Table as Printed
 
 from reports.commands.progress import stage_progress
-from reports.evidence import accuracy
-from reports.evidence.haptic_rate import topic_of
 from reports.figures.numbers import format_cell
+from verification.cost.impacts import work_precision
 from verification.cost.study import haptic_study
 from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Table
 
@@ -25,8 +24,8 @@ def bench(
 ) -> None:
     """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
     with stage_progress() as progress:
-        topic = topic_of(haptic_study("full" if full else "quick", progress))
-        methods = accuracy.compute(lambda done, total: progress("methods on problems", done, total))
+        topic = haptic_study("full" if full else "quick", progress)
+        methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
     console = Console(width=max(140, Console().width))
     for name, numbers in topic.tables.items():
         if tables or name not in LONG:

@@ -12,7 +12,7 @@ from iapb import decide_effects, find_scene, load_scene
 from iapb.errors import ArgumentError
 from reference.worlds import find_world
 from reports.commands.progress import stage_progress
-from reports.evidence.effects import effects_of, summary
+from verification.cost.effects import effects_of, summary
 
 
 def effects(
@@ -57,8 +57,9 @@ def _measure(source: Any, world: str) -> None:
     table = Table(title=f"Effects of {source.name} in {world}, measured", show_lines=True, caption=caption)
     for heading in ("effect", "on", "why", "cost", "changes without it", "best of its error"):
         table.add_column(heading, overflow="fold")
-    for one in found:
-        table.add_row(one.name, "on" if one.active else "off", one.reason, one.cost or "–",
-                      (one.change or one.consequence) if one.active else "–", best.get(one.name, "–"))  # fmt: skip
+    for one in found.records():
+        change = (one["change"] or one["left out"]) if one["active"] else "–"
+        table.add_row(one["effect"], "on" if one["active"] else "off", one["reason"], one["cost"] or "–", change,
+                      best.get(one["effect"], "–"))  # fmt: skip
     console = Console(width=max(140, Console().width))
     console.print(table)

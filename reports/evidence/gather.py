@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from reports.evidence import (
-    accuracy,
     claims,
     counterexamples,
     cross_checks,
-    effects,
     hard_cases,
     proofs,
     properties,
@@ -31,10 +29,11 @@ from reports.pages.records import (
     FailedCases,
     HardCase,
     Property,
-    SceneEffect,
 )
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
+from verification.cost import effects
+from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, Table, attempt
 
 Progress = Callable[[str, int, int], None]
@@ -67,17 +66,21 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     bulk = kept.stage("bulk impacts", Table, partial(properties.bulk, depth), None)
     checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
     hard = kept.stage("hard cases", tuple[HardCase, ...], partial(hard_cases.compute, runner))
-    timed = kept.stage("accuracy", Table, accuracy.compute, None)
+    timed = kept.stage("accuracy", Table, _methods, None)
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
     inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
-    needed = kept.stage("effects", dict[str, tuple[SceneEffect, ...]], effects.compute, {})
-    inputs[effects.INPUT] = effects.summary(needed)
+    needed = kept.stage("effects", dict[str, Table], effects.effects_of_scenes, {})
+    inputs["effect_costs"] = effects.summary(needed)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
         cross_checks=checks, hard_cases=hard, effects=needed, topics=topics, failed=kept.failed(),
         provenance=provenance(), manifest=manifest(runner.used, kept.stages, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)
+
+
+def _methods(progress: Callable[[int, int], None], failures: list[Failure]) -> Table:
+    return work_precision(progress=progress, failures=failures)
 
 
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:

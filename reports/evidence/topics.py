@@ -15,7 +15,7 @@ TOPICS: dict[str, str] = {
     "stability": "reports.evidence.stability:compute",
     "complementarity": "reports.evidence.complementarity:compute",
     "engines": "reports.evidence.engines:compute",
-    "haptic-rate": "reports.evidence.haptic_rate:compute",
+    "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",
 }
 

@@ -118,24 +118,6 @@ class HardCase:
 
 
 @dataclass(frozen=True)
-class SceneEffect:
-    """One effect of a scene: on or off, why, what it costs and what leaving it out would change.
-
-    consequence : in words, for any scene; change : as measured on this one
-    saved : share of the step's time that leaving it out saves; position : how far that takes the tool away [m]
-    """
-
-    name: str
-    active: bool
-    reason: str
-    cost: str = ""
-    consequence: str = ""
-    change: str = ""
-    saved: float | None = None
-    position: float | None = None
-
-
-@dataclass(frozen=True)
 class StoredFile:
     """One line of the manifest: a run or table file, what it holds, and the command that makes it again.
 
@@ -177,7 +159,7 @@ class Evidence:
     cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
     bulk: Table | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
-    effects: Mapping[str, tuple[SceneEffect, ...]] = field(default_factory=dict)
+    effects: Mapping[str, Table] = field(default_factory=dict)  # of each scene, as `verification.cost.effects` has them
     topics: tuple[Finding, ...] = ()
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)

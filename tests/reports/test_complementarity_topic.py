@@ -23,8 +23,7 @@ from verification.complementarity.convergence import ConvergenceRow
 from verification.complementarity.extensions import compare_friction, compare_unequal, struck_bar
 from verification.complementarity.problem_study import study_read
 from verification.complementarity.study import OWN, ComparisonStudy
-from verification.cost.step_cost import LEMKE_KERNEL, CostRow, impact_cost
-from verification.cost.world_cost import WAYS, StepCostRow
+from verification.cost.step_cost import LEMKE_KERNEL, WAYS, CostRow, StepCostRow, impact_cost
 from verification.finding import VERDICTS, Table, titled
 
 NAN = float("nan")

@@ -10,21 +10,19 @@ from typing import Any
 import pytest
 
 from iapb import find_scene
-from reports.evidence import engines, haptic_rate, stability
+from reports.evidence import engines, stability
 from reports.runner import Runner
 from verification.cost import (
     against_mujoco,
-    anytime,
-    kernels,
+    growth,
+    impacts,
     many_bodies,
     resting_scenes,
-    scaling,
     start_up,
     step_cost,
     study,
     trajectories,
 )
-from verification.cost import haptic_rate as rate
 from verification.engines import study as engines_study
 from verification.finding import Finding
 from verification.scenes import ledger
@@ -103,48 +101,42 @@ def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> N
 
 
 def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    def races(scene: Any, *_: Any) -> list[against_mujoco.StepRace]:
-        times = [kernels.quartiles([1e-6])] * 3
-        return [against_mujoco.StepRace(scene.name, "box", "Newton", 4, 4, *times, 0.0, 0.0)]
-
-    def cost(d: int, c: int, *_: Any) -> kernels.KernelTime:
-        return kernels.KernelTime(d, c, kernels.quartiles([1e-6]), kernels.quartiles([2e-4]))
-
-    chosen = resting_scenes.resting_scenes()
+    scenes_at_rest = resting_scenes.resting_scenes()
     monkeypatch.setattr(against_mujoco, "_mujoco", lambda: None)
-    monkeypatch.setattr(against_mujoco, "_race", broken(races, lambda scene, *_: scene is chosen[1]))
+    monkeypatch.setattr(against_mujoco, "_race", broken(_races, lambda scene, *_: scene is scenes_at_rest[1]))
     for module in (against_mujoco, study):
-        monkeypatch.setattr(module, "resting_scenes", lambda: chosen)
-    monkeypatch.setattr(study, "profile_step", broken(lambda *_: (), lambda scene, _: scene is chosen[0]))
-    monkeypatch.setattr(kernels, "_time_size", broken(cost, lambda d, c, *_: c == 300))
+        monkeypatch.setattr(module, "resting_scenes", lambda: scenes_at_rest)
+    monkeypatch.setattr(study, "profile_step", broken(lambda *_, rounds: [], lambda scene: scene is scenes_at_rest[0]))
     monkeypatch.setattr(study, "SOLVER_CONTACTS", {"quick": (1, 2)})
     monkeypatch.setattr(step_cost, "_time_case", broken(_solver_rows, lambda case, *_: case.contacts == 2))
     clock = itertools.count(1)
-    monkeypatch.setattr(scaling, "_calls", lambda d, c: {"factored": (d, c), "gram_pinv": (d, c)})
-    monkeypatch.setattr(scaling, "_seconds", broken(lambda size: 1e-6 * next(clock), lambda size: size == (24, 60)))
-    monkeypatch.setattr(rate, "_factored", lambda d, c: None)
-    monkeypatch.setattr(rate, "_printed", lambda d, c: None)
-    monkeypatch.setattr(rate, "_trial", broken(lambda method, d, c, call, calls: rate.RateTrial(method, d, c, 0, 1e-6),
-                                               lambda method, d, c, *_: (method, d, c) == (rate.PRINTED, 3, 60)))
+    monkeypatch.setattr(growth, "_sampler", broken(lambda *_: lambda: 1e-6 * next(clock),
+                                                   lambda method, d, c: (d, c) == (24, 60)))
+    monkeypatch.setattr(growth, "_trial", broken(lambda *_: (0, 1e-6), lambda method, d, c, calls: (method, d, c) == (
+        growth.PRINTED, 3, 60)))  # fmt: skip
     monkeypatch.setattr(many_bodies, "_cost", broken(lambda n: many_bodies.StepCost(n, 1e-6 * n, 1.0, 1, n, n),
                                                      (50).__eq__))
-    monkeypatch.setattr(study, "_robots", broken(lambda depth: ((), ""), lambda depth: True))
+    monkeypatch.setattr(study, "_robots", broken(lambda depth: None, lambda depth: True))
     monkeypatch.setattr(start_up, "_timed", broken(lambda *_: (1.0, 1.0), lambda *_: True))
-    monkeypatch.setattr(anytime, "SIZES", ((6, 24),))
-    monkeypatch.setattr(anytime, "_row", broken(
-        lambda d, c, rank, budget, cases: anytime.BudgetRow(d, c, rank, budget, 1, 0.1, 0.1, -1.0, 0.5),
-        lambda d, c, rank, budget, cases: budget == 1))  # fmt: skip
-    monkeypatch.setattr(trajectories, "_Judge", broken(lambda scene: scene, lambda scene: "cradle" in scene.title))
-    monkeypatch.setattr(trajectories, "methods", lambda: {"IAPB, midpoint": None, "PB, midpoint": None, "other": None})
-    monkeypatch.setattr(trajectories, "_over_steps", broken(_motions, lambda scene, method, *_: method == "other"))
-    topic = haptic_rate.topic_of(study.haptic_study())
+    monkeypatch.setattr(impacts, "SIZES", ((6, 24),))
+    monkeypatch.setattr(impacts, "_stopped", broken(_stopped, lambda cases, budget: budget == 1))
+    monkeypatch.setattr(trajectories, "Judge", broken(lambda scene: scene, lambda scene: "cradle" in scene.title))
+    ways = {name: name for name in ("IAPB, midpoint", "PB, midpoint", "other")}
+    monkeypatch.setattr(trajectories, "methods", lambda: ways)
+    monkeypatch.setattr(trajectories, "over_steps", broken(_motions, lambda scene, way, *_: way == "other"))
+    topic = study.haptic_study()
     assert lost(topic) == [
-        f"race on {chosen[1].name}", f"parts of a step, {chosen[0].name}", "robots",
-        "impact of 300 contacts in 12 coordinates", "patch of 2 contacts", "pile of 2 contacts",
+        f"race on {scenes_at_rest[1].name}", f"parts of a step, {scenes_at_rest[0].name}",
         "factored, d = 24, c = 60", "gram_pinv, d = 24, c = 60", "60 contacts in 3 coordinates by the printed formula",
-        "50 bodies", "iapb --help", "budget of 1 rows, d = 6, c = 24", "truth of cradle, e = 1",
-        "other on bouncing ball, e = 0.7", "other on peg into a corner, e = 0",
+        "50 bodies", "robots", "patch of 2 contacts", "pile of 2 contacts", "iapb --help",
+        "budget of 1 rows, d = 6, c = 24", "truth of cradle, e = 1", "other on bouncing ball, e = 0.7",
+        "other on peg into a corner, e = 0",
     ]  # fmt: skip
+
+
+def _races(scene: Any, *_: Any) -> list[dict[str, Any]]:
+    return [{"scene": scene.name, "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "our contacts": 4,
+             "its contacts": 4, "our step": 1.0, "its step": 100.0, "ratio": 0.01, "asked for": 0.1}]  # fmt: skip
 
 
 def _solver_rows(case: Any, *_: Any) -> list[step_cost.CostRow]:
@@ -153,5 +145,9 @@ def _solver_rows(case: Any, *_: Any) -> list[step_cost.CostRow]:
             for name, t in zip(names, (1.0, 0.1, 2.0), strict=True)]  # fmt: skip
 
 
-def _motions(scene: Any, method: str, *_: Any) -> list[trajectories.TrajectoryRun]:
-    return [trajectories.TrajectoryRun(scene.title, method, 1e-3, "ok", "", 0.1, 0.1, 0.1, 1e-3)]
+def _stopped(cases: Any, budget: int) -> list[dict[str, Any]]:
+    return [{"rank": 4, "budget": budget, "share of the loss": 0.5, "largest relative gain": -1.0}]
+
+
+def _motions(*_: Any) -> list[dict[str, Any]]:
+    return [{"position": 0.1, "time": 1.0, "outcome": "ok", "note": ""}]

@@ -17,11 +17,9 @@ import verification.mechanics
 import verification.proofs
 from reports.commands import reproduce
 from reports.evidence import (
-    accuracy,
     claims,
     counterexamples,
     cross_checks,
-    effects,
     gather,
     hard_cases,
     mechanics,
@@ -34,7 +32,7 @@ from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
 from verification.claims import c07_plastic
-from verification.cost import effect_cost, measure
+from verification.cost import effects, impacts
 from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
 from verification.laws import engine_laws, impact_laws, trajectory_laws
@@ -149,27 +147,25 @@ def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
 
 
 def of_accuracy(patch: Patch, folder: Path) -> list[str]:
-    problem = measure.timed_problems()[0]
-    patch.setattr(measure, "timed_problems", lambda: (problem,))
-    patch.setattr(measure, "_ENOUGH", 0.0)
-    name = next(iter(measure.METHODS))
-    patch.setitem(measure.METHODS, name, broken(measure.METHODS[name], lambda problem: True))
+    problem = impacts.timed_problems()[0]
+    patch.setattr(impacts, "timed_problems", lambda: (problem,))
+    patch.setattr(impacts, "_ENOUGH", 0.0)
+    name = next(iter(impacts.METHODS))
+    patch.setitem(impacts.METHODS, name, broken(impacts.METHODS[name], lambda problem: True))
     failures: list[Failure] = []
-    table = accuracy.compute(nothing, failures)
-    assert [row[0] for row in table.rows] == list(measure.METHODS)[1:]
+    table = impacts.work_precision(progress=nothing, failures=failures)
+    assert table.column("method") == list(impacts.METHODS)[1:]
     return [failure.case.removeprefix(problem.label) for failure in failures]
 
 
 def of_effects(patch: Patch, folder: Path) -> list[str]:
     patch.setattr(effects, "SCENES", ("peg_corner", "arm_pushing"))
-    patch.setattr(effects, "shipped_scene", broken(effects.shipped_scene, "arm_pushing".__eq__))
-    made = effect_cost.EffectMeasure
-    patch.setattr(effect_cost, "_Loop", lambda *_: type("Loop", (), {"sample": lambda self: 1.0})())
-    patch.setattr(effect_cost, "_measure", broken(lambda scene, world, whole, name, pairs: made(
-        name, 1.0, 1.0, 0.0, 0.0, 0.0), lambda scene, world, whole, name, pairs: name == "impulses"))  # fmt: skip
+    patch.setattr(effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing"))
+    patch.setattr(effects, "Loop", lambda *_: None)
+    patch.setattr(effects, "measure", broken(lambda *_: {"change": "some"}, lambda *given: given[3] == "impulses"))
     failures: list[Failure] = []
-    found = effects.compute(nothing, failures)
-    assert list(found) == ["peg_corner"] and sum(bool(effect.change) for effect in found["peg_corner"]) >= 3
+    found = effects.effects_of_scenes(nothing, failures)
+    assert list(found) == ["peg_corner"] and found["peg_corner"].column("change").count("some") >= 3
     return [failure.case for failure in failures]
 
 

@@ -24,14 +24,14 @@ from reports.pages.records import (
     Evidence,
     HardCase,
     Property,
-    SceneEffect,
     StoredFile,
     Verdict,
 )
 from reports.pages.sections import SECTIONS
 from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
-from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, Part, finding_of, titled
+from verification.cost.effects import COLUMNS as EFFECTS
+from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, Part, finding_of, table_of, titled
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -86,7 +86,7 @@ def full() -> Evidence:
         topics=(finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
                            (Part("It holds to 1e-14.", REPRODUCED),),
                            {"trees": titled(("joints", "error"), ((3, 1e-14),))}),),
-        effects={"peg": (SceneEffect("gravity", False, "none in the scene"),)},
+        effects={"peg": table_of(EFFECTS, [{"effect": "gravity", "active": False, "reason": "none in the scene"}])},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
     )

@@ -50,7 +50,7 @@ def _impacts(study: Study) -> Iterator[dict[str, Any]]:
 
 
 def _steps(study: Study) -> Iterator[dict[str, Any]]:
-    from verification.cost.world_cost import IDEAL, STEPPED, step_rivals, world_cost
+    from verification.cost.step_cost import IDEAL, STEPPED, step_rivals, world_cost
 
     rows = world_cost(SCENES, REPEATS[study.depth], STEPS[study.depth], (STEPPED, IDEAL))
     for theirs, ours in step_rivals(rows):

@@ -14,8 +14,16 @@ from verification.complementarity.convergence import CASES, WITHOUT_TRUTH
 from verification.complementarity.extensions import GAIN
 from verification.complementarity.problem_study import ProblemStudy
 from verification.complementarity.study import ComparisonStudy
-from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, CostRow, rivals
-from verification.cost.world_cost import costs_more, step_rivals
+from verification.cost.step_cost import (
+    IAPB,
+    KERNEL,
+    LEMKE_KERNEL,
+    PRINTED,
+    CostRow,
+    costs_more,
+    rivals,
+    step_rivals,
+)
 from verification.finding import (
     LIMITED,
     NOT_TESTABLE,

@@ -25,8 +25,7 @@ from verification.complementarity.extensions import (
 from verification.complementarity.own_problems import own_problems
 from verification.complementarity.problem_study import ProblemStudy, study_problems, study_read
 from verification.complementarity.scene_cases import impacts_of_run, scene_impacts
-from verification.cost.step_cost import CONTACTS, CostRow, impact_cost
-from verification.cost.world_cost import StepCostRow, world_cost
+from verification.cost.step_cost import CONTACTS, CostRow, StepCostRow, impact_cost, world_cost
 from verification.finding import Failure, attempt
 
 Progress = Callable[[str, int, int], None]

@@ -1,30 +1,30 @@
 """One recorded step of ours against MuJoCo's, each in its own compiled loop, on scenes in resting contact.
 
 Ours is `Simulation.advance_chunk`, as `simulate` runs it, record included; MuJoCo's is `mj_step(model, data, nstep)`,
-which records nothing. Both are called for the same number of steps in turn, by the thread's own clock; each round
-gives one ratio. Every solver of MuJoCo is tried, and the fastest one of a form is what counts.
+which records nothing. Both are called for the same number of steps in turn; each round gives one ratio. Every
+solver of MuJoCo is tried, and the fastest one of a form is what counts.
 Where the time of our step goes: every part of it by itself, in turn.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from iapb.compiled import kernel
+from iapb.contact.kernels.collide import resolve_collisions
+from iapb.contact.kernels.step import clear, find_contacts, locate, move
 from iapb.errors import MissingDependencyError
-from iapb.recording import make_record
+from iapb.haptics.kernels import couple, drive_device
+from iapb.recording import make_record, write_step
 from iapb.scene import scene_from_text
 from iapb.simulation import Simulation
-from verification.cost.kernels import quartiles
-from verification.cost.loops import PARTS, repeat_part
-from verification.cost.measure import Quartiles
+from verification.clock import TIME_COLUMNS, take_turns, time_cells, timed
 from verification.cost.resting_scenes import RestingScene, resting_scenes
-from verification.finding import Failure, attempt
+from verification.finding import Column, Failure, Row, Table, attempt, table_of
 
 STEPS, ROUNDS = 512, 15  # steps of one sample, as many as a chunk of `simulate`; samples of each
 SOLVERS = ("Newton", "CG", "PGS")
@@ -32,37 +32,32 @@ TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
 
 
-@dataclass(frozen=True)
-class StepRace:
-    """One scene: a step of ours against MuJoCo's with one form of the scene and one solver.
-
-    contacts, their_contacts : mean over the steps that were timed
-    ratio : ours by theirs, round by round
-    moved, they_moved : largest change of a coordinate while timed [m, rad]: near zero where the scene rests
-    """
-
-    scene: str
-    form: str
-    solver: str
-    contacts: float
-    their_contacts: float
-    ours: Quartiles
-    theirs: Quartiles
-    ratio: Quartiles
-    moved: float
-    they_moved: float
-
-    @property
-    def target(self) -> float:
-        """Largest ratio asked for."""
-        return TARGETS.get(self.scene, SPATIAL_TARGET)
+RACE_COLUMNS = (
+    Column("scene", condition=True),
+    Column("MuJoCo's form", condition=True),
+    Column("MuJoCo's solver", condition=True),
+    Column("our contacts"),
+    Column("its contacts"),
+    Column("our step", "µs", timed=True),
+    Column("its step", "µs", timed=True),
+    Column("ratio", timed=True),
+    Column("quartiles", timed=True),
+    Column("asked for"),
+    Column("we moved", timed=True),
+    Column("it moved", timed=True),
+)
+RACE_NOTE = (
+    "Frictionless (condim 1), same masses, forces and step; MuJoCo's other options are its defaults. Ours is recorded, "
+    "MuJoCo's is not. Ratios and their quartiles are of rounds. Contacts are means over the steps that were timed. "
+    "Moved: largest change of a coordinate while timed, m or rad."
+)
 
 
 def race_mujoco(
     scenes: Sequence[RestingScene] | None = None, rounds: int = ROUNDS, steps: int = STEPS,
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> tuple[StepRace, ...]:
-    """Time every scene, form and solver.
+) -> Table:
+    """Time a step of every scene against MuJoCo's, with every form and solver.
 
     Raises
     ------
@@ -70,41 +65,38 @@ def race_mujoco(
         MuJoCo is not installed.
     """
     _mujoco()
-    found: list[StepRace] = []
+    found: list[Row] = []
     chosen = resting_scenes() if scenes is None else tuple(scenes)
     for done, scene in enumerate(chosen, start=1):
         found += attempt(f"race on {scene.name}", partial(_race, scene, rounds, steps), failures) or []
         if progress is not None:
             progress(done, len(chosen))
-    return tuple(found)
+    return table_of(RACE_COLUMNS, found, digits=3, note=RACE_NOTE)
 
 
-def fastest_of_theirs(races: Sequence[StepRace]) -> tuple[StepRace, ...]:
+def fastest_of_theirs(races: Table) -> list[Row]:
     """Of each scene and form, the race against MuJoCo's fastest solver."""
-    by: dict[tuple[str, str], StepRace] = {}
-    for race in races:
-        key = race.scene, race.form
-        if key not in by or race.theirs.median < by[key].theirs.median:
-            by[key] = race
-    return tuple(by.values())
+    by: dict[tuple[str, str], Row] = {}
+    for race in sorted(races.records(), key=lambda race: float(race["its step"])):
+        by.setdefault((race["scene"], race["MuJoCo's form"]), race)
+    return list(by.values())
 
 
-def _race(scene: RestingScene, rounds: int, steps: int) -> list[StepRace]:
+def _race(scene: RestingScene, rounds: int, steps: int) -> list[Row]:
     ours = OwnLoop(scene, steps)
     theirs = {(form, solver): _Theirs(scene, form, solver, steps) for form in scene.models for solver in SOLVERS}
-    runners: list[OwnLoop | _Theirs] = [ours, *theirs.values()]
-    for runner in runners:  # warm
-        runner.sample()
-    for turn in range(rounds):
-        first = turn % len(runners)
-        for runner in runners[first:] + runners[:first]:
-            runner.times.append(runner.sample() / steps)
-    return [
-        StepRace(
-            scene.name, form, solver, ours.contacts, other.contacts, quartiles(ours.times), quartiles(other.times),
-            quartiles([a / b for a, b in zip(ours.times, other.times, strict=True)]), ours.moved, other.moved,
-        ) for (form, solver), other in theirs.items()
-    ]  # fmt: skip
+    times = take_turns({"ours": ours.sample, **{key: other.sample for key, other in theirs.items()}}, rounds)
+    found: list[Row] = []
+    for (form, solver), other in theirs.items():
+        ratio = times["ours"].over(times[form, solver])
+        found.append({
+            "scene": scene.name, "MuJoCo's form": form, "MuJoCo's solver": solver, "our contacts": ours.contacts,
+            "its contacts": other.contacts, "our step": 1e6 * times["ours"].median,
+            "its step": 1e6 * times[form, solver].median, "ratio": ratio.median,
+            "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
+            "asked for": TARGETS.get(scene.name, SPATIAL_TARGET), "we moved": ours.moved, "it moved": other.moved,
+        })  # fmt: skip
+    return found
 
 
 class OwnLoop:
@@ -112,21 +104,24 @@ class OwnLoop:
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
         self.simulation = Simulation(scene_from_text(scene.text, scene.file))
-        self.settling, self.steps, self.times = scene.settling, steps, list[float]()
+        self.settling, self.steps = scene.settling, steps
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
-        """Seconds of `steps` steps."""
+        """Seconds per step."""
+        self.settle()
+        simulation, record = self.simulation, self.record(self.steps)
+        before = simulation.state.q.copy()
+        _, seconds = timed(lambda: simulation.advance_chunk(record, self.steps))
+        self.contacts = float(record.contact_count.mean())
+        self.moved = float(np.abs(simulation.state.q - before).max())
+        return seconds / self.steps
+
+    def settle(self) -> None:
+        """Start anew and come to rest."""
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.port = system.make_state(), system.make_port(simulation.coupling)
         simulation.advance_chunk(self.record(self.settling), self.settling)
-        record, before = self.record(self.steps), simulation.state.q.copy()
-        started = time.thread_time()
-        simulation.advance_chunk(record, self.steps)
-        seconds = time.thread_time() - started
-        self.contacts = float(record.contact_count.mean())
-        self.moved = float(np.abs(simulation.state.q - before).max())
-        return seconds
 
     def record(self, steps: int) -> Any:
         system, port = self.simulation.system, self.simulation.port
@@ -141,23 +136,21 @@ class _Theirs:
         self.mujoco = _mujoco()
         self.model = scene.models[form](solver)
         self.push, self.pose = scene.push, scene.pose
-        self.settling, self.steps, self.times = scene.settling, steps, list[float]()
+        self.settling, self.steps = scene.settling, steps
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
-        """Seconds of `steps` steps."""
+        """Seconds per step."""
         data = self.mujoco.MjData(self.model)
         data.xfrc_applied[-1] = self.push
         if self.pose:
             data.qpos[:] = self.pose
         self.mujoco.mj_step(self.model, data, self.settling)
         before, touching = data.qpos.copy(), data.ncon
-        started = time.thread_time()
-        self.mujoco.mj_step(self.model, data, self.steps)
-        seconds = time.thread_time() - started
+        _, seconds = timed(lambda: self.mujoco.mj_step(self.model, data, self.steps))
         self.contacts = 0.5 * (touching + data.ncon)
         self.moved = float(np.abs(data.qpos - before).max())
-        return seconds
+        return seconds / self.steps
 
 
 def _mujoco() -> Any:
@@ -168,29 +161,46 @@ def _mujoco() -> Any:
     return mujoco
 
 
-@dataclass(frozen=True)
-class PartTime:
-    """Time of one part of a step [s]; part "whole step" is the loop itself."""
-
-    scene: str
-    part: str
-    seconds: Quartiles
+# in the order in which `repeat_part` numbers them
+PARTS = ("hand and coupling", "bodies placed", "contacts found", "collisions", "forces and motion", "device", "record")
 
 
-def profile_step(scene: RestingScene, rounds: int = ROUNDS, steps: int = STEPS) -> tuple[PartTime, ...]:
-    """Time of each part, and of the whole step, on a scene at rest."""
+WHOLE = "whole step"
+PART_COLUMNS = (Column("scene", condition=True), Column("part", condition=True), *TIME_COLUMNS)
+
+
+def profile_step(scene: RestingScene, rounds: int = ROUNDS, steps: int = STEPS) -> list[Row]:
+    """Time of each part, and of the whole step, on a scene at rest: rows of PART_COLUMNS."""
     loop = OwnLoop(scene, steps)
-    times: dict[str, list[float]] = {"whole step": [], **{part: [] for part in PARTS}}
-    for turn in range(rounds + 1):
-        seconds = loop.sample()
-        found = {"whole step": seconds / steps}
-        simulation = loop.simulation
-        for number, part in enumerate(PARTS):
-            record = loop.record(steps)
-            started = time.thread_time()
-            repeat_part(simulation.world, simulation.state, simulation.port, record, number, steps)
-            found[part] = (time.thread_time() - started) / steps
-        if turn:
-            for part, value in found.items():
-                times[part].append(value)
-    return tuple(PartTime(scene.name, part, quartiles(samples)) for part, samples in times.items())
+
+    def part(number: int) -> float:
+        loop.settle()
+        simulation, record = loop.simulation, loop.record(steps)
+        arguments = simulation.world, simulation.state, simulation.port, record, number, steps
+        return timed(lambda: repeat_part(*arguments))[1] / steps
+
+    times = take_turns({WHOLE: loop.sample, **{name: partial(part, k) for k, name in enumerate(PARTS)}}, rounds)
+    return [{"scene": scene.name, "part": name, **time_cells(taken)} for name, taken in times.items()]
+
+
+@kernel
+def repeat_part(world: Any, state: Any, port: Any, record: Any, part: Any, times: Any) -> None:
+    """Do one part of the step `times` times; on a scene at rest each time is like the one before."""
+    for k in range(times):
+        if part == 0:
+            couple(world, state, port)
+        elif part == 1:
+            clear(state)
+            locate(world, state)
+        elif part == 2:
+            find_contacts(world, state)
+        elif part == 3:
+            resolve_collisions(world, state)
+        elif part == 4:
+            state.penalty_force[:] = 0.0
+            state.friction_force[:] = 0.0
+            move(world, state, port.applied)
+        elif part == 5:
+            drive_device(world, state, port)
+        else:
+            write_step(record, k, k, state, port)

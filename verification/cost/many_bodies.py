@@ -6,7 +6,6 @@ The time belongs to the machine. What the broad phase does about it is counted: 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -17,9 +16,12 @@ from iapb.contact.kernels.broadphase import near_pairs
 from iapb.recording import make_record
 from iapb.scene import scene_from_text
 from iapb.simulation import Simulation
+from verification.clock import timed
+from verification.cost.growth import power_law
 from verification.finding import Failure, attempt
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
+LEAST_BODIES = 20  # with fewer, overhead hides the growth
 RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
 CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # chunks are short, so that some repeat of each is undisturbed
 
@@ -62,11 +64,10 @@ def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | 
     return tuple(cost for cost in found if cost is not None)
 
 
-def growth_exponent(costs: Sequence[StepCost], quantity: str = "seconds", least_bodies: int = 20) -> float:
-    """Return the slope of log(quantity) over log(bodies), from `least_bodies` on: below, overhead hides the growth."""
+def growth_exponent(costs: Sequence[StepCost], quantity: str = "seconds", least_bodies: int = LEAST_BODIES) -> float:
+    """Return the slope of log(quantity) over log(bodies), from `least_bodies` on."""
     chosen = [cost for cost in costs if cost.bodies >= least_bodies]
-    x = np.log([cost.bodies for cost in chosen])
-    return float(np.polyfit(x, np.log([getattr(cost, quantity) for cost in chosen]), 1)[0])
+    return power_law([cost.bodies for cost in chosen], [getattr(cost, quantity) for cost in chosen])
 
 
 def _cost(n: int) -> StepCost:
@@ -80,9 +81,8 @@ def _cost(n: int) -> StepCost:
         contacts, impacts, tested = 0.0, 0, 0.0
         for k in range(CHUNKS):
             record = make_record(CHUNK_STEPS, sizes, simulation.system.capacity, n)
-            start = time.perf_counter()
-            simulation.advance_chunk(record, CHUNK_STEPS)
-            quickest[k] = min(quickest[k], time.perf_counter() - start)
+            _, spent = timed(partial(simulation.advance_chunk, record, CHUNK_STEPS))
+            quickest[k] = min(quickest[k], spent)
             contacts += float(record.contact_count.mean()) / CHUNKS
             impacts += int(record.used[1])
             tested += _tested(simulation) / CHUNKS

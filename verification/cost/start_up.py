@@ -8,12 +8,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from verification.finding import Failure, attempt
+from verification.finding import Column, Failure, Table, attempt
 
 HELP_LIMIT, COMPILE_LIMIT = 0.5, 30.0  # [s]
 _HELPS = 5
@@ -26,41 +26,34 @@ _FIRST_STEPS = (
 )
 
 
-@dataclass(frozen=True)
-class StartUp:
-    """Seconds: of the clock on the wall, and of the process itself; medians over `runs` processes."""
-
-    what: str
-    wall: float
-    cpu: float
-    runs: int
-    limit: float
+COLUMNS = (
+    Column("what", condition=True),
+    Column("on the wall", "s", timed=True),
+    Column("computing", "s", timed=True),
+    Column("processes"),
+    Column("asked for", "s"),
+)
 
 
-def start_up(depth: str = "quick", failures: list[Failure] | None = None) -> tuple[StartUp, ...]:
+def start_up(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
     """Time `iapb --help`; at depth "full" also the first steps without and with a cache of compiled kernels."""
-    found = attempt("iapb --help", _help, failures) or []
+    rows = attempt("iapb --help", _help, failures) or ()
     if depth == "full":
-        found += attempt("first steps", _first_steps, failures) or []
-    return tuple(found)
+        rows += attempt("first steps", _first_steps, failures) or ()
+    return Table(COLUMNS, rows, digits=3)
 
 
-def _help() -> list[StartUp]:
+def _help() -> tuple[tuple[Any, ...], ...]:
     helps = [_timed(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
-    return [StartUp("iapb --help", *_medians(helps), _HELPS, HELP_LIMIT)]
+    return (("iapb --help", *(float(x) for x in np.median(helps, axis=0)), _HELPS, HELP_LIMIT),)
 
 
-def _first_steps() -> list[StartUp]:
+def _first_steps() -> tuple[tuple[Any, ...], ...]:
     with tempfile.TemporaryDirectory() as cache:
         first, second = (_timed(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache}) for _ in range(2))
     saved = (first[0] - second[0], first[1] - second[1])
-    return [StartUp("first steps, all kernels compiled", *saved, 1, COMPILE_LIMIT),
-            StartUp("first steps, kernels from the cache", *second, 1, COMPILE_LIMIT)]  # fmt: skip
-
-
-def _medians(times: list[tuple[float, float]]) -> tuple[float, float]:
-    wall, cpu = np.median(times, axis=0)
-    return float(wall), float(cpu)
+    return (("first steps, all kernels compiled", *saved, 1, COMPILE_LIMIT),
+            ("first steps, kernels from the cache", *second, 1, COMPILE_LIMIT))  # fmt: skip
 
 
 def _timed(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:

@@ -1,36 +1,36 @@
-"""C22: what one impact costs by each solver, beside IAPB, in one run.
+"""C22: what one impact costs by each solver, and one step in each world, beside IAPB, in one run.
 
 Timed is the whole way from M, J, v to v⁺: for the references that includes forming W or its factor, for IAPB the
 checks of `resolve_impact`. The kernels, IAPB's and Lemke's, are called from compiled code as in the engine's step:
-`rivals` sets like against like. Every solver is warmed first (imports, compiling), then all take turns, so that a busy
-moment of the machine hits them alike; linear algebra runs on one thread.
+`rivals` sets like against like. The rigid worlds run a QP per step from Python, the engine's worlds are compiled; so
+IAPB's step is timed in both ways, as the loop runs it and one step at a time from Python.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError
+from iapb.scene import find_scene, load_scene
+from iapb.simulation import Simulation
 from reference.one_thread import one_thread
-from verification.cost.impact_calls import Call, KernelCall, LemkeCall, engine_call, solver_call
+from reference.worlds import find_world
+from verification.clock import LEAST_ROUNDS, Times, sampler, seconds, take_turns
+from verification.cost.calls import Call, Floats, KernelCall, LemkeCall, engine_call, solver_call
+from verification.cost.loop import RecordedLoop
 from verification.finding import Failure, attempt, failure_of
 from verification.impacts import ImpactCase
-
-Floats = NDArray[np.float64]
 
 CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
 SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
 IAPB, KERNEL, PRINTED, LEMKE_KERNEL = "IAPB", "IAPB kernel", "IAPB printed formula", "Lemke kernel"
 REPEATS = 5
 LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked for a larger one; the row says so
-_SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
 # |v⁺ − v⁺_reference| in the kinetic metric below which an impact counts as solved; first-order solvers reach 1e-6.
 _SOLVED = 1e-5
 
@@ -66,9 +66,7 @@ class Rivals(NamedTuple):
     @property
     def costs_more(self) -> bool | None:
         """Whether the solver costs more; None where it solved nothing, or where the samples of the two overlap."""
-        solver, ours = self.solver, self.ours
-        overlap = solver.least <= ours.largest and ours.least <= solver.largest
-        return None if solver.verdict != "solved" or overlap else solver.median > ours.median
+        return costs_more(self.solver, self.ours) if self.solver.verdict == "solved" else None
 
 
 def rivals(rows: Sequence[CostRow]) -> tuple[Rivals, ...]:
@@ -116,14 +114,14 @@ def impact_cost(
     progress: Callable[[str, int, int], None] | None = None,
     failures: list[Failure] | None = None,
 ) -> tuple[CostRow, ...]:
-    """Time every solver and IAPB on a patch and on a pile of each size; at least three samples each."""
+    """Time every solver and IAPB on a patch and on a pile of each size; at least LEAST_ROUNDS samples each."""
     rows: list[CostRow] = []
     too_slow: dict[tuple[str, str], float] = {}
     for done, count in enumerate(contacts):
         for make in (patch, pile):
             case = make(count, np.random.default_rng([seed, count]))
             with one_thread():
-                timing = partial(_time_case, case, solvers, max(3, repeats), longest, too_slow, failures)
+                timing = partial(_time_case, case, solvers, max(LEAST_ROUNDS, repeats), longest, too_slow, failures)
                 rows += attempt(f"{case.family} of {count} contacts", timing, failures) or []
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))
@@ -135,15 +133,8 @@ def _time_case(
     failures: list[Failure] | None,
 ) -> list[CostRow]:
     calls, answers, notes = _warm(case, solvers, too_slow, failures)
-    samples: dict[str, list[float]] = {name: [] for name in calls}
-    inner = {name: _repetitions(call) for name, call in calls.items()}
-    names = list(calls)
-    for turn in range(repeats):
-        for name in names[turn % len(names) :] + names[: turn % len(names)]:
-            samples[name].append(_seconds(calls[name], inner[name]))
-    for name, times in samples.items():
-        if np.median(times) > longest:
-            too_slow[case.family, name] = float(np.median(times))
+    samples = take_turns({name: sampler(call) for name, call in calls.items()}, repeats, warm=False)
+    too_slow.update({(case.family, name): times.median for name, times in samples.items() if times.median > longest})
     return [_row(case, name, samples, answers, notes) for name in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, *solvers)]
 
 
@@ -173,28 +164,8 @@ def _warm(
     return calls, answers, notes
 
 
-def _repetitions(call: Call) -> int:
-    """Calls in one sample, so that it lasts long enough for the clock."""
-    times = 1
-    while _seconds(call, times) * times < _SHORTEST_SAMPLE:
-        times *= 4
-    return times
-
-
-def _seconds(call: Call, times: int) -> float:
-    """Seconds per call; the kernel repeats itself in compiled code, so that no call from Python is counted."""
-    repeated = getattr(call, "repeated", None)
-    started = time.perf_counter()
-    if repeated is not None:
-        repeated(times)
-    else:
-        for _ in range(times):
-            call()
-    return (time.perf_counter() - started) / times
-
-
 def _row(
-    case: ImpactCase, name: str, samples: dict[str, list[float]], answers: dict[str, Floats], notes: dict[str, str]
+    case: ImpactCase, name: str, samples: dict[str, Times], answers: dict[str, Floats], notes: dict[str, str]
 ) -> CostRow:
     size = (case.family, case.contacts, len(case.velocity), name)
     if name not in samples:
@@ -206,4 +177,62 @@ def _row(
     distance = float(np.linalg.norm(upper @ (answers[name] - reference))) / speed
     verdict = "solved" if distance <= _SOLVED else "failed"
     times = samples[name]
-    return CostRow(*size, verdict, float(np.median(times)), min(times), max(times), len(times), distance)
+    return CostRow(*size, verdict, times.median, times.least, times.largest, times.rounds, distance)
+
+
+SCENES = ("peg_corner", "peg_hole")
+STEPPED, IDEAL = "IAPB, step by step", "ideal (QP per step)"
+WAYS = ("IAPB, compiled loop", STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP per step)")
+STEPS = 256  # half a second of the peg: free, colliding and resting steps
+
+
+@dataclass(frozen=True)
+class StepCostRow:
+    """Seconds per step of one world on one scene: median, least and largest of `repeats` runs of `steps` steps."""
+
+    scene: str
+    way: str
+    median: float
+    least: float
+    largest: float
+    repeats: int
+    steps: int
+
+
+def step_rivals(rows: Sequence[StepCostRow]) -> tuple[tuple[StepCostRow, StepCostRow], ...]:
+    """(the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
+    by = {(row.scene, row.way): row for row in rows}
+    scenes = dict.fromkeys(row.scene for row in rows)
+    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in scenes
+                 if (scene, IDEAL) in by and (scene, STEPPED) in by)  # fmt: skip
+
+
+def costs_more(theirs: CostRow | StepCostRow, ours: CostRow | StepCostRow) -> bool | None:
+    """Whether theirs costs more; None where the samples of the two overlap."""
+    if theirs.least <= ours.largest and ours.least <= theirs.largest:
+        return None
+    return theirs.median > ours.median
+
+
+def world_cost(
+    scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS, ways: Sequence[str] = WAYS,
+    progress: Callable[[str, int, int], None] | None = None, failures: list[Failure] | None = None,
+) -> tuple[StepCostRow, ...]:
+    """Time every world on every scene; at least LEAST_ROUNDS samples each."""
+    rows: list[StepCostRow] = []
+    for done, name in enumerate(scenes):
+        times = take_turns({way: partial(_seconds_per_step, name, way, steps) for way in ways},
+                           max(LEAST_ROUNDS, repeats), failures=failures, name=lambda way: f"{name}, {way}")  # noqa: B023  # fmt: skip
+        rows += [StepCostRow(name, way, t.median, t.least, t.largest, t.rounds, steps) for way, t in times.items()]
+        if progress is not None:
+            progress("time per step", done + 1, len(scenes))
+    return tuple(rows)
+
+
+def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:
+    scene, world = load_scene(find_scene(scene_name)), find_world(way.split(",")[0].split(" ")[0])
+    simulation = Simulation(scene, world.law, world.coupling_in(scene))
+    if way == STEPPED:
+        simulation.step()
+        return seconds(simulation.step, steps)
+    return RecordedLoop(simulation, steps).sample()

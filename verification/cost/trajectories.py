@@ -1,16 +1,16 @@
 """Whole motions: error against event-driven truth, and the time they take, over methods and steps.
 
 Our compiled worlds are timed in their loop, the record included. The others are called from Python with set-up and
-record: their time is that of the run less that of a run of one step. All by the thread's own clock, the least of
-REPEATS short runs. What raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST
-by the time of the coarser steps is a time-out. Both stay among the records.
+record: their time is that of the run less that of a run of one step. The least of REPEATS short runs counts. What
+raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST by the time of the coarser
+steps is a time-out. Both stay among the rows. An error below what the truth is worth is no measurement: the row has
+the truth's bound in its place, and its note says so.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import cos, sin, sqrt
 from typing import Any
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from iapb.contact import laws
 from iapb.errors import IapbError, MissingDependencyError
-from iapb.recorder import Recorder
 from iapb.simulation import Simulation
 from reference.one_thread import one_thread
 from reference.scene_events import scene_truth
@@ -28,7 +27,9 @@ from reference.simulators import FixedScene, Settings, Trajectory, find_simulato
 from reference.simulators.own_engines import own_scene, world_state
 from reference.simulators.scene import FLOOR, RADIUS, WEIGHT, Cuboid, Obstacle, RigidBody, Sphere, rotation
 from reference.simulators.trajectory import steps_between_samples
-from verification.finding import Failure, attempt
+from verification.clock import timed
+from verification.cost.loop import RecordedLoop
+from verification.finding import Column, Failure, Table, attempt, table_of
 
 _BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
 _PEG = (0.021, 0.0105, 0.0105)  # [m] the paper's peg, a third side added
@@ -84,47 +85,56 @@ OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene, step, duration -> motion, seconds
 
 
-@dataclass(frozen=True)
-class TrajectoryRun:
-    """One method on one scene with one step [s]; the errors of a failure are NaN.
-
-    position : largest distance of a body's centre, or of a point half a length beside it, from the truth, in lengths
-    velocity : mean over the samples, a millisecond apart, of the largest error of a body's velocity, in largest true
-        speeds (L¹: at an impact any two motions that are not simultaneous differ by the whole jump)
-    energy : error of the energy at the end, in largest true kinetic energies; positive is a gain
-    seconds : CPU time of the run [s]; until it failed, or expected where it was not tried
-    """
-
-    scene: str
-    method: str
-    step: float
-    status: str
-    note: str
-    position: float
-    velocity: float
-    energy: float
-    seconds: float
+COLUMNS = (
+    Column("scene", condition=True),
+    Column("method", condition=True),
+    Column("step", "ms", condition=True),
+    Column("time", "ms", timed=True),
+    Column("position"),
+    Column("velocity"),
+    Column("energy"),
+    Column("signed energy"),
+    Column("outcome", timed=True),
+    Column("note", timed=True),
+)
+NOTE = (
+    "Position in lengths of the body (sup norm), velocity in largest speeds (L¹, at samples a millisecond apart), "
+    "energy at the end in largest kinetic energies."
+)
+BELOW = "below the truth's bound"
+Record = dict[str, Any]
 
 
 def trajectory_precision(
     scenes: Sequence[str] | None = None, depth: str = "quick", steps: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> tuple[TrajectoryRun, ...]:
-    """Run every method that is installed on every scene with every step, coarse to fine."""
+) -> Table:
+    """Run every method that is installed on every scene with every step [s], coarse to fine.
+
+    Returns
+    -------
+    Table
+        position : largest distance of a body's centre, or of a point half a length beside it, from the truth
+        velocity : mean over the samples of the largest error of a body's velocity (at an impact any two motions that
+            are not simultaneous differ by the whole jump)
+        signed energy : error of the energy at the end; positive is a gain
+        time : of the run; until it failed, or expected where it was not tried
+    """
     names, ways = tuple(scenes or TRAJECTORY_SCENES), methods()
-    runs: list[TrajectoryRun] = []
+    records: list[Record] = []
     with one_thread():
         for done, name in enumerate(names):
             scene = TRAJECTORY_SCENES[name]()
-            judge = attempt(f"truth of {scene.title}", partial(_Judge, scene), failures)
+            judge = attempt(f"truth of {scene.title}", partial(Judge, scene), failures)
             if judge is None:
                 continue
             for turn, (method, way) in enumerate(ways.items(), start=1):
-                over = partial(_over_steps, scene, method, way, judge, steps or STEPS[depth], LONGEST[depth])
-                runs += attempt(f"{method} on {scene.title}", over, failures) or []
+                over = partial(over_steps, scene, way, judge, steps or STEPS[depth], LONGEST[depth])
+                found = attempt(f"{method} on {scene.title}", over, failures) or []
+                records += [{"scene": scene.title, "method": method, **record} for record in found]
                 if progress is not None:
                     progress(done * len(ways) + turn, len(names) * len(ways))
-    return tuple(runs)
+    return table_of(COLUMNS, records, digits=3, note=NOTE)
 
 
 def methods() -> dict[str, Motion]:
@@ -146,38 +156,46 @@ def methods() -> dict[str, Motion]:
     return ways
 
 
-def _over_steps(scene: FixedScene, method: str, way: Motion, judge: _Judge, steps: Sequence[float],
-                longest: float) -> list[TrajectoryRun]:  # fmt: skip
-    runs: list[TrajectoryRun] = []
-    nothing, per_step = (np.nan,) * 3, 0.0
+def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:
+    """Run one method with every step; what fails or would take longer than `longest` [s] is a row, too."""
+    records: list[Record] = []
+    per_step = 0.0
+
+    def add(step: float, outcome: str, note: str, seconds: float, **errors: float) -> None:
+        records.append({"step": 1e3 * step, "time": 1e3 * seconds, "outcome": outcome, "note": note, **errors})
+
     for step in sorted(steps, reverse=True):
         expected = per_step * scene.duration / step
         if expected > longest:
-            note = f"would take {expected:.2g} s"
-            runs.append(TrajectoryRun(scene.title, method, step, TIMED_OUT, note, *nothing, expected))
+            add(step, TIMED_OUT, f"would take {expected:.2g} s", expected)
             continue
-        started = time.thread_time()
-        try:
-            found = [way(scene, step, scene.duration)]
-            while len(found) < REPEATS and found[0][1] < ONCE:
-                found.append(way(scene, step, scene.duration))
-        except Exception as error:  # an engine's own errors are of every kind, and each is a result
-            note = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-            spent = time.thread_time() - started
-            runs.append(TrajectoryRun(scene.title, method, step, FAILED, note, *nothing, spent))
+        found, spent = timed(partial(_tried, way, scene, step))
+        if isinstance(found, Exception):
+            add(step, FAILED, " ".join(f"{type(found).__name__}: {found}".split())[:160], spent)
             continue
-        seconds = min(spent for _, spent in found)
+        motion, seconds = found
         per_step = seconds / (scene.duration / step)
-        motion = found[-1][0]
-        if not motion.finite:
-            runs.append(TrajectoryRun(scene.title, method, step, FAILED, "not a number", *nothing, seconds))
-            continue
-        runs.append(TrajectoryRun(scene.title, method, step, OK, "", *judge.errors(motion), seconds))
-    return runs
+        if motion.finite:
+            errors, note = judge.errors(motion)
+            add(step, OK, note, seconds, **errors)
+        else:
+            add(step, FAILED, "not a number", seconds)
+    return records
 
 
-class _Judge:
-    """The truth of a scene, and how far a motion is from it."""
+def _tried(way: Motion, scene: FixedScene, step: float) -> tuple[Trajectory, float] | Exception:
+    """The motion and the least time of its runs, or what was raised."""
+    try:
+        found = [way(scene, step, scene.duration)]
+        while len(found) < REPEATS and found[0][1] < ONCE:
+            found.append(way(scene, step, scene.duration))
+    except Exception as error:  # an engine's own errors are of every kind, and each is a result
+        return error
+    return found[-1][0], min(spent for _, spent in found)
+
+
+class Judge:
+    """The truth of a scene, how far a motion is from it, and how far the truth may be off itself."""
 
     def __init__(self, scene: FixedScene) -> None:
         self.scene = scene
@@ -185,18 +203,32 @@ class _Judge:
         grid = self._at(np.linspace(0.0, scene.duration, 1001))
         self.speed = float(np.linalg.norm(grid.velocity, axis=-1).max())
         self.kinetic = float(grid.kinetic_energy(scene).max())
+        bound, mass = self.truth.bound, sum(body.mass for body in scene.bodies)
+        # an event that comes late by `instant` leaves a body for so long with a velocity off by the whole jump
+        late = 2.0 * self.speed * bound.instant * len(self.truth.events) / scene.duration
+        energy = mass * (self.speed * bound.velocity + float(np.linalg.norm(scene.gravity)) * bound.position)
+        self.bounds = {
+            "position": bound.position * (1.0 + 0.5 * scene.length) / scene.length,  # the point beside turns as well
+            "velocity": (bound.velocity + late) / self.speed,
+            "energy": energy / self.kinetic,
+        }
 
-    def errors(self, motion: Trajectory) -> tuple[float, float, float]:
-        """Errors of position, velocity and energy, as `TrajectoryRun` has them."""
+    def errors(self, motion: Trajectory) -> tuple[dict[str, float], str]:
+        """Errors as the table has them, none below the truth's bound, and a note on those that would be."""
         truth = self._at(np.minimum(motion.time, self.truth.end))
         off = np.linalg.norm(motion.velocity - truth.velocity, axis=-1).max(axis=1)
         energy = [one.kinetic_energy(self.scene)[-1] + one.potential_energy(self.scene)[-1] for one in (motion, truth)]
-        return (
-            max(float(np.linalg.norm(a - b, axis=-1).max()) for a, b in
-                zip(self._points(motion), self._points(truth), strict=True)) / self.scene.length,
-            float(np.trapezoid(off, motion.time) / (motion.time[-1] * self.speed)),
-            float(energy[0] - energy[1]) / self.kinetic,
-        )  # fmt: skip
+        signed = float(energy[0] - energy[1]) / self.kinetic
+        found = {
+            "position": max(float(np.linalg.norm(a - b, axis=-1).max()) for a, b in
+                            zip(self._points(motion), self._points(truth), strict=True)) / self.scene.length,
+            "velocity": float(np.trapezoid(off, motion.time) / (motion.time[-1] * self.speed)),
+            "energy": abs(signed),
+        }  # fmt: skip
+        below = [name for name, value in found.items() if value < self.bounds[name]]
+        found = {name: max(value, self.bounds[name]) for name, value in found.items()}
+        note = f"{', '.join(below)} {BELOW}" if below else ""
+        return found | {"signed energy": float(np.copysign(found["energy"], signed))}, note
 
     def _points(self, motion: Trajectory) -> tuple[Floats, Floats]:
         beside = rotation(motion.orientation) @ np.array([0.5 * self.scene.length, 0.0, 0.0])
@@ -213,15 +245,9 @@ def _compiled(law_name: str, integrator: str) -> Motion:
     def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float]:
         contact: dict[str, Any] = dict(find_simulator("iapb").settings(scene, step).options)
         law = getattr(laws, law_name)(integrator=integrator)
-        recording = Recorder(Simulation(own_scene(scene, step, duration, **contact), law))
-        total, seconds = round(duration / step), 0.0
-        while recording.steps < total:
-            started = time.thread_time()
-            stop = recording.chunk(total)
-            seconds += time.thread_time() - started
-            if stop is not None:
-                raise stop
-        run = recording.run("", "")
+        loop = RecordedLoop(Simulation(own_scene(scene, step, duration, **contact), law), round(duration / step))
+        seconds = loop.sample() * loop.steps
+        run = loop.recording.run("", "")
         keep = slice(None, None, steps_between_samples(step))
         q, v = run.q[keep], run.v[keep]
         return Trajectory(run.time[keep], *world_state(q, v), np.full(len(q), -1)), seconds
@@ -236,13 +262,10 @@ def _adapter(name: str) -> Motion:
         engine = find_simulator(name)
         settings: Settings = engine.settings(scene, step)
         engine.run(scene, settings, step, 2.0 * step)  # warm
-        marks = [time.thread_time()]
-        engine.run(scene, settings, step, step)
-        marks.append(time.thread_time())
-        motion = engine.run(scene, settings, step, duration)
-        marks.append(time.thread_time())
+        _, set_up = timed(partial(engine.run, scene, settings, step, step))
+        motion, spent = timed(partial(engine.run, scene, settings, step, duration))
         if len(motion.time) < 2:
             raise IapbError("fewer than two instants were recorded")
-        return motion, max((marks[2] - marks[1]) - (marks[1] - marks[0]), 0.0)
+        return motion, max(spent - set_up, 0.0)
 
     return run

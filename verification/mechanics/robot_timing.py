@@ -1,14 +1,14 @@
 """Time of mass matrix and bias per call, against Pinocchio called from Python; and of many states in one call.
 
-Pinocchio is called in its cheapest form, a bound function whose result is thrown away. Calls of both are interleaved:
-a slow minute of the machine slows both, and the ratio of each round is what counts.
+Pinocchio is called in its cheapest form, a bound function whose result is thrown away. Both take turns: a slow minute
+of the machine slows both, and the ratio of each round is what counts.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_state
 from reference.rigid_body import model_from_urdf
+from verification.clock import seconds, take_turns
 from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
 from verification.mechanics.robots import SEED, robot_files
 
@@ -63,12 +64,11 @@ def _rows(path: Path, rounds: int) -> Iterator[dict[str, Any]]:
     states = [random_state(rng, mechanism) for _ in range(STATES)]
     head = {"robot": path.stem, "velocities": mechanism.nv}
     for quantity, form, ours, theirs in _contests(mechanism, path, states):
-        times = np.array(list(_interleaved(ours, theirs, rounds))) / STATES * 1e6
-        lower, ratio, upper = np.percentile(times[:, 0] / times[:, 1], (25, 50, 75))
-        ours_median, theirs_median = np.median(times, axis=0)
-        yield {**head, "quantity": quantity, "form": form, "time": float(ours_median),
-               "Pinocchio": float(theirs_median), "ratio": float(ratio), "lower quartile": float(lower),
-               "upper quartile": float(upper)}  # fmt: skip
+        times = take_turns({"ours": partial(seconds, ours), "theirs": partial(seconds, theirs)}, rounds)
+        per_state, ratio = 1e6 / STATES, times["ours"].over(times["theirs"])
+        yield {**head, "quantity": quantity, "form": form, "time": per_state * times["ours"].median,
+               "Pinocchio": per_state * times["theirs"].median, "ratio": ratio.median,
+               "lower quartile": ratio.lower, "upper quartile": ratio.upper}  # fmt: skip
 
 
 def _contests(
@@ -98,19 +98,6 @@ def _contests(
     yield "bias", ONE, biases, their_biases
     yield "mass matrix", MANY, lambda: mechanism.mass_matrices(qs), their_masses
     yield "bias", MANY, lambda: mechanism.biases(qs, vs), their_biases
-
-
-def _interleaved(
-    ours: Callable[[], object], theirs: Callable[[], object], rounds: int
-) -> Iterator[tuple[float, float]]:
-    """Yield the two times [s] of each round, after one to warm up."""
-    for k in range(rounds + 1):
-        marks = [time.perf_counter()]
-        for work in (ours, theirs):
-            work()
-            marks.append(time.perf_counter())
-        if k:
-            yield marks[1] - marks[0], marks[2] - marks[1]
 
 
 def _judged(table: Table) -> Table:

@@ -18,7 +18,7 @@ from verification.complementarity import (
     own_problems,
     study,
 )
-from verification.cost import step_cost, world_cost
+from verification.cost import step_cost
 from verification.finding import NOT_TESTABLE, Failure
 
 
@@ -53,8 +53,8 @@ def found() -> Iterator[study.ComparisonStudy]:
     monkeypatch.setattr(step_cost, "solver_call", breaks(step_cost.solver_call, lambda case, name: name == "lemke"))
     monkeypatch.setattr(step_cost.impact_cost, "__defaults__",
                         (step_cost.CONTACTS, ("daqp", "lemke"), *step_cost.impact_cost.__defaults__[2:]))
-    monkeypatch.setattr(world_cost, "_seconds_per_step",
-                        breaks(lambda *_: 1.0, lambda scene, way, _: (scene, way) == ("peg_hole", world_cost.IDEAL)))
+    monkeypatch.setattr(step_cost, "_seconds_per_step",
+                        breaks(lambda *_: 1.0, lambda scene, way, _: (scene, way) == ("peg_hole", step_cost.IDEAL)))
     monkeypatch.setattr(own_problems, "SCENES", ())
     monkeypatch.setattr(own_problems, "HARD", ("grazing", "mass_ratio"))
     monkeypatch.setattr(own_problems, "_hyperstatic", lambda: ())
@@ -81,7 +81,7 @@ def test_only_the_rows_with_a_fault_are_lost(found: study.ComparisonStudy) -> No
     assert [row.scene for row in found.convergence] == ["bernoulli_balls"]
     assert {row.solver: row.verdict for row in found.impact_costs}["lemke"] == "failed"
     assert [row.way for row in found.step_costs if row.scene == "peg_hole"] == [
-        way for way in world_cost.WAYS if way != world_cost.IDEAL]
+        way for way in step_cost.WAYS if way != step_cost.IDEAL]
     assert [line.problem for line in found.problems[0].lines] == ["hard case mass_ratio"]
 
 

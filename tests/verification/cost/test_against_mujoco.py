@@ -9,9 +9,9 @@ from iapb.errors import MissingDependencyError
 from iapb.scene import scene_from_text
 from iapb.system import System
 from verification.cost import against_mujoco
-from verification.cost.against_mujoco import OwnLoop, StepRace, fastest_of_theirs, race_mujoco
-from verification.cost.kernels import quartiles
+from verification.cost.against_mujoco import OwnLoop, fastest_of_theirs, race_mujoco
 from verification.cost.resting_scenes import RestingScene, resting_scenes
+from verification.finding import titled
 
 SCENES = {scene.name: scene for scene in resting_scenes()}
 
@@ -46,19 +46,16 @@ def test_our_scene_rests_and_carries_the_load(name: str) -> None:
 def test_a_race_states_contacts_of_both_and_keeps_every_solver() -> None:
     pytest.importorskip("mujoco")
     races = race_mujoco([SCENES["peg in the corner"]], rounds=3, steps=32)
-    assert {(race.form, race.their_contacts) for race in races} == {("box", 8.0), ("four corner balls", 4.0)}
-    assert {race.solver for race in races} == set(against_mujoco.SOLVERS)
-    assert all(race.contacts == 4.0 and race.they_moved < 1e-6 for race in races)
+    assert {(race["MuJoCo's form"], race["its contacts"]) for race in races.records()} == {
+        ("box", 8.0), ("four corner balls", 4.0)}  # fmt: skip
+    assert set(races.column("MuJoCo's solver")) == set(against_mujoco.SOLVERS)
+    assert set(races.column("our contacts")) == {4.0} and max(races.column("it moved")) < 1e-6
 
 
 def test_the_fastest_solver_counts() -> None:
-    def race(solver: str, theirs: float) -> StepRace:
-        times = [quartiles([value]) for value in (1.0, theirs, 1.0 / theirs)]
-        return StepRace("a", "box", solver, 4, 4, *times, 0, 0)
-
-    assert [one.solver for one in fastest_of_theirs([race("slow", 9.0), race("fast", 3.0), race("middle", 5.0)])] == [
-        "fast"
-    ]
+    keys = ("scene", "MuJoCo's form", "MuJoCo's solver", "its step")
+    races = titled(keys, [("a", "box", "slow", 9.0), ("a", "box", "fast", 3.0), ("a", "box", "middle", 5.0)])
+    assert [race["MuJoCo's solver"] for race in fastest_of_theirs(races)] == ["fast"]
 
 
 def test_without_mujoco_the_race_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

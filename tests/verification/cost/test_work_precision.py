@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from verification.cost.kernels import kernel_times
-from verification.cost.measure import METHODS, work_precision
+from verification.cost.impacts import METHODS, work_precision
 from verification.impacts import timed_problems
 
 
@@ -28,32 +27,19 @@ def test_equalities_and_complementarity_have_the_same_answer(problem: object) ->
 def test_a_small_study_is_complete_and_ordered() -> None:
     problems = timed_problems(("contacts",))[:2]
     seen: list[tuple[int, int]] = []
-    records = work_precision(problems, rounds=4, progress=lambda done, of: seen.append((done, of)))
-    assert [(r.label, r.method) for r in records] == [(p.label, m) for p in problems for m in METHODS]
+    found = work_precision(problems, rounds=4, progress=lambda done, of: seen.append((done, of)))
+    assert [row[:2] for row in found.rows] == [(m, p.label) for p in problems for m in METHODS]
     assert seen == [(1, 2), (2, 2)]
-    for record in records:
-        assert record.status == "ok" and record.note == ""
-        assert 0.0 < record.seconds.lower <= record.seconds.median <= record.seconds.upper
-        assert record.seconds.rounds >= 3
-    errors = {r.method: r.forward_error for r in records if r.contacts == 4}
+    assert set(found.column("outcome")) == {"ok"} and min(found.column("time")) > 0.0
+    errors = dict(found.where(problem=problems[0].label).select(("method", "relative error")).rows)
     assert errors["factored"] < 1e-14 and errors["svd"] < 1e-13
     assert errors["factored"] < errors["cvxpy QP"] < errors["factored, 2 rows"] < errors["factored, 1 row"]
-    assert all(r.energy_gain < 0.0 for r in records)
+    assert set(found.column("relative energy gain")) == {0.0}
 
 
 def test_a_failure_is_recorded_with_its_reason() -> None:
-    """More contacts than coordinates: the Cholesky of W refuses, and the record says so."""
-    record = work_precision(timed_problems(("contacts",))[2:3], ["gram_cholesky"], rounds=3)[0]
-    assert record.status == "failed"
-    assert "independent rows" in record.note
-    assert np.isnan(record.forward_error) and np.isnan(record.seconds.median) and record.seconds.rounds == 0
-    assert record.failed_after > 0.0
-
-
-def test_kernel_times_speak_of_the_sizes_asked_for() -> None:
-    """Times themselves are never judged by a test: that is for `iapb bench`."""
-    small, large = kernel_times(((3, 4), (12, 300)), rounds=3)
-    assert [(found.coordinates, found.contacts) for found in (small, large)] == [(3, 4), (12, 300)]
-    for found in (small, large):
-        assert found.factored.rounds == found.printed.rounds == 3
-        assert found.ratio == found.printed.median / found.factored.median
+    """More contacts than coordinates: the Cholesky of W refuses, and the row says so."""
+    row = work_precision(timed_problems(("contacts",))[2:3], ["gram_cholesky"], rounds=3).records()[0]
+    assert row["outcome"].startswith("failed: ") and "independent rows" in row["outcome"]
+    assert row["relative error"] is row["time"] is None
+    assert row["failed after"] > 0.0

@@ -1,0 +1,157 @@
+"""The study of the haptic rate: a miss is called a miss, an absent engine is named, every figure has its table."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import typer
+
+from reports.commands import bench as command
+from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
+from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
+from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
+from verification.cost.effects import summary
+from verification.cost.growth import FACTORED, PRINTED, RATE_COLUMNS, SCALING_COLUMNS, fitted
+from verification.cost.impacts import BUDGET_COLUMNS
+from verification.cost.many_bodies import StepCost
+from verification.cost.start_up import COLUMNS as START_COLUMNS
+from verification.cost.step_cost import IAPB, KERNEL, CostRow
+from verification.cost.study import _bodies, _rate, finding, solvers_table
+from verification.cost.trajectories import BELOW
+from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
+from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
+from verification.mechanics.robot_timing import MANY, ONE
+
+Tables = dict[str, Table]
+
+
+def _races(ratio: float) -> Table:
+    return table_of(RACE_COLUMNS, [
+        {"scene": "peg in the corner", "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "our contacts": 4,
+         "its contacts": 8, "our step": 1.0, "its step": 1.0 / ratio, "ratio": ratio, "quartiles": "", "asked for": 0.1}
+    ])  # fmt: skip
+
+
+def _times(printed: float) -> Table:
+    sizes = [(12, c) for c in (50, 60, 500)] + [(d, 60) for d in (3, 6)]
+    return table_of(SCALING_COLUMNS, [
+        {"method": method, "coordinates": d, "contacts": c, "time": t * c * d, "lower quartile": 1, "upper quartile": 2}
+        for d, c in sizes for method, t in ((FACTORED, 0.01), (PRINTED, 0.01 * printed))
+    ])  # fmt: skip
+
+
+def _costs(*solvers: tuple[str, float]) -> Table:
+    return solvers_table(tuple(CostRow("patch", 4, 6, name, "solved", t, t, t, 3, 0.0) for name, t in solvers))
+
+
+def _run(method: str, step: float, error: float | None, time: float, outcome: str = "ok", note: str = "") -> Any:
+    return {"scene": "ball", "method": method, "step": step, "time": time, "position": error, "velocity": error,
+            "energy": error, "signed energy": error, "outcome": outcome, "note": note}  # fmt: skip
+
+
+def _budget(budget: int, gain: float = 0.0) -> Any:
+    return {"coordinates": 6, "contacts": 24, "rank": 4, "budget": budget, "median residual": 0.1,
+            "largest residual": 0.2, "share of the loss": budget / 4, "largest relative gain": gain}  # fmt: skip
+
+
+@pytest.fixture
+def tables() -> Tables:
+    """Everything as asked for."""
+    parts = (("whole step", 1.0), ("contacts found", 0.6), ("record", 0.1), ("device", 0.05))
+    robots = titled(("robot", "quantity", "form", "ratio"), [("arm", "bias", form, 0.9) for form in (ONE, MANY)])
+    late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0},
+            {"method": "the printed formula", "coordinates": 3, "contacts": 60, "late calls": 0}]  # fmt: skip
+    motions = [_run("IAPB, midpoint", 1.0, 1e-3, 1.0), _run("PB, midpoint", 1.0, 1.0, 1.0),
+               _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")]  # fmt: skip
+    return {
+        "steps against MuJoCo": _races(0.05),
+        "parts of a step": table_of(PART_COLUMNS, [
+            {"scene": "peg in the corner", "part": name, "time": t} for name, t in parts]),
+        "scaling": _times(20.0), "fitted": fitted(_times(20.0)),
+        "contacts at 1 kHz": _rate(table_of(RATE_COLUMNS, late)),
+        "bodies": _bodies(tuple(StepCost(n, 1e-6 * n, 1.0, 1, n * n, n) for n in (20, 100, 200))),
+        "robots": replace(robots, note="made up"),
+        "solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4), ("Lemke kernel", 2e-6)),
+        "start": Table(START_COLUMNS, (("iapb --help", 0.4, 0.3, 1, 0.5),)),
+        "budgets": table_of(BUDGET_COLUMNS, [_budget(budget) for budget in range(5)]),
+        "motions": table_of(MOTION_COLUMNS, motions),
+    }  # fmt: skip
+
+
+def _found(tables: Tables) -> Finding:
+    found = finding(tables, [])
+    assert not found.failures
+    return found
+
+
+def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
+    found = _found(tables)
+    assert {part.verdict for part in found.parts} == {found.verdict} == {REPRODUCED}
+    assert "0.05 times MuJoCo's as box (8 contacts" in found.parts[0].sentence
+    assert "600 at d = 3 (60 by the printed formula)" in found.parts[5].sentence
+    assert found.timed and not found.parts[-1].timed
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"steps against MuJoCo": _races(0.4)}, "contacts found 60 %"),
+        ({"scaling": _times(5.0)}, "5 times as long"),
+        ({"solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
+        ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "iapb --help takes 0.90 s"),
+        ({"bodies": _bodies(tuple(StepCost(n, 1e-9 * n**2, 1.0, 1, n, n) for n in (20, 200)))}, "power 2.00"),
+        ({"budgets": table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
+    ],
+)
+def test_a_miss_is_called_one(tables: Tables, change: Tables, words: str) -> None:
+    missed = [part.sentence for part in _found(tables | change).parts if part.verdict == LIMITED]
+    assert len(missed) == 1 and words in missed[0]
+
+
+def test_an_absent_engine_is_named(tables: Tables) -> None:
+    first = _found(tables | {"steps against MuJoCo": Table(RACE_COLUMNS, note="mujoco is not installed")}).parts[0]
+    assert first.verdict == NOT_COMPUTED and "not installed" in first.sentence
+
+
+def test_an_error_that_the_truth_cannot_show_is_not_called_an_error(tables: Tables) -> None:
+    runs = [*tables["motions"].records(), _run("MuJoCo", 0.2, 1e-9, 50.0, note=f"position, energy {BELOW}")]
+    sentence = next(part.sentence for part in _found(tables | {"motions": table_of(MOTION_COLUMNS, runs)}).parts
+                    if "Whole motion" in part.sentence)  # fmt: skip
+    assert f"MuJoCo {BELOW} of 1.0e-09 in 50 ms" in sentence
+
+
+def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
+    inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
+    motions = trajectory_precision.draw(inputs)
+    assert len(motions.panels) == 3
+    assert [name for name, _ in motions.legend] == ["IAPB, midpoint", "PB, midpoint", "MuJoCo"]
+    without = {**inputs, trajectory_precision.INPUT: tables["motions"].where(outcome="ok")}
+    assert motions.panels[0].svg != trajectory_precision.draw(without).panels[0].svg
+    assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
+
+
+def test_the_front_of_effects_is_pareto() -> None:
+    rows = [("cheap", True, 10.0, 0.0), ("dear", True, 40.0, 1.0), ("bad", True, 10.0, 2.0), ("off", False, None, None)]
+    keys = ("effect", "active", "time saved", "position")
+    effects = table_of(EFFECT_COLUMNS, [dict(zip(keys, row, strict=True)) for row in rows])
+    table = summary({"scene": effects})
+    assert {row["effect"]: row["best of its error"] for row in table.records()} == {
+        "cheap": "yes", "dear": "yes", "bad": "no"}  # fmt: skip
+    assert len(effect_costs.draw({effect_costs.INPUT: table}).panels) == 1
+
+
+def test_bench_ends_with_1_where_a_row_failed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failed = Failure("impact of 4 contacts", "SolverError", "no solution")
+    topic = Finding("haptic-rate", "The haptic rate", "", "", NOT_COMPUTED, failures=(failed,))
+    monkeypatch.setattr(command, "haptic_study", lambda *_: topic)
+    monkeypatch.setattr(command, "work_precision", lambda **_: Table(()))
+    monkeypatch.setattr(command, "_methods", lambda _: "")
+    with pytest.raises(typer.Exit) as ended:
+        command.bench(False, False)
+    assert ended.value.exit_code == 1 and "Not computed: impact of 4 contacts: SolverError" in capsys.readouterr().out
+    monkeypatch.setattr(command, "haptic_study", lambda *_: replace(topic, failures=()))
+    command.bench(False, False)

@@ -1,0 +1,65 @@
+"""The clock: warm, in random order, compiled code within compiled code; what fails takes no further turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from verification.clock import Times, sampler, seconds, take_turns, timed
+from verification.finding import Failure
+
+
+def test_statistics_are_of_the_samples_and_nan_of_none() -> None:
+    times = Times((3.0, 1.0, 2.0, 5.0, 4.0))
+    assert (times.least, times.lower, times.median, times.upper, times.largest) == (1.0, 2.0, 3.0, 4.0, 5.0)
+    assert times.over(Times((1.0, 1.0, 4.0, 5.0, 2.0))).samples == (3.0, 1.0, 0.5, 1.0, 2.0)
+    assert np.isnan(Times().median) and Times().rounds == 0
+
+
+def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_does_not_count() -> None:
+    order: list[str] = []
+
+    def contestant(name: str) -> float:
+        order.append(name)
+        return float(len(order))
+
+    found = take_turns({name: lambda name=name: contestant(name) for name in "abc"}, 20)  # type: ignore[misc]
+    rounds = ["".join(order[k : k + 3]) for k in range(0, len(order), 3)]
+    assert len(rounds) == 21 and {"".join(sorted(each)) for each in rounds} == {"abc"}
+    assert len(set(rounds)) == 6  # every order occurs
+    assert [times.rounds for times in found.values()] == [20] * 3
+    assert min(min(times.samples) for times in found.values()) > 3.0  # the warm round had 1, 2 and 3
+
+
+def test_a_contestant_that_raises_is_a_failure_and_leaves() -> None:
+    failures: list[Failure] = []
+    found = take_turns({(1, "good"): lambda: 1.0, (2, "bad"): lambda: 1.0 / 0.0}, 3, failures=failures)
+    assert list(found) == [(1, "good")] and [failure.error for failure in failures] == ["ZeroDivisionError"]
+    with pytest.raises(ZeroDivisionError):
+        take_turns({"bad": lambda: 1.0 / 0.0}, 3)
+
+
+def test_who_has_had_enough_takes_no_more_than_the_least_rounds() -> None:
+    found = take_turns({"slow": lambda: 1.0, "fast": lambda: 1e-3}, 9, enough=0.5)
+    assert (found["slow"].rounds, found["fast"].rounds) == (3, 9)
+
+
+def test_a_call_that_repeats_itself_is_not_called_from_python() -> None:
+    class Call:
+        calls = repeated_times = 0
+
+        def repeated(self, times: int) -> None:
+            self.repeated_times += times
+
+        def __call__(self) -> None:
+            self.calls += 1
+
+    call = Call()
+    seconds(call, 7)
+    assert (call.calls, call.repeated_times) == (0, 7)
+
+
+def test_processor_time_is_of_work_and_per_call() -> None:
+    result, spent = timed(lambda: sum(range(200_000)))
+    assert result == 19_999_900_000 and spent > 0.0
+    assert 0.0 < sampler(lambda: sum(range(20_000)))() < spent  # a tenth of the work, per call

@@ -1,0 +1,116 @@
+"""One impact, from M, J, v to v⁺, by each way that is timed; kernels repeat themselves in compiled code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb import resolve_impact
+from iapb.compiled import block, kernel
+from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
+from iapb.errors import MissingDependencyError, SolverError
+from iapb.mechanics.kernels.cholesky import cholesky
+from reference.complementarity import ImpactProblem, solve
+from verification.impacts import ImpactCase
+
+Floats = NDArray[Any]
+Call = Callable[[], Floats]
+
+
+def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
+    """Return an impact on c rows that span two thirds of the d coordinates."""
+    rank = max(1, (2 * d) // 3)
+    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
+
+
+def engine_call(case: ImpactCase, method: str, budget: int | None = None) -> Call:
+    """`resolve_impact` by a method, checks and all."""
+    return lambda: resolve_impact(*case.arrays, case.restitution, method=method, budget=budget).velocity
+
+
+def printed_call(case: ImpactCase) -> Call:
+    """(21) to the letter, in numpy."""
+    mass, rows, v = case.arrays
+
+    def call() -> Floats:
+        solved = np.linalg.solve(mass, rows.T)
+        return v - (1.0 + case.restitution) * (solved @ (np.linalg.pinv(rows @ solved) @ (rows @ v)))
+
+    return call
+
+
+@kernel
+def repeat_impact(  # type: ignore[no-untyped-def]
+    mass_matrix, lower, v, restitution, columns, work, v_plus, momentum, times
+):
+    """Factor M, copy the rows and resolve the impact, `times` times."""
+    d, count = columns.shape
+    for _ in range(times):
+        cholesky(mass_matrix, lower)
+        for k in range(d):
+            for i in range(count):
+                work.columns[k, i] = columns[k, i]
+        factored_impact(mass_matrix, lower, v, restitution, count, rank_tolerance(lower), d, True, work, v_plus,
+                        momentum)
+
+
+class KernelCall:
+    """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
+
+    def __init__(self, case: ImpactCase) -> None:
+        self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
+        self.columns, self.restitution = np.ascontiguousarray(case.contact_jacobian.T), case.restitution
+        d, c = len(self.v), case.contacts
+        self.lower, self.v_plus, self.momentum = np.zeros((d, d)), np.zeros(d), np.zeros(d)
+        self.work = block(make_impact_work(d, c))
+
+    def repeated(self, times: int) -> None:
+        """Resolve the impact `times` times."""
+        repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.work, self.v_plus,
+                      self.momentum, times)
+
+    def __call__(self) -> Floats:
+        """v⁺ (d,)."""
+        self.repeated(1)
+        return self.v_plus
+
+
+class LemkeCall:
+    """Lemke's kernel on the same arrays."""
+
+    def __init__(self, case: ImpactCase) -> None:
+        try:
+            import quantecon  # noqa: F401
+        except ImportError as error:
+            raise MissingDependencyError("quantecon", "Lemke kernel", "pip install quantecon") from error
+        self.case = case
+
+    def repeated(self, times: int) -> Floats:
+        """Resolve the impact `times` times; v⁺ of the last."""
+        from verification.cost.lemke_kernel import repeat_lemke  # brings quantecon
+
+        found: Floats = repeat_lemke(*self.case.arrays, self.case.restitution, times)
+        return found
+
+    def __call__(self) -> Floats:
+        """v⁺ (d,)."""
+        return self.repeated(1)
+
+
+def solver_call(case: ImpactCase, name: str, needs_answer: bool = False) -> Call:
+    """A solver by name: the impact as a complementarity problem in p ≥ 0, made and solved anew at each call.
+
+    Without an impulse v⁺ is NaN, or SolverError is raised where an answer is needed.
+    """
+
+    def call() -> Floats:
+        solution = solve(ImpactProblem.from_impact(*case.arrays, case.restitution), name)
+        if needs_answer and solution.impulse is None:
+            raise SolverError(f"{name} gave no impulse: {solution.note}")
+        return solution.velocity_plus
+
+    return call

@@ -1,0 +1,158 @@
+"""How one impact's time grows with contacts and coordinates, and how many contacts a millisecond holds (claim C19)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from reference.one_thread import one_thread
+from verification.clock import TIME_COLUMNS, sampler, seconds, take_turns, time_cells
+from verification.cost.calls import Call, KernelCall, printed_call, random_impact
+from verification.finding import Column, Failure, Table, attempt, table_of
+
+FACTORED, PRINTED = "factored", "gram_pinv"  # the compiled kernel, and the printed formula in numpy
+SIZES = (
+    *((12, c) for c in (50, 60, 100, 200, 300, 500, 1000, 2000, 5000)),
+    *((d, 60) for d in (3, 6, 24, 48, 96)),
+)  # (d, c)
+PRINTED_UP_TO = 500  # contacts: beyond, one pseudo-inverse takes seconds
+_ROUNDS = 15
+
+SIZE_COLUMNS = (Column("coordinates", condition=True), Column("contacts", condition=True))
+SCALING_COLUMNS = (Column("method", condition=True), *SIZE_COLUMNS, *TIME_COLUMNS)
+
+
+def scaling(
+    rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
+    sizes: tuple[tuple[int, int], ...] = SIZES,
+) -> Table:
+    """Time the factored impact, and the printed formula where that ends, over contacts and over coordinates.
+
+    All sizes take their turns in every round, so that a slow minute of the machine bends no curve.
+    """
+    wanted = [(method, d, c) for d, c in sizes for method in (FACTORED, PRINTED)
+              if method == FACTORED or c <= PRINTED_UP_TO]  # fmt: skip
+    with one_thread():
+        made = {size: attempt(_name(size), partial(_sampler, *size), failures) for size in wanted}
+        calls = {size: call for size, call in made.items() if call is not None}
+        times = take_turns(calls, rounds, failures=failures, name=_name, progress=progress)
+    return table_of(
+        SCALING_COLUMNS,
+        ({"method": method, "coordinates": d, "contacts": c, **time_cells(taken)}
+         for (method, d, c), taken in times.items()), digits=3, note="Rows of rank two thirds of d.",
+    )  # fmt: skip
+
+
+def _name(size: tuple[str, int, int]) -> str:
+    return "{}, d = {}, c = {}".format(*size)
+
+
+def _sampler(method: str, d: int, c: int) -> Callable[[], float]:
+    return sampler(_call(method, d, c))
+
+
+def _call(method: str, d: int, c: int) -> Call:
+    case = random_impact(d, c, np.random.default_rng([d, c]))
+    call = KernelCall(case) if method == FACTORED else printed_call(case)
+    call()  # compiled, and its arrays touched
+    return call
+
+
+def exponent(table: Table, method: str, axis: str) -> float:
+    """Slope of log(time) over log(axis), axis "contacts" at d = 12 or "coordinates" with 60 contacts."""
+    held = {"coordinates": 12} if axis == "contacts" else {"contacts": 60}
+    chosen = table.where(method=method, **held)
+    return power_law(chosen.column(axis), chosen.column("time"))
+
+
+def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """Return the slope of log(value) over log(size)."""
+    return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
+
+
+def fitted(table: Table) -> Table:
+    """A row per method and axis."""
+    columns = (Column("method", condition=True), Column("axis", condition=True), Column("exponent", timed=True))
+    rows = tuple((method, axis, exponent(table, method, axis))
+                 for method in (FACTORED, PRINTED) for axis in ("contacts", "coordinates"))  # fmt: skip
+    return Table(columns, rows, digits=3, note="Least squares of log time over log size.")
+
+
+DEADLINE = 1e-3  # [s] the haptic rate of 1 kHz
+CALLS, ALLOWED = 1000, 1  # calls of one trial, and how many of them may be late: 99.9 % are in time
+_ATTEMPTS = 3  # caches that others emptied only add time: so many trials are made until one is in time
+COORDINATES = (3, 6, 12, 30)
+CONTACTS = (6, 12, 30, 60, 120, 300, 600, 1200, 3000, 6000, 12000, 30000)
+TITLES = {FACTORED: "factored", PRINTED: "the printed formula"}
+RATE_COLUMNS = (
+    Column("method", condition=True, part=True),
+    *SIZE_COLUMNS,
+    Column("late calls", "of 1000", timed=True),
+    Column("time", "µs", timed=True),
+)
+
+
+def haptic_rate(
+    coordinates: tuple[int, ...] = COORDINATES, contacts: tuple[int, ...] = CONTACTS, calls: int = CALLS,
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
+) -> Table:
+    """Try both methods at each number of coordinates, with more and more contacts until one is late.
+
+    A row per trial: how many calls were beyond the deadline in the best of some attempts (one ends as soon as more
+    are late than ALLOWED), and the median of its calls.
+
+    Parameters
+    ----------
+    coordinates, contacts : sizes d and c; the rows span two thirds of the motion
+    calls : in each trial
+    """
+    records: list[dict[str, Any]] = []
+    with one_thread():
+        for done, d in enumerate(coordinates, start=1):
+            for method, title in TITLES.items():
+                for c in contacts:
+                    found = attempt(f"{c} contacts in {d} coordinates by {title}",
+                                    partial(_trial, method, d, c, calls), failures)  # fmt: skip
+                    if found is None:
+                        continue
+                    late, time = found
+                    records.append({"method": title, "coordinates": d, "contacts": c, "late calls": late,
+                                    "time": 1e6 * time})  # fmt: skip
+                    if late > ALLOWED:
+                        break
+            if progress is not None:
+                progress(done, len(coordinates))
+    return table_of(RATE_COLUMNS, records)
+
+
+def most_contacts(trials: Table) -> dict[str, dict[int, int]]:
+    """Largest number of contacts in time by method and coordinates; 0 where none is."""
+    most: dict[str, dict[int, int]] = {}
+    for row in trials.records():
+        best = most.setdefault(row["method"], {})
+        in_time = row["contacts"] if row["late calls"] <= ALLOWED else 0
+        best[row["coordinates"]] = max(best.get(row["coordinates"], 0), in_time)
+    return most
+
+
+def _trial(method: str, d: int, c: int, calls: int) -> tuple[int, float]:
+    call = _call(method, d, c)
+    for _ in range(_ATTEMPTS):
+        late, median = _late_calls(call, calls)
+        if late <= ALLOWED:
+            break
+    return late, median
+
+
+def _late_calls(call: Call, calls: int) -> tuple[int, float]:
+    """Number of late calls and the median time; stops when there are too many."""
+    late, times = 0, []
+    for _ in range(calls):
+        times.append(seconds(call))
+        late += times[-1] > DEADLINE
+        if late > ALLOWED:
+            break
+    return late, float(np.median(times))
