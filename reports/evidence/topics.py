@@ -12,9 +12,9 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 TOPICS: dict[str, str] = {
     "mechanics": "reports.evidence.mechanics:compute",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
-    "stability": "reports.evidence.stability:compute",
+    "stability": "verification.stability.contact_stability:contact_stability",
     "complementarity": "reports.evidence.complementarity:compute",
-    "engines": "reports.evidence.engines:compute",
+    "engines": "verification.engines.verdict:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",
 }

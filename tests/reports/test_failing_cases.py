@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from iapb import find_scene
-from reports.evidence import engines, stability
 from reports.runner import Runner
 from verification.cost import (
     against_mujoco,
@@ -24,9 +23,11 @@ from verification.cost import (
     trajectories,
 )
 from verification.engines import study as engines_study
+from verification.engines.verdict import engines
 from verification.finding import Finding
 from verification.scenes import ledger
-from verification.stability import device_port, maps, peg, waveforms
+from verification.stability import device_port, maps, peg
+from verification.stability.contact_stability import contact_stability
 
 
 def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
@@ -61,12 +62,12 @@ def test_stability(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(peg.STIFFNESSES, "quick", (500.0, 1000.0))
     monkeypatch.setitem(peg.DAMPINGS, "quick", (50.0,))
     monkeypatch.setattr(peg, "DEVICES", {"512 Hz": peg.DEVICES["512 Hz"]})
-    monkeypatch.setattr(waveforms, "_record", broken(waveforms._record, lambda name, _: name == "brake"))
+    monkeypatch.setattr(peg, "_pulse", broken(peg._pulse, lambda name, _: name == "brake"))
     monkeypatch.setitem(device_port.WALLS, "quick", (("CBuc", 1e3, 0.0), ("PB", 1e3, 0.0)))
     monkeypatch.setitem(device_port.SPEEDS, "quick", (0.3,))
     monkeypatch.setattr(device_port, "_worst", broken(device_port._worst, lambda loop, sensors, kind, _: (
         loop.world, sensors, kind) == ("PB", "late", "presses")))
-    topic = stability.compute(Runner(tmp_path), "quick", nothing)
+    topic = contact_stability(Runner(tmp_path), "quick", nothing)
     assert lost(topic) == [
         "walls at 1000 Hz, delay 0, device damping 5 N s/m", "peg at 512 Hz, K = 500 N/m, B = 50 N s/m",
         "waveform brake", "hand's port in PB, K = 1000 N/m, B = 0 N s/m, late sensors, the hand presses",
@@ -81,7 +82,7 @@ def test_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(engines_study, "FIXED_SCENES", ("redundant_wedge", "bernoulli"))
     monkeypatch.setattr(engines_study, "_both", broken(engines_study._both, lambda name, _, scene, depth: (
         name, scene) == ("rigid", "bernoulli")))
-    topic = engines.compute(Runner(tmp_path), "quick", nothing)
+    topic = engines(Runner(tmp_path), "quick", nothing)
     assert lost(topic) == ["rigid on bernoulli"]
     assert [row[2] for row in topic.tables["errors"].rows] == ["redundant wedge"] * 2 + ["bernoulli"] * 2 + [
         "redundant wedge"] * 2

@@ -1,10 +1,39 @@
-"""Verdicts in words: whether a run met its scene's law, and one sentence per engine."""
+"""What the engines did on the fixed scenes: whether a run met its scene's law, a sentence per engine, the finding."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
 
+from iapb.run import Run
+from reference.simulators import fixed_scene
 from verification.engines.record import EngineRecord
+from verification.engines.study import OWN, compare_engines
+from verification.finding import (
+    MIXED,
+    NOT_TESTABLE,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    finding_of,
+    table_of,
+    titled,
+)
+
+TITLE = "Other engines"
+QUESTION = (
+    "Eight scenes whose outcome is known, by energy, momentum and symmetry or because nothing may move, were given to "
+    "every engine that is installed: without friction, each at the settings that suit it best and then at a step "
+    "of 1 ms. Energy, momentum and overlap are computed from positions and velocities by one measure for all. MuJoCo "
+    "and Drake have no coefficient of restitution; springs with the right damping stand in for it."
+)
+COLUMNS = titled((
+    "engine", "version", "scene", "settings", "law", "energy error", "largest rise of energy", "momentum error",
+    "velocity error", "overlap / size", "drift [m]", "creep [m]", "simulated [s]", "failure",
+)).columns  # fmt: skip
 
 # A peer with springs for contacts cannot be exact; a hundredth of the start's energy, momentum and speed is what a
 # user of the engine would not notice, and what no engine misses by rounding.
@@ -33,7 +62,7 @@ def sentence(records: Sequence[EngineRecord]) -> str:
     if first.missing:
         return f"{first.title} is not installed here: {first.missing}"
     met = [record for record in records if verdict(record) == MET]
-    at = "at its own settings" if first.choice == "own" else f"at a step of {1e3 * (first.step or 0.0):g} ms"
+    at = "at its own settings" if first.choice == OWN else f"at a step of {1e3 * (first.step or 0.0):g} ms"
     parts = [f"{first.title} {first.version}, {at}, meets the law of {len(met)} of {len(records)} scenes"]
     missed = [f"{record.scene.replace('_', ' ')} ({_worst(record)})" for record in records if record not in met]
     if missed:
@@ -57,3 +86,62 @@ def _worst(record: EngineRecord) -> str:
     errors = {"energy": record.energy_error, "momentum": record.momentum_error, "velocity": record.velocity_error}
     name, value = max(errors.items(), key=lambda item: abs(item[1] or 0.0))
     return f"{name} off by {abs(value or 0.0):.2g}"
+
+
+def engines(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Compare all engines that are here, and name those that are not; `run` is not asked for anything."""
+    failures: list[Failure] = []
+    return finding(compare_engines(depth=depth, progress=progress, failures=failures), failures)
+
+
+def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -> Finding:
+    """Return one part per engine and choice of settings, and one on the engines that are not installed."""
+    present = [record for record in records if not record.missing]
+    groups: dict[tuple[str, str], list[EngineRecord]] = {}
+    for record in present:
+        groups.setdefault((record.engine, record.choice), []).append(record)
+    parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED) for group in groups.values()]
+    absent = sorted({record.title for record in records if record.missing})
+    if absent:
+        parts.append(Part(f"Not installed here, and so not compared: {', '.join(absent)}.", NOT_TESTABLE))
+    own = [record for record in present if record.choice == OWN]
+    matched = [record for record in present if record.choice != OWN]
+    answer = (
+        f"{len({record.engine for record in present})} engines on {len({record.scene for record in present})} scenes "
+        f"of known outcome: the law is met in {_met(own)} of {len(own)} runs at their own settings and in "
+        f"{_met(matched)} of {len(matched)} at 1 ms."
+    )
+    tables = {"errors": errors_table(records), "settings": settings_table(records)}
+    return finding_of("engines", TITLE, QUESTION, answer, parts, tables, failures)
+
+
+def _met(records: Sequence[EngineRecord]) -> int:
+    return sum(verdict(record) == MET for record in records)
+
+
+def errors_table(records: Sequence[EngineRecord]) -> Table:
+    """A row per engine, scene and choice of settings; an engine that is not installed keeps its rows."""
+    note = ("Errors are shares of the start's kinetic energy, of the sum of m |v| and of the largest speed; at rest "
+            "the rise is a share of m g times the bodies' size. A law is met within 1 %, at rest within 1 mm.")
+    return table_of(COLUMNS, map(_row, records), digits=2, note=note)
+
+
+def _row(record: EngineRecord) -> dict[str, Any]:
+    depth = None if record.penetration is None else record.penetration / fixed_scene(record.scene).length
+    same = {name.replace("_", " "): value for name, value in asdict(record).items()}
+    return same | {
+        "engine": record.title, "scene": record.scene.replace("_", " "), "settings": record.choice,
+        "law": verdict(record), "largest rise of energy": record.energy_gain, "overlap / size": depth,
+        "simulated": record.duration or None,
+    }  # fmt: skip
+
+
+def settings_table(records: Sequence[EngineRecord]) -> Table:
+    """What every engine was run with, and where."""
+    uses: dict[tuple[str, str, str, str], list[str]] = {}
+    for record in records:
+        key = (record.title, record.version or MISSING, record.settings, record.note)
+        uses.setdefault(key, []).append(f"{record.scene.replace('_', ' ')} ({record.choice})")
+    rows = [(title, version, settings, "" if version == MISSING else ", ".join(used), note)
+            for (title, version, settings, note), used in uses.items()]  # fmt: skip
+    return titled(("engine", "version", "settings", "used in", "what it cannot do"), rows)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from verification.finding import Failure, attempt
+from verification.finding import Failure, of_each
 from verification.stability.sampled_wall import LAWS, Contact, Floats, Loop, touch_walls
 
 SETTLES, BOUNCES_ON, GROWS = "settles", "bounces on", "grows"
@@ -80,9 +78,7 @@ def grid(depth: str) -> tuple[Floats, Floats]:
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 
-def stability_maps(
-    depth: str = "quick", progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> tuple[StabilityMap, ...]:
+def stability_maps(depth: str = "quick", failures: list[Failure] | None = None) -> tuple[StabilityMap, ...]:
     """Every loop under both laws, in turn, on the same walls; a loop that raises under one is left out."""
     stiffness, damping = grid(depth)
     K, B = walls(stiffness, damping)
@@ -90,12 +86,7 @@ def stability_maps(
     def both(loop: Loop) -> list[StabilityMap]:
         return [StabilityMap(loop, law, stiffness, damping, touch_walls(loop, K, B, law)) for law in LAWS]
 
-    chosen, maps = loops(), list[StabilityMap]()
-    for done, loop in enumerate(chosen, start=1):
-        name = f"walls at {loop.rate:g} Hz, delay {loop.delay}, device damping {loop.device_damping:g} N s/m"
-        maps += attempt(name, partial(both, loop), failures) or []
-        if progress is not None:
-            progress(done, len(chosen))
-    return tuple(maps)
+    def name(loop: Loop) -> str:
+        return f"walls at {loop.rate:g} Hz, delay {loop.delay}, device damping {loop.device_damping:g} N s/m"
 
-
+    return tuple(of_each(loops(), both, failures, name))

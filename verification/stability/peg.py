@@ -1,20 +1,31 @@
-"""The peg of Fig. 4 against walls of many stiffnesses and dampings, in the engine's own loop with its device."""
+"""The peg of Fig. 4 in the engine's own loop with its device: against many walls, and under every waveform."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from itertools import count, product
 from typing import Any
 
+import numpy as np
+
+from iapb.haptics.waveforms import WAVEFORMS
 from iapb.run import Run
-from iapb.scene import Scene
-from verification.finding import Failure, attempt
+from iapb.scene import find_scene, load_scene
+from verification.finding import (
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Part,
+    Table,
+    of_each,
+    table_of,
+    titled,
+    verdict_of_trials,
+)
 from verification.scenes.measures import bounces, deepest_penetration, settling_time
 from verification.scenes.trace import trace_of
 
-Runner = Callable[[Scene, str], Run]
-
+SCENE = "peg_corner"
 STIFFNESSES = {"quick": (500.0, 1000.0, 4000.0, 16000.0), "full": (250.0, 500.0, 1e3, 2e3, 4e3, 8e3, 16e3, 32e3)}
 DAMPINGS = {"quick": (0.0, 50.0, 200.0), "full": (0.0, 12.5, 25.0, 50.0, 100.0, 200.0, 400.0)}
 WORLDS = ("PB", "IAPB")
@@ -26,50 +37,102 @@ DEVICES: dict[str, tuple[float, dict[str, Any]]] = {
     "1 kHz": (1000.0, {}),
     "1 kHz, late sensors": (1000.0, LATE),
 }
-
-
-@dataclass(frozen=True)
-class PegContact:
-    """One run; settling_time [s] from first contact, None where the peg never rests or the loop gave up (`note`)."""
-
-    device: str
-    stiffness: float
-    damping: float
-    world: str
-    settling_time: float | None
-    bounces: int
-    penetration: float
-    note: str = ""
+WAVEFORM_RATE = 1000.0  # [Hz]: aluminium rings at 300 Hz
+COLUMNS = titled(("device", "stiffness [N/m]", "damping [N s/m]", "world", "settles after [s]", "bounces",
+                  "penetration [mm]", "stopped")).columns  # fmt: skip
+PULSE_COLUMNS = titled((
+    "waveform", "rate-hardness [N/m]", "peak force [N]", "settles after [s]", "bounces", "penetration [mm]",
+    "momentum not given", "given to the hand [mJ]", "lost in collisions [mJ]",
+)).columns  # fmt: skip
 
 
 def peg_contacts(
-    scene: Scene, run: Runner, depth: str = "quick", progress: Callable[[int, int], None] | None = None,
+    run: Callable[..., Run], depth: str = "quick", progress: Callable[[int, int], None] | None = None,
     failures: list[Failure] | None = None,
-) -> tuple[PegContact, ...]:
-    """Every device and wall, in both worlds in turn; a wall that raises in one is left out.
+) -> Table:  # fmt: skip
+    """Run every device and wall in both worlds in turn; a wall that raises in one is left out.
 
     Parameters
     ----------
-    scene : the peg in the corner; run : (scene, world) -> Run, complete or not
+    run : (scene, world, keep=False, partial=True) -> Run, complete or not
     """
-    chosen = [(device, K, B) for device in DEVICES for K in STIFFNESSES[depth] for B in DAMPINGS[depth]]
+    scene = load_scene(find_scene(SCENE))
+    chosen, done = list(product(DEVICES, STIFFNESSES[depth], DAMPINGS[depth])), count()
 
-    def both(device: str, K: float, B: float) -> list[PegContact]:
-        rate, sensors = DEVICES[device]
-        values = {"rate": rate, "contact.stiffness": K, "contact.damping": B, **sensors}
-        return [_contact(device, K, B, run(scene.with_values(values), world)) for world in WORLDS]
-
-    found: list[PegContact] = []
-    for done, case in enumerate(chosen, start=1):
-        name = "peg at {}, K = {:g} N/m, B = {:g} N s/m".format(*case)
-        found += attempt(name, partial(both, *case), failures) or []
+    def both(case: tuple[str, float, float]) -> list[dict[str, Any]]:
         if progress is not None:
-            progress(done, len(chosen))
-    return tuple(found)
+            progress(next(done), len(chosen))
+        (rate, sensors), K, B = DEVICES[case[0]], *case[1:]
+        changed = scene.with_values({"rate": rate, "contact.stiffness": K, "contact.damping": B, **sensors})
+        return [_contact(*case, run(changed, world, keep=False, partial=True)) for world in WORLDS]
+
+    rows = of_each(chosen, both, failures, lambda case: "peg at {}, K = {:g} N/m, B = {:g} N s/m".format(*case))
+    return table_of(COLUMNS, rows, digits=3, note="A dash: it never came to rest.")
 
 
-def _contact(device: str, stiffness: float, damping: float, run: Run) -> PegContact:
+def _contact(device: str, stiffness: float, damping: float, run: Run) -> dict[str, Any]:
     trace = trace_of(run)
-    settled = settling_time(trace) if run.complete else None
-    return PegContact(device, stiffness, damping, run.world, settled, bounces(trace), deepest_penetration(trace),
-                      run.stopped)  # fmt: skip
+    return {
+        "device": device, "stiffness": stiffness, "damping": damping, "world": run.world,
+        "settles after": settling_time(trace) if run.complete else None, "bounces": bounces(trace),
+        "penetration": 1e3 * deepest_penetration(trace), "stopped": run.stopped,
+    }  # fmt: skip
+
+
+def peg(pegs: Table) -> Part:
+    """Whether the peg rests no later with impulses; a wall where it rests under neither law cannot tell."""
+    rows = pegs.records()
+    pairs = list(zip(rows[::2], rows[1::2], strict=True))
+    times = [tuple(np.inf if row["settles after"] is None else row["settles after"] for row in pair) for pair in pairs]
+    sooner = [None if np.isinf(min(pair)) else bool(pair[1] <= pair[0]) for pair in times]
+    fewer = sum(ours["bounces"] <= theirs["bounces"] for theirs, ours in pairs)
+    return Part(
+        f"The peg in the corner comes to rest no later with impulses in {sooner.count(True)} of "
+        f"{len(sooner) - sooner.count(None)} trials of device and wall where either does, and bounces no more often in "
+        f"{fewer} of {len(pairs)}.", verdict_of_trials(sooner))  # fmt: skip
+
+
+def waveforms(run: Callable[..., Run], failures: list[Failure] | None = None) -> Table:
+    """Run the peg in the world IAPB at WAVEFORM_RATE, the impulse given by its device in every waveform."""
+    scene = load_scene(find_scene(SCENE))
+
+    def under(name: str) -> list[dict[str, Any]]:
+        return [_pulse(name, run(scene.with_values({"rate": WAVEFORM_RATE, "device.waveform": name}), "IAPB",
+                                 keep=False))]  # fmt: skip
+
+    note = ("The peg in the corner at 1 kHz, the impulse given by its device in each way. Negative energy: the pulses "
+            "took it from the hand. Momentum not given is still on its way at the end.")
+    rows = of_each(WAVEFORMS, under, failures, lambda name: f"waveform {name}")
+    return table_of(PULSE_COLUMNS, rows, digits=3, note=note)
+
+
+def _pulse(name: str, run: Run) -> dict[str, Any]:
+    """What a hand feels; rate-hardness: the first rise of the force over one step per speed on touching."""
+    trace = trace_of(run)
+    pulse = run.environment_force - run.penalty_force - run.friction_force
+    mean = 0.5 * (run.device_v[1:] + run.device_v[:-1])
+    computed = run.impulse.sum(axis=0)
+    first = int(run.impacts.step[0])
+    size = float(np.linalg.norm(pulse[first, :2]))
+    speed = abs(float(run.device_v[first, :2] @ pulse[first, :2])) / size
+    return {
+        "waveform": name, "rate-hardness": size / run.dt / speed,
+        "peak force": float(np.abs(run.device_force[:, :2]).max()), "settles after": settling_time(trace),
+        "bounces": bounces(trace), "penetration": 1e3 * deepest_penetration(trace),
+        "momentum not given": float(np.abs(pulse.sum(axis=0) * run.dt - computed).max() / np.abs(computed).max()),
+        "given to the hand": 1e3 * float(np.sum(pulse * mean) * run.dt),
+        "lost in collisions": 1e3 * float(run.impacts.energy_lost.sum()),
+    }  # fmt: skip
+
+
+def pulses(table: Table) -> Part:
+    """Whether every waveform gives the momentum and no more energy than the collisions took."""
+    rows = table.records()
+    most = max(row["given to the hand"] - row["lost in collisions"] for row in rows)
+    forces = {row["waveform"]: row["peak force"] for row in rows}
+    brake = ("" if not {"step", "brake"} <= set(forces) else
+             f"; a brake asks for {forces['brake']:.3g} N at most where one step asks for {forces['step']:.3g} N")
+    return Part(
+        f"Every waveform gives the hand the computed momentum (all but "
+        f"{max(row['momentum not given'] for row in rows):.0e}) and no more energy than the collisions took{brake}.",
+        REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip

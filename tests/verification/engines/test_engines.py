@@ -10,7 +10,7 @@ import pytest
 from iapb.errors import ArgumentError, MissingDependencyError
 from reference.simulators import find_simulator, fixed_scene
 from verification.engines import compare_engines, sentence, study, verdict
-from verification.engines.measures import measured
+from verification.engines.study import measured
 
 
 @pytest.fixture(scope="module")
