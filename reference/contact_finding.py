@@ -3,7 +3,7 @@
 The engine's conventions (unit normal from b into a, gap along it, point midway, its choice of points where a face lies
 on a face), but none of its code: everything is computed in the world frame, a polygon's nearest point is sought on all
 edges, faces of boxes are clipped by Sutherland and Hodgman. So is every sum in another order, and a fault of one shows
-beside the other (`reference.engine_differences`).
+beside the other (`verification.mechanics.engine_differences`).
 
 Two polygons, or boxes, meet along the axis of largest separation; axes of a flush pair agree to rounding, so what
 differs by less than TIE of the size counts as equal, and one of them goes first: b's edge, or a's face.

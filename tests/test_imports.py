@@ -5,12 +5,17 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
+from copy import deepcopy
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
 import pytest
+from grimp import build_graph
+from importlinter.configuration import configure
+from importlinter.contracts.forbidden import ForbiddenContract
 
 import iapb
 
@@ -116,6 +121,21 @@ def test_no_modules_import_each_other_not_even_inside_functions() -> None:
 def test_imports_inside_functions_are_few() -> None:
     late = sorted((name, other) for name, found in imports().items() for other, inside in found if inside)
     assert len(late) <= LATE_IMPORTS, late
+
+
+@pytest.mark.parametrize(
+    "engine", ["iapb.contact.kernels.step", "iapb.mechanics.kernels.dynamics", "iapb.contact.impact"]
+)
+def test_a_reference_that_calls_the_engine_breaks_the_contract(engine: str) -> None:
+    configure()
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    given = next(each for each in settings.pop("contracts") if each["type"] == "forbidden")
+    options = {key: str(value) if isinstance(value, bool) else value for key, value in given.items()}
+    contract = ForbiddenContract(given["name"], settings, options)
+    graph = build_graph(*PACKAGES, include_external_packages=True)
+    assert contract.check(deepcopy(graph), verbose=False).kept
+    graph.add_import(importer="reference.rigid_step", imported=engine)
+    assert not contract.check(graph, verbose=False).kept
 
 
 def test_a_cycle_is_found() -> None:

@@ -15,8 +15,8 @@ from iapb.errors import ArgumentError
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference import rigid_body
-from reference.engine_differences import compare
 from reference.random_mechanisms import random_mechanism, random_state
+from verification.mechanics.engine_differences import compare
 
 AGREEMENT = 1e-11  # relative to the largest entry; two algorithms of 30 links, each exact to some 1e-14
 ROBOTS = sorted((Path(__file__).parents[3] / "shared" / "robots").glob("*.urdf"))

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from iapb.mechanics.mechanism import Mechanism
-from reference.engine_differences import compare
 from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
 from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
+from verification.mechanics.engine_differences import compare
 
 # Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.
 AGREEMENT = 1e-11
