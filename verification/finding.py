@@ -100,6 +100,10 @@ class Table:
         kept = tuple(tuple(row[k] for k in at) for row in self.rows)
         return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
 
+    def judged(self, holds: Callable[[dict[str, Any]], bool | None]) -> Table:
+        """Return the table with the outcome of every row."""
+        return replace(self, holds=tuple(holds(row) for row in self.records()))
+
     def without(self, *keys: str) -> Table:
         """Return the table without these columns."""
         return self.select([key for key in self.keys if key not in keys])
@@ -258,6 +262,12 @@ def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     if share == 1.0:
         return REPRODUCED
     return MIXED if share >= LEAST_SHARE else REFUTED
+
+
+def verdict_of_law(holds: Iterable[bool | None]) -> str:
+    """Return the verdict on a law from its trials: one that fails refutes it."""
+    found = verdict_of_trials(holds)
+    return REFUTED if found == MIXED else found
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:

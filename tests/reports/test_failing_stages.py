@@ -13,7 +13,6 @@ import typer
 import verification.claims
 import verification.hard_cases
 import verification.laws
-import verification.mechanics
 import verification.proofs
 from reports.commands import reproduce
 from reports.evidence import (
@@ -22,7 +21,6 @@ from reports.evidence import (
     cross_checks,
     gather,
     hard_cases,
-    mechanics,
     proofs,
     properties,
     runs,
@@ -178,12 +176,10 @@ def of_runs(patch: Patch, folder: Path) -> list[str]:
 
 
 def of_survival(patch: Patch, folder: Path) -> list[str]:
-    import reports.resimulate
-
     chosen = ("corner/IAPB", "corner/PB")
     patch.setattr(survival, "FIGURE_RUNS", {name: survival.FIGURE_RUNS[name] for name in chosen})
-    repeat = broken(reports.resimulate.repeat_run, lambda path: "PB" in path.name.split("-"))
-    patch.setattr(reports.resimulate, "repeat_run", repeat)
+    repeat = broken(survival.repeat_run, lambda path: "PB" in path.name.split("-"))
+    patch.setattr(survival, "repeat_run", repeat)
     topic = survival.compute(Runner(folder), "quick", nothing)
     assert [row[0] for row in topic.tables["simulated again"].rows] == ["corner/IAPB"]
     return [failure.case for failure in topic.failures]
@@ -199,24 +195,22 @@ def rolled_ball(scene: Any, simulate: Any) -> Any:
 
 
 def of_mechanics(patch: Patch, folder: Path) -> list[str]:
-    from verification.cost import many_bodies
-    from verification.mechanics import false_collisions, linked_impacts, robots
+    from verification.mechanics import false_collisions, linked_impacts, mechanics, robots, tumbling
 
     patch.setattr(robots, "STATES", 1)
     patch.setattr(robots, "TREE_SIZES", (1, 2))
     patch.setattr(robots, "_trees", broken(robots._trees, lambda joints, *_: joints == 2))
-    patch.setattr(verification.mechanics, "STUDIES", {"random trees": ("robots", "compare_trees"),
-                                                      "tumbling": ("tumbling", "no_such_study")})  # fmt: skip
+    patch.setattr(mechanics, "AGAINST_PINOCCHIO", {"random trees": robots.compare_trees})
+    wrong = broken(tumbling.tumbling, lambda *_: True)
+    patch.setattr(mechanics, "STUDIES", {"tumbling": (wrong, tumbling.convergence)})
     kept, names = ("cradle of 5", "cradle of 2"), ("cradle of 2",)
     outcomes = broken(linked_impacts.outcomes, lambda balls: balls.name in names)
     patch.setattr(linked_impacts, "outcomes", lambda balls: outcomes(balls) if balls.name in kept else ())
     ball = broken(rolled_ball, lambda scene, _: scene.contact.damping == 10.0 and scene.contact.cluster_distance > 0.0)
     patch.setattr(false_collisions, "count_false", ball)
-    patch.setattr(many_bodies, "_cost", broken(lambda n: many_bodies.StepCost(n, 1e-6 * n, 1.0, 1, n, n), (20).__eq__))
-    topic = mechanics.compute(Runner(folder), "quick", nothing)
+    topic = mechanics.mechanics(Runner(folder), "quick", nothing)
     assert [row[2] for row in topic.tables["against Pinocchio"].rows] == ["random"]
     assert {row[0] for row in topic.tables["linked impacts"].rows} == {"cradle of 5"}
-    assert {row[0] for row in topic.tables["many bodies"].rows} == set(many_bodies.COUNTS) - {20}
     return [failure.case for failure in topic.failures]
 
 
@@ -233,7 +227,7 @@ STAGES: dict[Callable[[Patch, Path], list[str]], list[str]] = {
     of_runs: ["hole/IAPB"],
     of_survival: ["corner/PB"],
     of_mechanics: ["random trees, trees of 2", "tumbling", "cradle of 2", "clustering alone, 10 N s/m",
-                   "both filters, 10 N s/m", "20 bodies"],
+                   "both filters, 10 N s/m"],
 }
 
 

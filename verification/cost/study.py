@@ -52,9 +52,8 @@ from verification.finding import (
     of_each,
     table_of,
 )
-from verification.mechanics.own_robots import SHIPPED
 from verification.mechanics.robot_timing import LARGEST_RATIO, MANY, ONE, time_robots
-from verification.mechanics.robots import robot_files
+from verification.mechanics.robots import SHIPPED, robot_files
 
 KEY, TITLE = "haptic-rate", "The haptic rate"
 QUESTION = (
@@ -306,6 +305,11 @@ def _say_bodies(tables: Tables) -> Iterator[Part]:
         f"A step of {last['bodies']} free bodies takes {last['step']:.3g} µs; from {LEAST_BODIES} bodies on its time "
         f"grows as their number to the power {power:.2f}. Asked for: at most {LARGEST_EXPONENT['bodies']:g}.",
         power <= LARGEST_EXPONENT["bodies"])  # fmt: skip
+    tested = power_law([row["bodies"] for row in rows], [row["pairs tested"] for row in rows])
+    yield _part(
+        f"With the broad phase the pairs tested grow as the number of bodies to the power {tested:.2f}: "
+        f"{last['pairs tested']:.0f} of {last['pairs of shapes']:,} for {last['bodies']} free bodies. Asked for: at "
+        f"most {LARGEST_EXPONENT['bodies']:g}.", tested <= LARGEST_EXPONENT["bodies"], timed=False)  # fmt: skip
 
 
 def _say_robots(tables: Tables) -> Iterator[Part]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.finding import Failure, of_each
+from verification.finding import MIXED, REFUTED, REPRODUCED, Failure, Part, Table, of_each, titled
 
 DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: from a ball that bounces at edges to one that does not
 SCENE = "faceted_socket"
@@ -112,3 +112,42 @@ def _simulated(scene: Scene) -> Run:
     from iapb.simulation import simulate
 
     return simulate(scene)
+
+
+def filters_table(found: Sequence[FalseCollisions]) -> Table:
+    """One row per run of the socket."""
+    columns = ("filters", "damping [N s/m]", "false collisions", "contacts taken as new", "doubled contacts",
+               "steps off the facets", "energy lost [J]", "lost, of the fall")  # fmt: skip
+    rows = [(f.setting, f.damping, f.collisions, f.new_contacts, f.doubled, f.lifted, f.energy_lost,
+             f.energy_lost / f.potential_drop) for f in found]  # fmt: skip
+    return titled(columns, rows, digits=3, note="The ball rolls for two seconds; one contact per step is right.")
+
+
+def times_table(found: Sequence[FalseCollisions]) -> Table:
+    """One row per false collision, in time."""
+    rows = [
+        (f.setting, f.damping, time, count, sum(f.losses[:count]) / f.potential_drop)
+        for f in found for count, time in enumerate(f.times, start=1)
+    ]  # fmt: skip
+    columns = ("filters", "damping [N s/m]", "time [s]", "false collisions so far", "lost so far, of the fall")
+    return titled(columns, rows)
+
+
+def filters(found: Sequence[FalseCollisions]) -> Part:
+    """C18 at the scene's own distances: with both filters, then each alone."""
+    of: dict[str, dict[float, FalseCollisions]] = {}
+    for run in found:
+        of.setdefault(run.setting, {})[run.damping] = run
+    counts = "; ".join(f"{name} {', '.join(str(run.collisions) for run in runs.values())}" for name, runs in of.items())
+    both, none = of["both filters"], of["no filter"]
+    left = {damping: run for damping, run in both.items() if run.collisions}
+    bounce = "".join(f" At {damping:g} N s/m the ball leaves the facets ({run.lifted} steps off them) and comes back "
+                     "as a new contact." for damping, run in left.items() if run.lifted)  # fmt: skip
+    lost = max(run.energy_lost / run.potential_drop for run in none.values())
+    doubled = [sum(run.doubled for run in runs.values()) for runs in (none, both)]
+    return Part(
+        f"C18: a ball that rolls in the faceted socket, at damping {', '.join(f'{b:g}' for b in both)} N s/m and with "
+        f"distances beyond the {1e3 * EDGE_JUMP:.1f} mm of an edge, collides falsely: {counts}. Without filters up to "
+        f"{lost:.0%} of the fall's energy goes with them. Coherence removes them, clustering the doubled contacts "
+        f"({doubled[0]} without filters, {doubled[1]} with both).{bounce}",
+        REFUTED if len(left) == len(both) else MIXED if left else REPRODUCED)  # fmt: skip

@@ -7,7 +7,7 @@ wrong it stays.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import Any
 
@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
-from verification.finding import Column, Failure, Row, Table, check_depth, of_each, table_of
+from verification.finding import (
+    Column,
+    Failure,
+    Part,
+    Row,
+    Table,
+    check_depth,
+    of_each,
+    table_of,
+    verdict_of_law,
+)
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +78,7 @@ def power_balance(
     rows = of_each(cases, rows_of, failures, lambda case: f"{case[0].name}, {case[1]} joints")
     statement = "Energy changes by the work of the generalized forces, to the order of the integrator."
     tolerance = f"median order within {ORDER_TOLERANCE} of the declared order"
-    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {tolerance}.")
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
 
 
 def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -128,7 +138,7 @@ def _condition(mass: Floats) -> float:
 
 def judged(table: Table) -> Table:
     """The median order must be the declared one, and most trees must show one at all."""
-    return replace(table, holds=tuple(_holds(row) for row in table.records()))
+    return table.judged(_holds)
 
 
 def _holds(row: Row) -> bool:
@@ -143,11 +153,10 @@ def positive_definite(
     check_depth(depth)
     rows = of_each(SIZES, lambda joints: [_definite(joints, 10 * TREES[depth], seed)], failures,
                    lambda joints: f"{joints} joints")  # fmt: skip
-    table = table_of(DEFINITE_COLUMNS, rows)
-    holds = tuple(bool(row["least eigenvalue × condition"] > 0.0) for row in table.records())
     statement = "The mass matrix is positive definite wherever rounding leaves that to be judged."
     tolerance = f"least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}"
-    return replace(replace(table, holds=holds), note=f"{statement} Tolerance: {tolerance}.")
+    table = table_of(DEFINITE_COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}.")
+    return table.judged(lambda row: bool(row["least eigenvalue × condition"] > 0.0))
 
 
 def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
@@ -162,3 +171,46 @@ def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
             least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
     return {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
             "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
+
+
+def orders(table: Table) -> Part:
+    """The orders found for each integrator."""
+    found = "; ".join(
+        f"{words(name)} {span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
+        for (name,), rows in by(table.records(), "integrator").items()
+    )
+    return Part("On random trees of 1 to 30 joints the energy changes by the work of the forces with the integrator's "
+                f"order: {found}.", verdict_of_law(table.holds))  # fmt: skip
+
+
+def definiteness(table: Table) -> Part:
+    """How many matrices, and how near to zero."""
+    rows = table.records()
+    judged = sum(row["judged, condition ≤ 1e12"] for row in rows)
+    least = min(row["least eigenvalue × condition"] for row in rows)
+    verdict = verdict_of_law(table.holds)
+    if not table.passed:
+        return Part("A random mass matrix of moderate condition is not positive definite.", verdict)
+    return Part(
+        f"All {judged} of {sum(row['mass matrices'] for row in rows)} random mass matrices whose scaled condition is "
+        f"at most 1e12 (up to {max(row['largest condition judged'] for row in rows):.1e}) are positive definite: the "
+        f"least eigenvalue times the condition is never below {least:.2g}.", verdict)  # fmt: skip
+
+
+def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+    """Rows by the values of some columns."""
+    found: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[name] for name in names), []).append(row)
+    return found
+
+
+def span(values: Sequence[float]) -> str:
+    """The least and the largest, in words."""
+    low, high = f"{min(values):.2f}", f"{max(values):.2f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def words(name: str) -> str:
+    """An integrator's name for people."""
+    return {"semi_implicit_euler": "semi-implicit Euler", "runge_kutta_4": "Runge-Kutta 4"}.get(name, name)

@@ -1,22 +1,40 @@
-"""Random trees and real robots against Pinocchio: how far apart, over many random states.
+"""Mechanisms against Pinocchio: how far apart, over many random states.
 
-A robot is read twice from its URDF file, by the engine's reader and by Pinocchio's own.
+Random trees, joint kinds alone, the scenes, the project's robots and random URDF texts need nothing else; the robots of
+others need a folder that is not part of the project. A URDF text is read twice, by the engine and by Pinocchio.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Mechanism
+from iapb.scene import load_scene
+from iapb.scene.mechanism import mechanism_of
 from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_from_urdf, model_of
-from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
+from verification.finding import (
+    NOT_TESTABLE,
+    WORDS,
+    Column,
+    Failure,
+    Part,
+    Table,
+    check_depth,
+    of_each,
+    table_of,
+    titled,
+    verdict_of_law,
+)
 from verification.mechanics.engine_differences import compare
+from verification.mechanics.random_urdf import random_urdf
 
 # Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.
 AGREEMENT = 1e-11
@@ -25,6 +43,11 @@ TREE_SIZES = (1, 2, 4, 8, 16, 30)
 TREES = {"quick": 3, "full": 50}  # of each size
 SEED = 20050602
 ROBOTS = Path(__file__).parents[3] / "shared" / "robots"
+SHIPPED = Path(__file__).parents[2] / "scenes"
+KIND_SIZES = (1, 6)  # joints of a tree that has one kind only
+WRITTEN = {"quick": 4, "full": 40}  # URDF texts of each size
+WRITTEN_SIZES = (3, 8, 20)
+Reader = Callable[[Path, bool], PinocchioMechanism]
 
 QUANTITIES = (
     "mass_matrix", "point_jacobian", "frame_jacobian", "bias", "gravity", "inverse_dynamics", "kinetic_energy",
@@ -55,7 +78,7 @@ def compare_trees(
     statement = (
         "Mass matrix, Jacobians, forces, energies and momentum of random trees are those of Pinocchio."
     )
-    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {TOLERANCE}.")
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {TOLERANCE}."))
 
 
 def _trees(joints: int, count: int, seed: int) -> dict[str, Any]:
@@ -82,8 +105,7 @@ def compare_robots(
     rows = of_each(product(files, (False, True)), lambda case: [_robot(*case, seed)], failures,
                    lambda case: case[0].stem)  # fmt: skip
     statement = "Robots read by the engine are those that Pinocchio reads, in every quantity."
-    table = judged(table_of(COLUMNS, rows))
-    return replace(table, note=skipped or f"{statement} Tolerance: {TOLERANCE}.")
+    return judged(table_of(COLUMNS, rows, note=skipped or f"{statement} Tolerance: {TOLERANCE}."))
 
 
 def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
@@ -118,4 +140,126 @@ def largest_of(found: list[dict[str, float]]) -> dict[str, float]:
 
 def judged(table: Table) -> Table:
     """Every quantity within AGREEMENT."""
-    return replace(table, holds=tuple(bool(worst <= AGREEMENT) for worst in table.column("worst")))
+    return table.judged(lambda row: bool(row["worst"] <= AGREEMENT))
+
+
+def compare_kinds(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
+    """Compare trees that have one kind of joint only."""
+    check_depth(depth)
+    rows = of_each(product(KINDS, KIND_SIZES), lambda case: _kind(*case, seed), failures)
+    statement = "Each kind of joint, alone and in a tree of its own kind, is that of Pinocchio."
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {TOLERANCE}."))
+
+
+def _kind(kind: str, joints: int, seed: int) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng([seed, joints])
+    kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree that is fixed has nothing to compare
+    tree = random_mechanism(rng, joints, kinds)
+    if tree.nv:
+        yield _row(f"{joints} {kind}", "random", [(tree, model_of(tree))], rng)
+
+
+def compare_scenes(
+    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
+) -> Table:
+    """Compare the mechanism of every scene that comes with the project."""
+    check_depth(depth)
+
+    def rows_of(case: tuple[str, Mechanism]) -> list[dict[str, Any]]:
+        name, mechanism = case
+        return [_row(name, "of the scene", [(mechanism, model_of(mechanism))], np.random.default_rng(seed))]
+
+    rows = of_each(scene_mechanisms(), rows_of, failures, lambda case: case[0])
+    statement = "The mechanism of every scene is the one that Pinocchio makes of the same bodies."
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {TOLERANCE}."))
+
+
+def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
+    """Yield the scenes that have something moving."""
+    for path in sorted(SHIPPED.glob("*.yaml")):
+        mechanism = mechanism_of(load_scene(path))
+        if mechanism.nv:
+            yield path.stem, mechanism
+
+
+def compare_written(
+    depth: str = "quick", seed: int = SEED, reader: Reader = model_from_urdf, failures: list[Failure] | None = None
+) -> Table:
+    """Compare the project's own robots and random URDF texts, read by the engine and by Pinocchio's parser."""
+    check_depth(depth)
+
+    def rows_of(case: tuple[tuple[str, list[Path]], bool]) -> list[dict[str, Any]]:
+        (label, files), floating = case
+        rng = np.random.default_rng([seed, floating])
+        pairs = [(Mechanism.from_urdf(file, floating), reader(file, floating)) for file in files]
+        return [_row(label, "floating" if floating else "fixed", pairs, rng)]
+
+    with TemporaryDirectory() as scratch:
+        texts = (*_own(), *_written(Path(scratch), WRITTEN[depth], seed))
+        rows = list(of_each(product(texts, (False, True)), rows_of, failures, lambda case: case[0][0]))
+    statement = "A URDF text is read by the engine as Pinocchio's own parser reads it."
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {TOLERANCE}."))
+
+
+def _own() -> Iterator[tuple[str, list[Path]]]:
+    for path in sorted((SHIPPED / "robots").glob("*.urdf")):
+        yield path.stem, [path]
+
+
+def _written(folder: Path, count: int, seed: int) -> Iterator[tuple[str, list[Path]]]:
+    for links in WRITTEN_SIZES:
+        rng, files = np.random.default_rng([seed, links, 2]), []
+        for k in range(count):
+            files.append(folder / f"random-{links}-{k}.urdf")
+            files[-1].write_text(random_urdf(rng, links), encoding="utf-8")
+        yield f"{count} random texts of {links} joints", files
+
+
+def _row(
+    label: str, base: str, pairs: list[tuple[Mechanism, PinocchioMechanism]], rng: np.random.Generator
+) -> dict[str, Any]:
+    sizes = [(len(mechanism.bodies), mechanism.nv) for mechanism, _ in pairs]
+    return {"mechanism": label, "base": base, "bodies": max(size[0] for size in sizes),
+            "velocities": max(size[1] for size in sizes), "states": STATES * len(pairs),
+            **largest_of([worst_of(mechanism, model, rng) for mechanism, model in pairs])}  # fmt: skip
+
+
+_SETS = {
+    "random trees": "trees of 1 to 30 bodies, every joint kind and nearly singular inertias among them",
+    "joint kinds": "trees that have one kind of joint only",
+    "scenes": "mechanisms of the scenes that come along",
+    "URDF texts": "sets of URDF texts, our own robot and random ones with every joint type, each read by two parsers",
+    "robots": "robots of the folder beside the checkout, with a fixed and a floating base",
+}
+
+
+def agreement(name: str, compared: Table) -> Part:
+    """How far one set of mechanisms is from Pinocchio."""
+    rows = compared.records()
+    if not rows:
+        return Part(f"Robots beside the checkout: not there ({compared.note}), so not compared.", NOT_TESTABLE)
+    states = sum(row["states"] for row in rows)
+    count = states // STATES if name == "random trees" else len({row["mechanism"] for row in rows})
+    most = max(QUANTITIES, key=lambda quantity: max(row[quantity] for row in rows)).replace("_", " ")
+    return Part(
+        f"{count} {_SETS[name]}: at {states:,} random states everything differs from Pinocchio by at most "
+        f"{max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}), the {most} most.",
+        verdict_of_law(compared.holds))  # fmt: skip
+
+
+def pinocchio_table(compared: Mapping[str, Table]) -> Table:
+    """One row per mechanism of every set: the largest relative difference of each quantity."""
+    merged = {"placements and Jacobians": ("placement", "frame_jacobian", "point_jacobian"),
+              "energies": ("kinetic_energy", "potential_energy")}  # fmt: skip
+    columns = ("set", "mechanism", "base", "velocities", "states", "mass matrix", "placements and Jacobians", "bias",
+               "gravity", "inverse dynamics", "energies", "momentum", "worst", "holds")  # fmt: skip
+    rows = []
+    for name, table in compared.items():
+        words = "robots beside the checkout" if name == "robots" else name
+        for row, held in zip(table.records(), table.holds, strict=True):
+            largest = {title: max(row[quantity] for quantity in quantities) for title, quantities in merged.items()}
+            found = {key.replace("_", " "): value for key, value in row.items()} | largest
+            rows.append((words, *(found[title] for title in columns[1:-1]), WORDS[held]))
+    return titled(columns, rows, digits=2, note=f"Largest difference over all states. Tolerance: {TOLERANCE}.")

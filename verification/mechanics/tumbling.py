@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
+from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
+from verification.mechanics.power_balance import by, span, words
 from verification.mechanics.torque_free import TorqueFreeBody
 
 Floats = NDArray[np.float64]
@@ -88,7 +89,7 @@ def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Tab
         "energy and angular momentum fall at least as fast."
     )
     tolerance = f"order within {ORDER_TOLERANCE} of the declared one, by the two finest steps above rounding"
-    return replace(judged(table_of(COLUMNS, rows)), note=f"{statement} Tolerance: {tolerance}.")
+    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
 
 
 def _forms(method: Integrator) -> tuple[tuple[str, Callable[..., Tumble], int], ...]:
@@ -195,3 +196,14 @@ def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
     drifts = [shown[name][-1] for name in DRIFT_ORDERS if shown[name]]
     equal = abs(shown["order"][-1] - declared) <= ORDER_TOLERANCE
     return bool(equal and all(order >= declared - ORDER_TOLERANCE for order in drifts))
+
+
+def convergence(table: Table) -> Part:
+    """The orders found for each integrator and form."""
+    judges = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
+    series = "; ".join(
+        f"{words(name)}, {form}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
+        for (name, form), rows in by(judges, "integrator", "form").items()
+    )
+    return Part("A free tumbling body converges to the closed form with the declared order, and its energy and angular "
+                f"momentum converge no slower: {series}.", verdict_of_law(table.holds))  # fmt: skip

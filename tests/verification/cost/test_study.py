@@ -102,6 +102,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({"solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
         ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "iapb --help takes 0.90 s"),
         ({"bodies": _bodies(tuple(StepCost(n, 1e-9 * n**2, 1.0, 1, n, n) for n in (20, 200)))}, "power 2.00"),
+        ({"bodies": _bodies(tuple(StepCost(n, 1e-6 * n, 1.0, 1, n * n, n * n) for n in (20, 200)))}, "pairs tested"),
         ({"budgets": table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
     ],
 )

@@ -7,30 +7,30 @@ import pytest
 
 from iapb.mechanics.joints import KINDS
 from reference.rigid_body import model_from_urdf
-from verification.mechanics import own_robots, robots
+from verification.mechanics import robots
 from verification.mechanics.random_urdf import TYPES, random_urdf
 
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
     monkeypatch.setattr(robots, "STATES", 5)
-    monkeypatch.setattr(own_robots, "WRITTEN", {"quick": 1})
+    monkeypatch.setattr(robots, "WRITTEN", {"quick": 1})
 
 
 def test_every_kind_of_joint_agrees_alone():
-    finding = own_robots.compare_kinds()
+    finding = robots.compare_kinds()
     assert finding.passed
     assert {name.split()[1] for name in finding.column("mechanism")} == set(KINDS)
 
 
 def test_every_scene_has_a_mechanism_that_agrees():
-    finding = own_robots.compare_scenes()
+    finding = robots.compare_scenes()
     assert finding.passed
     assert {"peg_corner", "tumbling_body", "arm_obstacles"} <= set(finding.column("mechanism"))
 
 
 def test_texts_are_read_as_pinocchio_reads_them():
-    finding = own_robots.compare_written()
+    finding = robots.compare_written()
     assert finding.passed
     assert set(finding.column("base")) == {"fixed", "floating"}
 
@@ -41,7 +41,7 @@ def test_a_reading_that_turns_inertias_wrongly_is_found(tmp_path):
         other.write_text(path.read_text().replace('ixx="', 'ixx="1'))
         return model_from_urdf(other, floating)
 
-    finding = own_robots.compare_written(reader=careless)
+    finding = robots.compare_written(reader=careless)
     assert finding.passed is False and len(finding.that(False).rows) == len(finding.rows)
 
 
