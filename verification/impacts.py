@@ -160,14 +160,49 @@ RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
 ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
 
 
-def draw_case(rng: np.random.Generator, largest_condition: float = 1e8, largest_size: int = 10) -> ImpactCase:
-    """Return one random impact with κ(M) up to `largest_condition`."""
+# Sizes and units that ordinary draws never meet. Every LARGE_EVERY-th impact is large, of these kinds in turn: contacts
+# beyond any table of a small solver on few coordinates, coordinates beyond it, and rarely both, which is dear.
+LARGE_EVERY = 10
+LARGE_KINDS = ("contacts", "coordinates", "contacts", "coordinates", "contacts and coordinates")
+LARGE_COORDINATES, LARGE_CONTACTS = (11, 40), (101, 500)
+# Powers of two about ±8 decades: they round nothing, so dependent rows stay dependent.
+SCALE_POWERS = 27
+
+
+def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: float = 1e8) -> ImpactCase:
+    """Return impact `number` of a series: one in ten large, half in other units, some at rest or partly at rest."""
+    contacts, size = None, None
+    if number % LARGE_EVERY == LARGE_EVERY // 2:
+        kind = LARGE_KINDS[number // LARGE_EVERY % len(LARGE_KINDS)]
+        if "contacts" in kind:
+            contacts = int(rng.integers(LARGE_CONTACTS[0], LARGE_CONTACTS[1] + 1))
+        if "coordinates" in kind:
+            size = int(rng.integers(LARGE_COORDINATES[0], LARGE_COORDINATES[1] + 1))
+    case = draw_case(rng, largest_condition, coordinates=size, contacts=contacts)
+    name, v = case.family, case.velocity
+    chance = rng.random()
+    if chance < 0.15:
+        name += ", at rest" if chance < 0.02 else ", partly at rest"
+        v = v * ((chance >= 0.02) & (rng.random(len(v)) < 0.5))
+    if rng.random() < 0.5:
+        return replace(case, velocity=v, family=name)
+    m, j, s = np.ldexp(1.0, rng.integers(-SCALE_POWERS, SCALE_POWERS + 1, size=3))
+    name += f", times M {m:.0e} J {j:.0e} v {s:.0e}"
+    return replace(case, mass_matrix=m * case.mass_matrix, contact_jacobian=j * case.contact_jacobian,
+                   velocity=s * v, family=name)  # fmt: skip
+
+
+def draw_case(
+    rng: np.random.Generator, largest_condition: float = 1e8, coordinates: int | None = None,
+    contacts: int | None = None,
+) -> ImpactCase:  # fmt: skip
+    """Return one random impact with κ(M) up to `largest_condition`; unless given d is up to 10, c up to 2 d + 1."""
     rows_kind = _one_of(rng, ROW_KINDS)
-    d = int(rng.integers(1, largest_size + 1))
+    d = int(rng.integers(1, 11)) if coordinates is None else coordinates
     condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
     mass_kind = "diagonal" if rows_kind == "cradle" else _one_of(rng, MASS_KINDS)
     mass = draw_mass_matrix(rng, mass_kind, d, condition)
-    rows, closeness = draw_rows(rng, rows_kind, mass)
+    rows, closeness = draw_rows(rng, rows_kind, mass, contacts)
     velocity_kind = _one_of(rng, VELOCITY_KINDS)
     v = draw_velocity(rng, velocity_kind, mass, rows)
     e = float(rng.uniform(-1.0, 1.0)) if rng.random() < 0.4 else float(rng.choice(RESTITUTIONS))
@@ -222,10 +257,12 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
     return 0.5 * (mass + mass.T)
 
 
-def draw_rows(rng: np.random.Generator, kind: str, mass: Floats) -> tuple[Floats, str]:
+def draw_rows(
+    rng: np.random.Generator, kind: str, mass: Floats, contacts: int | None = None
+) -> tuple[Floats, str]:
     """Return J (c, d) of the kind, and a word on how close to dependent its rows are."""
     d = len(mass)
-    c = int(rng.integers(1, 2 * d + 2))
+    c = int(rng.integers(1, 2 * d + 2)) if contacts is None else contacts
     generic = rng.normal(size=(c, d))
     generic /= np.linalg.norm(generic, axis=1, keepdims=True)
     rank = int(rng.integers(1, min(c, d) + 1))

@@ -20,7 +20,7 @@ from verification.impacts import draw_case, with_unequal_restitution
 from verification.laws.bounds import Bounds, LawResidual
 from verification.laws.counterexample import Struck, strike
 from verification.laws.engine_laws import ENGINE_LAWS
-from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
+from verification.laws.impact_laws import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.kit import LawCount, RunningCount, residual_of
 from verification.laws.resolver import Resolver
 from verification.laws.scenes import draw_scene
@@ -30,9 +30,8 @@ from verification.laws.trajectory_laws import judge_run
 IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"
 PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the order enters the seeds: add at the end
 SCENES = {TRAJECTORIES: draw_scene, IN_SPACE: draw_spatial_scene}
-# Laws of one call, which all of them share: put to every impact. The others compare it with calls on variants of the
-# impact, up to three and an SVD each; they are put to one impact in ONE_IN, each law to its own choice of them.
-OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
+# Laws of one call are put to every impact. The others compare it with calls on variants of it, up to three and an SVD
+# each; they are put to one impact in ONE_IN, each law to its own choice of them.
 ONE_IN = 10
 # Cases of a part for each impact or trajectory asked for, and cases per batch (a few seconds of work).
 _SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0.1, "hand_port": 0.02}

@@ -313,6 +313,9 @@ LAWS: dict[str, Law] = {
     "arguments": Law("the arguments are left as they were", arguments_are_left_alone),
 }
 
+# Laws that need no answer but that of the impact itself, which they share.
+OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
+
 # What holds for any law of unequal restitution, whatever it says of the separation velocities.
 UNEQUAL_LAWS: dict[str, Law] = {
     f"unequal_{name}": Law(f"{LAWS[name].statement}, unequal e", LAWS[name].check)

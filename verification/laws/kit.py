@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.impacts import ADVERSE, ImpactCase, adverse_cases, draw_case, with_unequal_restitution
+from verification.impacts import (
+    ADVERSE,
+    LARGE_CONTACTS,
+    LARGE_COORDINATES,
+    LARGE_EVERY,
+    ImpactCase,
+    adverse_cases,
+    draw_wide_case,
+    with_unequal_restitution,
+)
 from verification.laws.bounds import KIT, Bounds, LawResidual
 from verification.laws.counterexample import as_test, name_of, search_counterexample, shrink
-from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS, Law
-from verification.laws.resolver import Resolver, ResolverFault
+from verification.laws.impact_laws import LAWS, OF_ONE_CALL, UNEQUAL_LAWS, Law
+from verification.laws.resolver import Answer, Resolver, ResolverFault, Watched
 
 
 @dataclass(frozen=True)
@@ -245,8 +254,10 @@ def check_passivity(
     ----------
     resolver : called as resolver(mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution) with
         float64 arrays (copies; c = 0 included) and one e in [−1, 1] for all rows, each an equality; returns v⁺
-        as an array or as an object with `.velocity`.
-    impacts : random impacts drawn by numpy. `families.ADVERSE` more come first: elastic ones on nearly equal rows.
+        as an array, a list of numbers, or an object with `.velocity`.
+    impacts : random impacts drawn by numpy, up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
+        fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
+        `impacts.ADVERSE` more come first: elastic ones on nearly equal rows.
     seed : of the draw; the same seed gives the same impacts.
     search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
     bounds : tolerances; `verification.laws.bounds`.
@@ -260,6 +271,13 @@ def check_passivity(
     -------
     PassivityReport
         `passed`, each law with its worst case, and the smallest counterexample found, as a test to paste.
+
+    Notes
+    -----
+    The energy of every answer is judged, some twelve for each impact. A fault that shows in a share p of the calls is
+    found with probability 1 − (1 − p)ⁿ in n calls: with the default 5,000 impacts (n ≈ 58,000) 95 % at p = 5e-5, 16 %
+    at 3e-6. What stays unseen: faults rarer than that, gains below `bounds` (1e-7 at most), sizes beyond 40 coordinates
+    (80 for laws that double them) or 750 contacts, units beyond eight decades, and answers that follow the clock.
 
     Examples
     --------
@@ -290,15 +308,40 @@ class _Draw:
 
 def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
-    """Put every impact to every law; return for how many random ones there was time."""
+    """Put every impact to its laws; return for how many random ones there was time."""
+    watched = Watched(resolver)
     for done, (case, mixed) in enumerate(_drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)), 1 - ADVERSE):
-        for name, tally in tallies.items():
+        for name in _laws_for(case, done, tuple(tallies)):
             if time.monotonic() > ends:
                 return max(0, done - 1)
-            tally.add(mixed if name in UNEQUAL_LAWS else case, resolver, bounds)
+            tallies[name].add(mixed if name in UNEQUAL_LAWS else case, watched, bounds)
+        for suspect, v_plus in watched.suspects:
+            if suspect is not case and suspect is not mixed:  # judged by their own laws
+                within = suspect.condition <= draw.largest_condition
+                _judge_energy(tallies, suspect, v_plus, resolver, bounds if within else replace(bounds, ceiling=np.inf))
+        watched.suspects.clear()
         if progress is not None and done > 0:
             progress(done, draw.impacts)
     return draw.impacts
+
+
+def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[str]:
+    """Every law; of a large impact those of one call, and of the others one in turn."""
+    large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
+    for k, name in enumerate(laws):
+        if not large or name.removeprefix("unequal_") in OF_ONE_CALL or (number // LARGE_EVERY - k) % len(laws) == 0:
+            yield name
+
+
+def _judge_energy(
+    tallies: dict[str, Tally], case: ImpactCase, v_plus: Any, resolver: Resolver, bounds: Bounds
+) -> None:
+    """Put the answer that a law was given for a variant of an impact to the law of energy, without asking again."""
+    own = replace(case, family=f"{case.family}, a variant of it that another law tried")
+    own._answers[id(resolver)] = resolver, Answer(v_plus, 0)
+    name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
+    if name in tallies:
+        tallies[name].add(own, resolver, bounds)
 
 
 def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[ImpactCase, ImpactCase]]:
@@ -306,8 +349,8 @@ def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[ImpactCase, ImpactCase]
     rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
     for case in adverse_cases(adverse):
         yield case, with_unequal_restitution(adverse, case) if unequal else case
-    for _ in range(draw.impacts):
-        case = draw_case(rng, draw.largest_condition)
+    for number in range(draw.impacts):
+        case = draw_wide_case(rng, number, draw.largest_condition)
         yield case, with_unequal_restitution(other, case) if unequal else case
 
 

@@ -12,6 +12,7 @@ from iapb.errors import IapbError
 from verification.impacts import Floats, ImpactCase
 
 Resolver = Callable[[Floats, Floats, Floats, Any], Any]
+SUSPICIOUS = 1e-9  # a relative gain in plain doubles: below the least that the kit's bounds forbid at κ(M) above 1e4
 
 
 class ResolverFault(IapbError):
@@ -24,6 +25,29 @@ class Answer:
 
     velocity: Floats | ResolverFault
     changed: int
+
+
+class Watched:
+    """Anybody's resolver, whose every answer is looked at for energy, whichever law asked for it.
+
+    suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit judges them with care.
+    calls : how many there were.
+    """
+
+    def __init__(self, resolver: Resolver) -> None:
+        self.resolver, self.calls = resolver, 0
+        self.suspects: list[tuple[ImpactCase, Floats]] = []
+
+    def __call__(self, M: Floats, J: Floats, v: Floats, e: Any) -> Any:
+        return self.resolver(M, J, v, e)
+
+    def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
+        """Keep an answer whose energy is above that before it, by more than doubles round well conditioned sums."""
+        self.calls += 1
+        before = float(case.velocity @ (case.mass_matrix @ case.velocity))
+        after = float(v_plus @ (case.mass_matrix @ v_plus))
+        if not after <= before * (1.0 + SUSPICIOUS):
+            self.suspects.append((case, v_plus))
 
 
 def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
@@ -62,11 +86,14 @@ def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> F
     except Exception as error:  # anybody's resolver: whatever it raises is the finding
         raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
     velocity = np.asarray(getattr(answer, "velocity", answer))
-    if velocity.dtype.kind != "f" or velocity.shape != case.velocity.shape:
+    if velocity.dtype.kind not in "fiu" or velocity.shape != case.velocity.shape:
         return ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
     if not np.all(np.isfinite(velocity)):
         return ResolverFault("returned a velocity that is not finite")
-    return velocity.astype(np.float64)
+    velocity = velocity.astype(np.float64)
+    if isinstance(resolver, Watched):
+        resolver.look_at(case, velocity)
+    return velocity
 
 
 # The sound resolver; the planted bugs are made from its parts.
