@@ -118,6 +118,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)
     _check_options(method, budget, rank_tolerance, problem)
+    if clamp is not None and not isinstance(clamp, bool | np.bool_):
+        raise ArgumentError("clamp", clamp, "True, False or None")
     clamped = clamped_by_default if clamp is None else bool(clamp)
     limit = problem.coordinates if budget is None else int(budget)
     if problem.unequal is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -79,26 +80,40 @@ def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: A
     v = _finite("velocity", velocity, 1)
     if v.shape != (d,):
         raise ArgumentError("velocity", v.shape, f"shape ({d},), one entry per row of mass_matrix")
-    J = np.zeros((0, d)) if _is_empty_list(contact_jacobian) else _finite("contact_jacobian", contact_jacobian, 2)
+    J = np.zeros((0, d)) if _is_empty(contact_jacobian) else _finite("contact_jacobian", contact_jacobian, 2)
     if J.shape[1] != d:
         raise ArgumentError("contact_jacobian", J.shape, f"shape (contacts, {d})")
     e, unequal = _checked_restitution(restitution, len(J))
     return _scaled(M, J, v, e, unequal)
 
 
-def _is_empty_list(rows: ArrayLike) -> bool:
-    """[] has no second dimension to check."""
-    return isinstance(rows, list | tuple) and len(rows) == 0
+def _is_empty(rows: ArrayLike) -> bool:
+    """[] and zeros(0) have no second dimension to check."""
+    given = _real_numbers(rows)
+    return given is not None and given.shape == (0,)
+
+
+def _real_numbers(value: Any) -> NDArray[Any] | None:
+    """The value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        return None
+    if isinstance(value, np.ma.MaskedArray):
+        return None
+    if given.dtype.kind == "O":
+        return given if all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat) else None
+    return given if given.dtype.kind in "fiu" else None
 
 
 def _finite(name: str, value: Any, dimensions: int) -> Floats:
-    try:
-        given = np.asarray(value)
-        array = given.astype(np.float64, copy=False) if given.dtype.kind != "c" else None
-    except (TypeError, ValueError):
-        array = None
-    if array is None:
+    given = _real_numbers(value)
+    if given is None:
         raise ArgumentError(name, value, "an array of real numbers")
+    try:
+        array = given.astype(np.float64, copy=False)
+    except OverflowError:
+        raise ArgumentError(name, value, "an array of finite numbers") from None
     if array.ndim != dimensions:
         raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
     if not np.isfinite(array).all():
@@ -110,8 +125,8 @@ def _finite(name: str, value: Any, dimensions: int) -> Floats:
 def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, Floats | None]:
     if isinstance(restitution, float) and -1.0 <= restitution <= 1.0:
         return float(restitution), None
-    e = np.asarray(restitution)
-    if e.dtype.kind not in "fiu":
+    e = _real_numbers(restitution)
+    if e is None:
         raise ArgumentError("restitution", restitution, "a real number or one per contact")
     if e.ndim == 0:
         if not -1.0 <= float(e) <= 1.0:

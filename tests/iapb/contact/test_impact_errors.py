@@ -28,6 +28,16 @@ def call(**changed: object) -> object:
         ("mass_matrix", 2.0, "mass_matrix"),
         ("mass_matrix", "heavy", "mass_matrix"),
         ("mass_matrix", np.eye(2) * (1 + 1j), "mass_matrix"),
+        ("mass_matrix", np.eye(2, dtype=bool), "mass_matrix"),
+        ("mass_matrix", [["1", "0"], ["0", "1"]], "mass_matrix"),
+        ("mass_matrix", np.array([[1, True], [True, 2]], dtype=object), "mass_matrix"),
+        ("mass_matrix", [[10**400, 0], [0, 1]], "mass_matrix"),
+        ("contact_jacobian", np.ma.masked_array([[1.0, 0.0]], [[False, True]]), "contact_jacobian"),
+        ("velocity", np.array([1, 2], dtype="timedelta64[s]"), "velocity"),
+        ("restitution", np.ma.masked_array([0.5, 0.5], [True, False]), "restitution"),
+        ("restitution", "0.5", "restitution"),
+        ("clamp", "no", "clamp"),
+        ("clamp", 0, "clamp"),
         ("mass_matrix", [[1.0, np.nan], [np.nan, 1.0]], "mass_matrix[0, 1]"),
         ("mass_matrix", [[1.0, 0.0], [0.0, np.inf]], "mass_matrix[1, 1]"),
         ("mass_matrix", [[1.0, 0.2], [0.1, 1.0]], "mass_matrix[0, 1]"),
@@ -110,3 +120,8 @@ def test_overflow_is_a_named_error() -> None:
 def test_every_error_has_the_common_root() -> None:
     assert issubclass(ArgumentError, IapbError) and issubclass(RangeError, IapbError)
     assert issubclass(ArgumentError, ValueError) and issubclass(RangeError, OverflowError)
+
+
+@pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])
+def test_no_rows_in_any_form_leave_the_velocity_as_it_is(rows: object) -> None:
+    assert np.array_equal(call(contact_jacobian=rows).velocity, call(contact_jacobian=np.zeros((0, 2))).velocity)
