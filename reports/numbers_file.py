@@ -13,7 +13,7 @@ from iapb.errors import ArgumentError, RunFileError
 from reports.figures.figure import Figure
 from reports.pages.records import Evidence
 from reports.store.keys import plain
-from verification.finding import Table, titled
+from verification.finding import Finding, Table, titled
 
 NUMBERS_NAME = "numbers.json"
 FORMAT, FORMAT_VERSION = "iapb numbers", 2
@@ -49,10 +49,11 @@ def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: st
 
 def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     yield from _outcomes("verdicts", ((one.topic, one.outcome, one.sentence, one.timed) for one in evidence.verdicts))
-    yield from _outcomes("claims", ((one.id, one.outcome, one.headline, one.timed) for one in evidence.claims))
+    yield from _outcomes("claims", ((one.key, one.verdict, one.answer, one.timed) for one in evidence.claims))
+    yield from _claim_parts(evidence.claims)
     for claim in evidence.claims:
-        if claim.numbers is not None:
-            yield f"claims/{claim.id}", claim.numbers
+        for name, table in claim.tables.items():
+            yield f"claims/{claim.key}" + (f", {name}" if name != claim.key else ""), table
     yield from _checks(evidence)
     yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Table))
     yield from ((f"effects/{scene}", table) for scene, table in evidence.effects.items())
@@ -60,6 +61,17 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
         found = enumerate(topic.parts, 1)
         yield from _outcomes(topic.key, ((number, one.verdict, one.sentence, one.timed) for number, one in found))
         yield from ((f"{topic.key}/{name}", table) for name, table in topic.tables.items())
+
+
+def _claim_parts(claims: Iterable[Finding]) -> Iterator[tuple[str, Table]]:
+    """The parts of all claims, those that rest on measured times apart."""
+    titles = ("part", "outcome", "holds in", "of", "cannot tell")
+    rows = {timed: [(f"{claim.key}: {part.name}", part.outcome, part.held, part.decided, part.unknown)
+                    for claim in claims for part in claim.parts if part.timed == timed]
+            for timed in (False, True)}  # fmt: skip
+    yield "claims/parts", titled(titles, rows[False])
+    if rows[True]:
+        yield "claims/parts, from times", titled(titles, rows[True], timed=titles[1:], timed_rows=True)
 
 
 def _checks(evidence: Evidence) -> Iterator[tuple[str, Table]]:

@@ -7,11 +7,15 @@ Nothing here knows a page or a file.
 
 from __future__ import annotations
 
+import math
 import re
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Any, TypeVar
+
+import numpy as np
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
@@ -27,6 +31,13 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 LIMITED = MIXED
 # What fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
+# Trials that confirm a region, at least: were a quarter of the region wrong, ten in a row would hold in one case of
+# twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024.
+LEAST_CONFIRMING = 10
+SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
+_MOST_ENDS = 8  # more than two intervals have
+_DECADES = 1e3  # a condition that spans more is measured by decades
+_LISTED = 8  # more values than this are given by their ends
 # What is unknown of one part keeps the whole from being reproduced.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
@@ -88,11 +99,11 @@ class Table:
 
     def where(self, **values: Any) -> Table:
         """Return the rows in which the named columns have these values."""
-        return self._only([all(row[key] == value for key, value in values.items()) for row in self.records()])
+        return self.only([all(row[key] == value for key, value in values.items()) for row in self.records()])
 
     def that(self, outcome: bool | None) -> Table:
         """Return the rows with this outcome."""
-        return self._only([held is outcome for held in self.holds])
+        return self.only([held is outcome for held in self.holds])
 
     def select(self, keys: Sequence[str]) -> Table:
         """Return the table with these columns, in this order."""
@@ -142,7 +153,9 @@ class Table:
         """Titles of the columns of sentences."""
         return tuple(column.title for column in self.columns if column.prose)
 
-    def _only(self, kept: Sequence[bool]) -> Table:
+    def only(self, kept: Iterable[bool]) -> Table:
+        """Return the rows that are kept, with their outcomes."""
+        kept = list(kept)
         rows = tuple(row for row, keep in zip(self.rows, kept, strict=True) if keep)
         return replace(self, rows=rows, holds=tuple(h for h, keep in zip(self.holds, kept, strict=False) if keep))
 
@@ -174,11 +187,42 @@ def titled(
 
 
 @dataclass(frozen=True)
+class Region:
+    """Where a part holds: bounds on one or two conditions, and the trials inside. All of those hold.
+
+    bounds : condition, its unit, lowest and highest value; None where the tested range ends
+    searched : trials of the half in which the region was found; others : of the other half
+    fresh : trials drawn for the confirmation; share : of the tested range, by length or by decades
+    """
+
+    bounds: tuple[tuple[str, str, float | None, float | None], ...]
+    searched: int = 0
+    others: int = 0
+    fresh: int = 0
+    share: float = 0.0
+
+    def contains(self, row: Row) -> bool:
+        """Whether a trial lies inside, its bounds included."""
+        return all((low is None or row[key] >= low) and (high is None or row[key] <= high)
+                   for key, _, low, high in self.bounds)  # fmt: skip
+
+    def ends(self, key: str, tested: Sequence[float]) -> tuple[float, float]:
+        """Return the bounds of a condition; where one is open, the end of what was tested."""
+        low, high = next(((low, high) for name, _, low, high in self.bounds if name == key), (None, None))
+        return min(tested) if low is None else low, max(tested) if high is None else high
+
+    def __str__(self) -> str:
+        """The bounds, such as "tilt <= 0.015 rad"."""
+        return " and ".join(_bound(*bound) for bound in self.bounds)
+
+
+@dataclass(frozen=True)
 class Part:
     """A part of the answer that is judged by itself.
 
     name : where the parts of one question are told apart; sentence : what was found, with its number
-    held, decided : trials in which it held, of those that could tell; fails : the conditions of those that fail
+    held, decided : trials in which it held, of those that could tell; unknown : trials that could not
+    region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
     """
 
@@ -187,8 +231,15 @@ class Part:
     name: str = ""
     held: int = 0
     decided: int = 0
+    unknown: int = 0
+    region: Region | None = None
     fails: str = ""
     timed: bool = False
+
+    @property
+    def outcome(self) -> str:
+        """The verdict in words, with its region."""
+        return f"{self.verdict} {self.region}" if self.region else self.verdict
 
 
 @dataclass(frozen=True)
@@ -253,7 +304,7 @@ def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     """Return the verdict on something that was tried many times, from the outcomes of its trials.
 
     All that can tell hold: reproduced. At least LEAST_SHARE of them: mixed. Fewer: refuted. None can tell: not
-    testable here. "Reproduced where" takes a region: see `search_region`.
+    testable here. "Reproduced where" takes a confirmed region: see `judge_part`.
     """
     decided = [outcome for outcome in holds if outcome is not None]
     if not decided:
@@ -270,10 +321,27 @@ def verdict_of_law(holds: Iterable[bool | None]) -> str:
     return REFUTED if found == MIXED else found
 
 
+def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
+    """Return the verdict on the trials of one part.
+
+    What is mixed is "reproduced where" a region is confirmed: found on one half of the trials, it must hold in all
+    trials of the other half that lie inside, and in all that `fresh` draws inside. At least LEAST_CONFIRMING trials
+    must confirm it: fresh ones where they can be drawn, else those of the other half.
+    """
+    verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
+    held, decided = trials.holds.count(True), sum(outcome is not None for outcome in trials.holds)
+    part = Part("", verdict, name, held, decided, len(trials.rows) - decided, None, _where_it_fails(trials), timed)
+    said = _count(part)
+    if verdict == MIXED:
+        region, tried = _confirmed(trials, fresh)
+        part = replace(part, region=region, verdict=WHERE if region else MIXED)
+        said = f"{said}; {tried}"
+    return replace(part, sentence=f"{said}.")
+
+
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
     """Return the verdict of a finding: that of its worst part. What failed never counts as holding."""
-    found = worst(part.verdict for part in parts)
-    return NOT_COMPUTED if failures and found == REPRODUCED else found
+    return worst([part.verdict for part in parts] + [NOT_COMPUTED] * bool(failures))
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
@@ -287,7 +355,7 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
     return replace(
         finding, parts=(*finding.parts, part), tables={**finding.tables, FAILED_CASES: table}, failures=every,
         answer=f"{finding.answer} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
-        verdict=NOT_COMPUTED if finding.verdict == REPRODUCED else finding.verdict,
+        verdict=worst((finding.verdict, NOT_COMPUTED)),
     )  # fmt: skip
 
 
@@ -300,6 +368,150 @@ def finding_of(
     timed = any(part.timed for part in parts)
     made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed)
     return with_failures(made, failures)
+
+
+def ranges(table: Table) -> str:
+    """Return the conditions of a table in words: each with its values, or its ends where there are many."""
+    return "; ".join(f"{column.key} {_span(table.column(column.key))} {column.unit}".rstrip()
+                     for column in table.columns if column.condition and table.rows)  # fmt: skip
+
+
+def search_region(trials: Table) -> Region | None:
+    """Return the bounds on one or two conditions that keep most trials and no failure; None where none do.
+
+    Every interval between values of a condition is tried, alone and with every interval of every other. Of those that
+    keep equally many trials, the one with the fewest ends is taken, then the first in the order of the columns. A
+    second condition is taken only where it keeps half as many trials again: the simpler region generalizes better.
+    """
+    scales = [_intervals(column, trials) for column in trials.columns if column.condition]
+    scales = [scale for scale in scales if len(scale) > 1]
+    alone = max((_best(trials, scale, [_Interval()]) for scale in scales), key=_kept_simply, default=(0, ()))
+    pairs = (_best(trials, first, second) for first, second in combinations(scales, 2))
+    together = max(pairs, key=_kept_simply, default=(0, ()))
+    kept, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
+    if not kept or not chosen:
+        return None
+    share = math.prod(interval.share for interval in chosen)
+    return Region(tuple((x.key, x.unit, x.low, x.high) for x in chosen), kept, share=share)
+
+
+def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, tuple[_Interval, ...]]:
+    """How many trials the best pair of intervals keeps without a failure, and those of the two that bound anything."""
+    held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
+    inside, other = (np.array([interval.inside(trials) for interval in scale]) for scale in (first, second))
+    kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
+    ends = np.add.outer([interval.ends for interval in first], [interval.ends for interval in second])
+    score = np.where(wrong == 0, _MOST_ENDS * kept - ends, -_MOST_ENDS)
+    i, j = np.unravel_index(int(score.argmax()), score.shape)
+    found = int(kept[i, j]) if wrong[i, j] == 0 else 0
+    return found, tuple(interval for interval in (first[i], second[j]) if interval.ends)
+
+
+def _kept_simply(found: tuple[int, tuple[_Interval, ...]]) -> tuple[int, int]:
+    return found[0], -sum(interval.ends for interval in found[1])
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """Values of one condition between two ends; None where the tested range ends."""
+
+    key: str = ""
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    share: float = 1.0
+
+    @property
+    def ends(self) -> int:
+        return (self.low is not None) + (self.high is not None)
+
+    def inside(self, trials: Table) -> np.ndarray:
+        if not self.key:
+            return np.ones(len(trials.rows), np.bool_)
+        values = np.array(trials.column(self.key), float)
+        return (values >= (-np.inf if self.low is None else self.low)) & (
+            values <= (np.inf if self.high is None else self.high)
+        )
+
+
+def _intervals(column: Column, trials: Table) -> list[_Interval]:
+    """All intervals of more than one value, the unbounded one among them; none where a value is no number."""
+    values = trials.column(column.key)
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return []
+    seen = sorted(set(values))
+    if len(seen) < 2:
+        return []
+    scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
+    length = scale(seen[-1]) - scale(seen[0])
+    return [
+        _Interval(column.key, column.unit, low if i else None, high if j < len(seen) - 1 else None,
+                  (scale(high) - scale(low)) / length)
+        for i, low in enumerate(seen) for j, high in enumerate(seen) if i < j
+    ]  # fmt: skip
+
+
+def _confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
+    """The region that the other half and fresh trials confirm, and what came of the search in words.
+
+    Where the other half contradicts the region, both halves are searched, and fresh trials alone can confirm.
+    """
+    first = np.zeros(len(trials.rows), np.bool_)
+    first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
+    region = search_region(trials.only(first))
+    inside = trials.only(not searched and region is not None and region.contains(row)
+                         for searched, row in zip(first, trials.records(), strict=True))  # fmt: skip
+    if region is None or False in inside.holds:
+        contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
+        region, inside = (search_region(trials), trials.only(False for _ in trials.rows)) if fresh else (None, inside)
+        if region is None:
+            return None, f"no region confirmed: {contradicted}" if contradicted else "no region found"
+    drawn = fresh(region) if fresh else inside.only(False for _ in inside.rows)
+    if False in drawn.holds:
+        return None, f"no region confirmed: {region} fails in {_failing(drawn)} fresh trials"
+    region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
+    counts = f"{region.searched} trials of the search, {region.others} others and {region.fresh} fresh ones hold"
+    if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
+        return None, f"no region confirmed: for {region} only {counts}"
+    return region, f"where {region} ({region.share:.0%} of the tested range) all {counts}"
+
+
+def _failing(trials: Table) -> str:
+    return f"{trials.holds.count(False)} of {sum(held is not None for held in trials.holds)}"
+
+
+def _count(part: Part) -> str:
+    """In how many trials a part holds, and how many cannot tell."""
+    told = f"holds in {part.held} of {part.decided} trials" if part.decided else "no trial can tell"
+    total = part.decided + part.unknown
+    return f"{told}; {part.unknown} of {total} cannot tell" if part.unknown and part.decided else told
+
+
+def _where_it_fails(trials: Table) -> str:
+    """In how many trials, and under which conditions."""
+    failed = trials.that(False)
+    if not failed.rows:
+        return ""
+    decided = sum(outcome is not None for outcome in trials.holds)
+    if len(failed.rows) == decided:
+        return f"in all {decided} trials"
+    return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
+
+
+def _span(values: Sequence[Any]) -> str:
+    found = {value for value in values if value is not None}
+    if any(isinstance(value, str) for value in found):
+        return ", ".join(sorted(map(str, found)))
+    ordered = sorted(found)
+    if len(ordered) > _LISTED:
+        return f"{ordered[0]:g} to {ordered[-1]:g}"
+    return ", ".join(f"{value:g}" for value in ordered)
+
+
+def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
+    if low is None:
+        return f"{key} <= {high:g} {unit}".rstrip()
+    return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()
 
 
 def failure_of(case: str, error: Exception) -> Failure:

@@ -22,7 +22,6 @@ from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.evidence.verdicts import verdicts
 from reports.pages.records import (
-    Claim,
     Counterexample,
     CrossCheck,
     Evidence,
@@ -59,7 +58,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs["arm_energies"] = _arm_energies()
     from verification.proofs.statement import ProofRecord
 
-    ledger = kept.stage("claims", tuple[Claim, ...], partial(claims.compute, runner, depth))
+    ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)

@@ -1,13 +1,15 @@
-"""The first page: one sentence per topic, made from the records, never typed in."""
+"""The first page: one sentence per topic, made from the records, never typed in.
+
+The claims have no common verdict: the page shows each with its parts.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from reports.pages.records import Evidence, Verdict
-from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, VERDICTS, Failure
+from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Failure, verdict_of_trials, worst
 
 _ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
 
@@ -16,7 +18,9 @@ def verdicts(evidence: Evidence) -> tuple[Verdict, ...]:
     """One verdict for each topic that was computed; what failed never counts as holding."""
     failed = {one.stage: one.failures for one in evidence.failed}
     found = {stage: tuple(said(evidence)) for stage, said in _STAGES.items()}
-    marked = (_marked(found[stage], TITLES[stage], failed.get(stage, ())) for stage in _STAGES)
+    if evidence.claims:
+        failed.pop("claims", None)
+    marked = (_marked(found.get(stage, ()), about, failed.get(stage, ())) for stage, about in TITLES.items())
     return (*(verdict for group in marked for verdict in group), *_topics(evidence))
 
 
@@ -30,20 +34,7 @@ def _marked(found: tuple[Verdict, ...], about: tuple[str, str], failures: Sequen
             yield one
             continue
         count = f"{len(failures)} {'case' if len(failures) == 1 else 'cases'} failed."
-        outcome = NOT_COMPUTED if one.outcome == REPRODUCED else one.outcome
-        yield replace(one, outcome=outcome, sentence=f"{one.sentence} {count}")
-
-
-def _claims(evidence: Evidence) -> Iterator[Verdict]:
-    if not evidence.claims:
-        return
-    count = Counter(claim.outcome for claim in evidence.claims)
-    words = ", ".join(f"{count[outcome]} {outcome}" for outcome in VERDICTS if count[outcome])
-    refuted = [claim.id for claim in evidence.claims if claim.outcome == REFUTED]
-    outcome = REPRODUCED if set(count) == {REPRODUCED} else MIXED
-    tail = f" Refuted: {', '.join(refuted)}." if refuted else ""
-    yield Verdict("The paper's claims", outcome, f"Of {len(evidence.claims)} claims computed: {words}.{tail}", "claims",
-                  any(claim.timed for claim in evidence.claims))
+        yield replace(one, outcome=worst((one.outcome, NOT_COMPUTED)), sentence=f"{one.sentence} {count}")
 
 
 def _passivity(evidence: Evidence) -> Iterator[Verdict]:
@@ -103,7 +94,8 @@ def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
     sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases with certain answers."
                 + (f" Not on: {'; '.join(failing)}." if failing else "")
                 + (f" {skipped} were skipped: their files are absent." if skipped else ""))  # fmt: skip
-    yield Verdict("Hard cases", MIXED if failing else REPRODUCED, sentence, "hard-cases")
+    outcome = verdict_of_trials(outcome == "stable" for outcome in ours.values())
+    yield Verdict("Hard cases", outcome, sentence, "hard-cases")
 
 
 def _topics(evidence: Evidence) -> Iterator[Verdict]:
@@ -114,7 +106,7 @@ def _topics(evidence: Evidence) -> Iterator[Verdict]:
 
 # stage -> its sentences; stage -> title and section
 _STAGES = {
-    "claims": _claims, "bulk impacts": _passivity, "proofs": _proofs, "properties": _laws, "cross-checks": _checks,
+    "bulk impacts": _passivity, "proofs": _proofs, "properties": _laws, "cross-checks": _checks,
     "hard cases": _hard_cases,
 }  # fmt: skip
 TITLES = {

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.figures import RECIPES
+from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
-from reports.pages.records import Claim, Evidence, Verdict
+from reports.pages.records import Evidence, Verdict
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
-from reports.pages.verdicts import verdicts
-from verification.finding import REFUTED, VERDICTS, Finding, Table
+from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
@@ -42,7 +42,8 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     return page.render(
         script=text, policy=policy(text), played=played(figures),
         evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
-        subjects=verdicts(evidence.claims), counts=count_outcomes(evidence.claims),
+        counts=count_verdicts(evidence.claims), maps={claim.key: map_of(claim) for claim in evidence.claims},
+        part_counts=count_verdicts(part for claim in evidence.claims for part in claim.parts),
         used={user for entry in evidence.manifest for user in entry.used_by},
     )
 
@@ -54,10 +55,25 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     return {**scenes, **tables, "energy_gains": evidence.bulk, **evidence.inputs}
 
 
-def count_outcomes(claims: Sequence[Claim | Verdict]) -> dict[str, int]:
-    """Return how many records have each outcome, those that occur only."""
-    counts = {outcome: sum(record.outcome == outcome for record in claims) for outcome in VERDICTS}
-    return {outcome: count for outcome, count in counts.items() if count}
+def count_verdicts(found: Iterable[Finding | Part]) -> dict[str, int]:
+    """Return how many findings or parts have each verdict, those that occur only."""
+    given = [one.verdict for one in found]
+    return {verdict: given.count(verdict) for verdict in VERDICTS if verdict in given}
+
+
+def map_of(claim: Finding) -> Figure | None:
+    """Where a claim holds, over its two telling conditions; None where it holds everywhere."""
+    table = claim.tables.get(claim.key)
+    if not claim.axes or claim.verdict == REPRODUCED or table is None or not table.rows:
+        return None
+    titles = {column.key: column.title for column in table.columns}
+    x, y, *split = claim.axes
+    panels = [value if isinstance(value, str) else f"{titles[split[0]]}: {value:g}"
+              for value in table.column(split[0])] if split else None  # fmt: skip
+    return condition_map(
+        f"map-{claim.key}", f"Where {claim.key} holds", f"Each mark is one simulated condition of {claim.key}.",
+        (titles[x], table.column(x)), (titles[y], table.column(y)), table.holds, panels,
+    )  # fmt: skip
 
 
 def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
@@ -68,11 +84,15 @@ def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, s
 
 def badge_words(verdict: Verdict, topics: Sequence[Finding]) -> str:
     """Return what a verdict of the first page amounts to in words; of a topic's findings, how many fail."""
-    if verdict.link == "claims":
-        return verdict.outcome
     parts = [part for topic in topics if topic.key == verdict.link for part in topic.parts]
     failing = sum(part.verdict == REFUTED for part in parts)
     return f"{failing} of {len(parts)} findings fail" if failing else FINDINGS[verdict.outcome]
+
+
+def counted(part: Part) -> str:
+    """Return in how many trials a part holds, of those that could tell, and how many could not."""
+    unknown = f", {part.unknown} cannot tell" if part.unknown else ""
+    return f"{part.held} of {part.decided}{unknown}" if part.decided or part.unknown else ""
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
@@ -89,7 +109,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled, film=_film,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, badge_words=badge_words, tables_without=tables_without,
+        as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
         runs_by_user=runs_by_user, anchor=anchor, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals["rows_shown"] = ROWS_SHOWN

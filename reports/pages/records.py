@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from reports.figures.figure import Figure
 from verification.finding import Failure, Finding, Table
 from verification.proofs.statement import ProofRecord
 
@@ -25,29 +24,6 @@ class Verdict:
     sentence: str
     link: str = ""
     timed: bool = False
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One line of the ledger. `headline` is the telling number in a few words, `fails` where it does not hold."""
-
-    id: str
-    statement: str
-    place: str
-    outcome: str
-    headline: str
-    quantity: str = ""
-    conditions: str = ""  # the range over which it was computed
-    tolerance: str = ""
-    fails: str = ""
-    numbers: Table | None = None
-    figure: Figure | None = None
-    inputs: tuple[str, ...] = ()  # names of runs and tables
-
-    @property
-    def timed(self) -> bool:
-        """Whether its outcome rests on measured times."""
-        return self.numbers is not None and bool(self.numbers.timed)
 
 
 @dataclass(frozen=True)
@@ -152,7 +128,7 @@ class Evidence:
     inputs: Mapping[str, Any] = field(default_factory=dict)
     scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name
     verdicts: tuple[Verdict, ...] = ()
-    claims: tuple[Claim, ...] = ()
+    claims: tuple[Finding, ...] = ()
     proofs: tuple[ProofRecord, ...] = ()
     properties: tuple[Property, ...] = ()
     counterexamples: tuple[Counterexample, ...] = ()

@@ -22,11 +22,11 @@ from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers
-from reports.pages.records import Claim, Evidence
+from reports.pages.records import Evidence
 from reports.report import build_report, write_report
 from reports.runner import Runner
 from reports.store.io import MARK_NAME
-from verification.finding import REPRODUCED, titled
+from verification.finding import REPRODUCED, Finding, Part, finding_of, titled
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
 FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))
@@ -43,9 +43,10 @@ def out(tmp_path_factory) -> Path:
         runner.user = "C07"
         runner(scene, "PB")
         runner(scene.with_values({"name": "own"}), "PB")
-        return (Claim("C07", "s", "p", REPRODUCED, "h", numbers=titled(("κ", "gain"), ((1e3, 2e-16),))),)
+        table = titled(("κ", "gain"), ((1e3, 2e-16),))
+        return (finding_of("C07", "C07", "s", "h", (Part("p", REPRODUCED),), {"C07": table}),)
 
-    stage = Stage(folder / "tables", "claims", tuple[Claim, ...], {"depth": "quick"})
+    stage = Stage(folder / "tables", "claims", tuple[Finding, ...], {"depth": "quick"})
     claims = stage.get_or_compute(compute, runner)
     with pytest.MonkeyPatch.context() as patch:
         words = [str(folder / "bin" / "iapb"), "reproduce", "--out", str(folder), f"--check={folder}"]

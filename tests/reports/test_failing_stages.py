@@ -60,15 +60,15 @@ def of_claims(patch: Patch, folder: Path) -> list[str]:
     from dataclasses import replace
 
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
-    chosen["C01"] = replace(chosen["C01"], measure=broken(chosen["C01"].measure, lambda study: True))
+    chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
     patch.setattr(verification.claims, "CLAIMS", chosen)
     patch.setattr(c07_plastic, "strike", broken(c07_plastic.strike, lambda arm, place, angle, e: (place, angle) ==
                                                 (c07_plastic.PLACES[0], c07_plastic.ANGLES[0])))  # fmt: skip
     failures: list[Failure] = []
     first, second = claims.compute(Runner(folder), "quick", nothing, failures)
-    assert (first.outcome, first.numbers.rows) == (NOT_COMPUTED, ())
+    assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
     trials = 2 * len(c07_plastic.PLACES) * len(c07_plastic.ANGLES) - 1
-    assert len(second.numbers.rows) == trials - 2
+    assert len(second.tables["C07"].rows) == trials - 2
     return [failure.case for failure in failures]
 
 

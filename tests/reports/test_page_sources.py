@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
-
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
-from reports.pages.records import Claim, Evidence, HardCase, StoredFile, Verdict
+from reports.pages.records import Evidence, HardCase, StoredFile, Verdict
 from reports.pages.sections import SECTIONS
-from reports.pages.verdicts import failures, verdicts
-from verification.finding import LIMITED, REFUTED, REPRODUCED, Part, finding_of, titled
+from verification.finding import MIXED, REFUTED, REPRODUCED, WHERE, Part, Region, finding_of, titled
 
 RUNS = tuple(
     StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))
@@ -17,8 +14,9 @@ RUNS = tuple(
 )  # fmt: skip
 KEPT = (StoredFile("claims", "tables/claims-1.h5", "k", "c" * 64, "iapb reproduce"),
         StoredFile("hard cases", "tables/hard_cases-1.h5", "k", "c" * 64, "iapb reproduce"))  # fmt: skip
-CLAIMS = (Claim("C10", "s", "p", REPRODUCED, "h"), Claim("C19", "s", "p", REPRODUCED, "h", numbers=titled(
-    ("a", "t"), ((1, 2.0),), timed=("t",))))  # fmt: skip
+CLAIMS = (finding_of("C10", "C10", "s", "h", (Part("p.", REPRODUCED),)),
+          finding_of("C19", "C19", "s", "h", (Part("p.", REPRODUCED, timed=True),),
+                     {"C19": titled(("a", "t"), ((1, 2.0),), timed=("t",))}))  # fmt: skip
 
 
 def test_a_claim_names_its_runs_and_each_run_its_command():
@@ -63,26 +61,21 @@ def test_a_long_table_is_cut_and_says_where_the_rest_is():
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
 
-@pytest.mark.parametrize(
-    ("fails", "told"),
-    [
-        ("", ""), ("in all 5 trials", " Fails in all 5 trials."),
-        ("x: in 21 of 72 trials, with tilt 0.03, 0.1 rad; y: a: in 3 of 42 trials, with b 1 m",
-         " Fails: x in 21 of 72 trials; y: a in 3 of 42 trials."),
-        ("a: in 1 of 2 trials; b: in 1 of 2 trials; c: in 1 of 2 trials",
-         " Fails: a in 1 of 2 trials; b in 1 of 2 trials; and 1 more."),
-    ],
-)  # fmt: skip
-def test_where_a_claim_fails_in_few_words(fails, told):
-    assert failures(fails) == told
-
-
-def test_the_first_page_says_where_and_not_twice():
-    claim = Claim("C20", "s", "p", LIMITED, "Held. (holds in 1 of 2 trials)", fails="x: in 1 of 2 trials, with a")
-    assert verdicts((claim,))[0].sentence == "C20: Held. Fails: x in 1 of 2 trials."
+def test_the_first_page_shows_every_part_of_a_claim_with_its_count():
+    held = [Part("s.", REPRODUCED, f"part {n}", 5, 5) for n in range(9)]
+    worst = Part("s.", REFUTED, "the one that fails", 1, 40, 7)
+    where = Part("s.", WHERE, "part in a region", 30, 40, region=Region((("tilt", "rad", None, 0.015),)))
+    page = build_page(Evidence(claims=(finding_of("C20", "C20", "s", "a", [*held, where, worst]),)), ())
+    first = page.split('<section id="verdict"')[1].split("</section>")[0]
+    assert all(part.name in first for part in held)
+    assert "reproduced where tilt ≤ 0.015 rad" in first
+    line = first.split("the one that fails")[1].split("</li>")[0]
+    assert "refuted" in line and "1 of 40, 7 cannot tell" in line
+    assert "1 refuted" in first.split("their 11 parts")[1].split("</p>")[0]
+    assert "more" not in first.split('<ul class="parts">')[1]
 
 
 def test_a_topic_with_failing_findings_counts_them():
     topic = finding_of("mechanics", "t", "l", "v", (Part("a", REPRODUCED), Part("b", REFUTED)))
     assert badge_words(Verdict("t", REFUTED, "v", "mechanics"), (topic,)) == "1 of 2 findings fail"
-    assert badge_words(Verdict("t", LIMITED, "v", "proofs"), (topic,)) == "mixed"
+    assert badge_words(Verdict("t", MIXED, "v", "proofs"), (topic,)) == "mixed"

@@ -19,19 +19,29 @@ from reports.figures.fig03_energy_loss import arm_energies
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
 from reports.pages.records import (
-    Claim,
     CrossCheck,
     Evidence,
+    FailedCases,
     HardCase,
     Property,
     StoredFile,
     Verdict,
 )
 from reports.pages.sections import SECTIONS
-from reports.pages.verdicts import verdicts
 from reports.report import build_report, write_report
 from verification.cost.effects import COLUMNS as EFFECTS
-from verification.finding import LIMITED, REFUTED, REPRODUCED, VERDICTS, Part, finding_of, table_of, titled
+from verification.finding import (
+    MIXED,
+    NOT_COMPUTED,
+    REFUTED,
+    REPRODUCED,
+    VERDICTS,
+    Part,
+    failure_of,
+    finding_of,
+    table_of,
+    titled,
+)
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -74,12 +84,12 @@ def _hard_case(*rows: tuple[Any, ...]) -> HardCase:
 
 @pytest.fixture(scope="module")
 def full() -> Evidence:
-    claim = Claim("C01", "KE never rises <b>", "Thm 1", LIMITED, "half of the printed loss: $\\frac{1}{2}$",
-                  numbers=titled(("κ", "gain"), ((1e3, 2e-16),)), fails="as printed")
+    claim = finding_of("C01", "C01", "KE never rises <b>", "half of the printed loss: $\\frac{1}{2}$",
+                       (Part("as printed.", MIXED, "as printed"),), {"C01": titled(("κ", "gain"), ((1e3, 2e-16),))})
     return Evidence(
         inputs={"arm_energies": arm_energies()},
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "properties"),),
-        claims=(claim, Claim("C02", "the same", "Thm 2", REFUTED, "no")),
+        claims=(claim, finding_of("C02", "C02", "the same", "no", (Part("n.", REFUTED),))),
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
@@ -158,7 +168,7 @@ def test_outcomes_are_told_by_a_mark_as_well_as_by_colour() -> None:
 
 def test_each_outcome_is_counted(full: Evidence) -> None:
     page = build_report(full)
-    assert f"1 {LIMITED}" in page
+    assert f"1 {MIXED}" in page
     assert f"1 {REFUTED}" in page
 
 
@@ -171,17 +181,12 @@ def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
     assert str(prose(text)).replace("\u202f", " ") == shown
 
 
-def test_a_verdict_is_the_worst_of_its_claims_in_its_own_words() -> None:
-    claims = (Claim("C01", "s", "p", REPRODUCED, "fine"),
-              Claim("C02", "s", "p", REFUTED, "Fails in 2.5 of 3. More words. And more"))
-    (verdict,) = verdicts(claims)
-    assert verdict.outcome == REFUTED
-    assert verdict.sentence == "1 of 2 claims reproduced. C02: Fails in 2.5 of 3."
-    assert verdict.link == "C02"
-
-
-def test_a_subject_without_claims_has_no_verdict() -> None:
-    assert verdicts(()) == ()
+def test_claims_have_no_common_verdict_unless_none_was_computed() -> None:
+    claims = (finding_of("C01", "C01", "s", "a", (Part("p", REPRODUCED),)),)
+    failed = (FailedCases("claims", (failure_of("C02", ValueError("planted")),), "file"),)
+    assert first_page(Evidence(claims=claims, failed=failed)) == ()
+    (verdict,) = first_page(Evidence(failed=failed))
+    assert (verdict.outcome, verdict.link) == (NOT_COMPUTED, "claims")
 
 
 def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
@@ -200,7 +205,7 @@ def test_a_hard_case_without_its_files_says_so() -> None:
 def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
     stable, failing = _hard_case(("IAPB", "stable", 0.0)), _hard_case(("IAPB", "gains energy", 0.5))
     (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, name="stiff wall"))))
-    assert verdict.outcome == LIMITED
+    assert verdict.outcome == MIXED
     assert "1 of 2" in verdict.sentence and "stiff wall (gains energy)" in verdict.sentence
     (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, skipped="no file"))))
     assert verdict.outcome == REPRODUCED and "1 were skipped" in verdict.sentence
@@ -214,10 +219,10 @@ def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Ev
 
 
 def test_a_topic_with_a_verdict_stands_on_the_first_page_with_the_worst_of_its_findings() -> None:
-    parts = (Part("a", REPRODUCED), Part("b", LIMITED))
+    parts = (Part("a", REPRODUCED), Part("b", MIXED))
     topics = (finding_of("mechanics", "Linkages", "", "Most hold.", parts),
               finding_of("scenes", "Scenes", "", "", parts))
-    assert first_page(Evidence(topics=topics)) == (Verdict("Linkages", LIMITED, "Most hold.", "mechanics"),)
+    assert first_page(Evidence(topics=topics)) == (Verdict("Linkages", MIXED, "Most hold.", "mechanics"),)
 
 
 def test_prose_keeps_a_lone_dollar() -> None:

@@ -142,7 +142,6 @@ def test_a_run_is_listed_under_every_claim_that_uses_it_though_it_is_made_once(t
     from reports.evidence import claims
 
     monkeypatch.setattr(verified, "CLAIMS", {"A": _UsesOne(("IAPB", "PB")), "B": _UsesOne(("PB", "IAPB", "PB"))})
-    monkeypatch.setattr(claims, "as_record", lambda result: result)
     runner = Runner(tmp_path)
     with runner.recording("claims") as used:
         claims.compute(runner, "quick", lambda done, total: None, [])

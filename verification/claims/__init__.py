@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from verification.claims.claim import Claim, ClaimResult
+from verification.claims.claim import Claim
 from verification.claims.study import Study, check_claims, conditions
-from verification.finding import VERDICTS, Column, Table
+from verification.finding import VERDICTS, Column, Finding, Table
 
 _FILES = (
     "c01_one_collision",
@@ -39,4 +39,4 @@ CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)
 }
 
-__all__ = ["CLAIMS", "VERDICTS", "Claim", "ClaimResult", "Column", "Study", "Table", "check_claims", "conditions"]
+__all__ = ["CLAIMS", "VERDICTS", "Claim", "Column", "Finding", "Study", "Table", "check_claims", "conditions"]

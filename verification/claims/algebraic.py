@@ -1,13 +1,19 @@
-"""What the algebraic claims share: batches of impacts, an error and a bound per batch, and when a batch holds."""
+"""What the algebraic claims share: batches of random impacts, an error and a bound per batch."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, product
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from verification.claims.claim import Claim
 from verification.finding import Column, Row, Table
-from verification.impacts import Floats, ImpactCase
+from verification.impacts import Family, Floats, ImpactCase, draw_of_rank, whole_numbers
+
+if TYPE_CHECKING:
+    from verification.claims.study import Study
 
 EPSILON = float(np.finfo(np.float64).eps)
 
@@ -23,19 +29,85 @@ COLUMNS = (
 )
 
 
+class Batch(NamedTuple):
+    """Random impacts of one family at one restitution, and the seed they were drawn with."""
+
+    impacts: list[ImpactCase]
+    family: Family
+    restitution: float
+    seed: int
+
+
+class Measure(NamedTuple):
+    """One part of an algebraic claim: the worst error of a batch, and the largest that it allows."""
+
+    error: Callable[[Batch], float]
+    bound: Callable[[Batch], float]
+
+
+class Exact(NamedTuple):
+    """Parts computed in rationals, where no error is allowed: on a quarter as many impacts in whole numbers."""
+
+    families: Sequence[Family]
+    restitution: float
+    errors: Mapping[str, Callable[[Batch], float]]
+
+
+def cases_of(
+    families: Sequence[Family], restitutions: Sequence[float], parts: Iterable[str], exact: Exact | None = None
+) -> list[tuple[str, Family, float]]:
+    """Return (part, family, restitution) of every batch."""
+    plain = product(families, restitutions, parts)
+    rational = product(exact.families, [exact.restitution], exact.errors) if exact else ()
+    return [(part, family, e) for family, e, part in chain(plain, rational)]
+
+
+def trial_of(
+    study: Study, case: tuple[str, Family, float], count: int, parts: Mapping[str, Measure],
+    exact: Exact | None = None, draw: Callable[[Family, int, int], Iterator[ImpactCase]] = draw_of_rank,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the row of one batch of `count` impacts."""
+    part, family, e = case
+    rational = exact is not None and part in exact.errors
+    count = max(count // 4, 2) if rational else count
+    impacts = list((whole_numbers if rational else draw)(family, count, study.seed))
+    batch = Batch(impacts, family, e, study.seed)
+    measure = Measure(exact.errors[part], lambda _: 0.0) if exact and rational else parts[part]
+    return {
+        "part": part, "coordinates": family.coordinates, "contacts": family.contacts,
+        "condition number": None if rational else family.condition_number, "restitution": e, "impacts": count,
+        "error": measure.error(batch), "bound": measure.bound(batch),
+    }  # fmt: skip
+
+
+def algebraic_claim(
+    *, families: Sequence[Family], restitutions: Sequence[float], parts: Mapping[str, Measure],
+    impacts: Mapping[str, int], exact: Exact | None = None,
+    draw: Callable[[Family, int, int], Iterator[ImpactCase]] = draw_of_rank, **words: Any,
+) -> Claim:  # fmt: skip
+    """Return a claim on batches of random impacts; `words` are the other fields of Claim.
+
+    impacts : in one batch, by depth; draw : (family, count, seed) -> the impacts of a batch
+    """
+    return Claim(
+        columns=COLUMNS, cases=lambda study: cases_of(families, restitutions, parts, exact), holds=within_bound,
+        trials=lambda study, case: [trial_of(study, case, impacts[study.depth], parts, exact, draw)], **words,
+    )  # fmt: skip
+
+
 def within_bound(row: Row) -> bool | None:
     """A batch holds where its worst error is within its bound; an unknown error never is."""
     return bool(row["error"] <= row["bound"])
 
 
-def energy_bound(instance_size: int, condition_number: float) -> float:
+def energy_bound(batch: Batch) -> float:
     """Relative energy gain that rounding alone may show: 10 d ε √κ(M), the resolver's promise."""
-    return 10.0 * instance_size * EPSILON * float(np.sqrt(condition_number))
+    return 10.0 * batch.family.coordinates * EPSILON * float(np.sqrt(batch.family.condition_number))
 
 
-def solve_bound(instance_size: int, condition_number: float) -> float:
+def solve_bound(batch: Batch) -> float:
     """Relative error of quantities that go through one solve with M or through W: 100 d ε κ(M)."""
-    return 100.0 * instance_size * EPSILON * condition_number
+    return 100.0 * batch.family.coordinates * EPSILON * batch.family.condition_number
 
 
 def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
@@ -68,8 +140,10 @@ def worst(values: Iterable[float]) -> float:
 
 
 def summary(table: Table, part: str) -> str:
-    """`worst error e (bound b) in n impacts` of one part of a claim."""
+    """`at most e (allowed b) in n impacts` of one part of a claim."""
     rows = table.where(part=part).records()
+    if not rows:
+        return "not computed"
     closest = max(rows, key=lambda row: row["error"] / row["bound"] if row["bound"] else row["error"])
     impacts = sum(row["impacts"] for row in rows)
     return f"at most {closest['error']:.1e} (allowed {closest['bound']:.1e}) in {impacts} impacts"

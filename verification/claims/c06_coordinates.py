@@ -3,58 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from iapb import resolve_impact
 from verification.claims.algebraic import (
-    COLUMNS,
-    Floats,
+    EPSILON,
+    Batch,
+    Exact,
+    Measure,
+    algebraic_claim,
     kinetic_energy,
-    solve_bound,
     summary,
-    within_bound,
     worst,
 )
-from verification.claims.claim import Claim
-from verification.finding import Table, table_of
-from verification.impacts import Family, ImpactCase, draw_of_rank, whole_numbers
-
-if TYPE_CHECKING:
-    from verification.claims.study import Study
+from verification.finding import Table
+from verification.impacts import Family, Floats, ImpactCase, draw_of_rank
 
 DOUBLES = "random change of coordinates, in doubles"
 EXACT = "shear by whole numbers, in rationals"
 MASS_CONDITION = 1e2
 # condition numbers of the coordinate change: metres to millimetres beside radians is about 1e3
 FAMILIES = tuple(
-    Family(d, contacts, rank, k)
-    for d, contacts, rank in ((3, 1, 1), (3, 6, 3), (6, 12, 4))
-    for k in (1e0, 1e3)
+    Family(d, contacts, rank, k) for d, contacts, rank in ((3, 1, 1), (3, 6, 3), (6, 12, 4)) for k in (1e0, 1e3)
 )
-RESTITUTIONS = (0.0, 0.7)
-IMPACTS = {"quick": 12, "full": 150}
 
 
-def measure(study: Study) -> Table:
+def _draw(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
+    """The family's condition number is that of the change of coordinates, not of M."""
+    return draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed)
+
+
+def _bound(batch: Batch) -> float:
+    return 100.0 * batch.family.coordinates * EPSILON * MASS_CONDITION * batch.family.condition_number**2
+
+
+def _worst_distance(batch: Batch) -> float:
     """q = T r: the impact solved for q̇, and solved for ṙ and brought back."""
-    count = IMPACTS[study.depth]
-    batches = study.each(FAMILIES, lambda family: _batches(family, count, study.seed))
-    exact = study.each(FAMILIES[::2], lambda family: [_exact_batch(family, count // 4, study.seed)])
-    return table_of(COLUMNS, [*batches, *exact])
-
-
-def _batches(family: Family, count: int, seed: int) -> Iterator[dict[str, Any]]:
-    rng = np.random.default_rng([seed, family.coordinates, family.contacts])
-    instances = list(draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed))
-    changes = [random_change(rng, family.coordinates, family.condition_number) for _ in instances]
-    bound = solve_bound(family.coordinates, MASS_CONDITION * family.condition_number**2)
-    for e in RESTITUTIONS:
-        pairs = zip(instances, changes, strict=True)
-        yield {**_names(family), "condition number": family.condition_number, "part": DOUBLES,
-               "restitution": e, "impacts": count, "bound": bound,
-               "error": worst(_distance(instance, change, e) for instance, change in pairs)}  # fmt: skip
+    family = batch.family
+    rng = np.random.default_rng([batch.seed, family.coordinates, family.contacts])
+    changes = [random_change(rng, family.coordinates, family.condition_number) for _ in batch.impacts]
+    return worst(_distance(case, change, batch.restitution)
+                 for case, change in zip(batch.impacts, changes, strict=True))  # fmt: skip
 
 
 def random_change(rng: np.random.Generator, size: int, condition_number: float) -> Floats:
@@ -74,23 +64,19 @@ def _distance(instance: ImpactCase, change: Floats, e: float) -> float:
     return float(np.sqrt(kinetic_energy(mass, here - back) / kinetic_energy(mass, velocity)))
 
 
-def _exact_batch(family: Family, count: int, seed: int) -> dict[str, Any]:
+def _different(batch: Batch) -> float:
+    """Outcomes that differ, without rounding."""
     from reference.exact import exact_impact
 
-    different = 0
-    for mass, rows, velocity in (case.arrays for case in whole_numbers(family, count, seed)):
+    different, e = 0, batch.restitution
+    for mass, rows, velocity in (case.arrays for case in batch.impacts):
         shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
         unshear = np.round(np.linalg.inv(shear))  # whole numbers, as the determinant is 1
-        here = np.array(exact_impact(mass, rows, velocity, 0.5).velocity)
-        there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, 0.5).velocity
+        here = np.array(exact_impact(mass, rows, velocity, e).velocity)
+        there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, e).velocity
         back = shear.astype(int).astype(object) @ np.array(there)
         different += bool(np.any(here != back))
-    return {**_names(family), "part": EXACT, "restitution": 0.5, "impacts": count, "error": float(different),
-            "bound": 0.0}  # fmt: skip
-
-
-def _names(family: Family) -> dict[str, Any]:
-    return {"coordinates": family.coordinates, "contacts": family.contacts}
+    return float(different)
 
 
 def finding(table: Table) -> str:
@@ -101,14 +87,18 @@ def finding(table: Table) -> str:
     )
 
 
-CLAIM = Claim(
+CLAIM = algebraic_claim(
     id="C06",
     statement="The outcome of a collision does not depend on the coordinates chosen.",
     place="Section V-A",
     quantity="Distance in the kinetic metric between the outcome and the one computed in other coordinates and "
     "brought back; in rationals the number of outcomes that differ.",
     tolerance="100 d ε κ(M) κ(T)²: the new mass matrix TᵀMT is that much worse conditioned. In rationals none.",
-    measure=measure,
-    holds=within_bound,
+    families=FAMILIES,
+    restitutions=(0.0, 0.7),
+    impacts={"quick": 12, "full": 150},
+    parts={DOUBLES: Measure(_worst_distance, _bound)},
+    exact=Exact(FAMILIES[::2], 0.5, {EXACT: _different}),
+    draw=_draw,
     finding=finding,
 )

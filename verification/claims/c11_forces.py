@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
-from verification.claims.closeness import count
-from verification.claims.conditions import Condition, columns
-from verification.finding import Column, Row, Table, table_of
+from verification.claims.closeness import FEW, count
+from verification.claims.conditions import START_COLUMNS, Condition
+from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, momentum_distance, peak_force, resting_force
 from verification.scenes.trace import COORDINATES
 
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
 LARGE, BALANCE, CLOSEST = "peak on new contact", "mean force after settling", "momentum given, distance to ideal"
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
-    Column("coordinate", condition=True),
+    *START_COLUMNS,
+    Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),
     Column("CBuc"),
@@ -34,12 +33,8 @@ BALANCED = 0.05  # [N]
 NOTHING = 1e-9
 
 
-def measure(study: Study) -> Table:
-    """Every start; peaks, resting forces and the momentum given so far, per coordinate."""
-    return table_of(COLUMNS, study.each(study.starts(), partial(_trials, study)))
-
-
-def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    """One start: peaks, resting forces and the momentum given so far, per coordinate."""
     ideal = study.trace(condition, "ideal")
     traces = {world: study.trace(condition, world) for world in WORLDS}
     window = comparison_window([ideal, *traces.values()])
@@ -87,9 +82,11 @@ CLAIM = Claim(
     "integral of the force, since a spike one step later must not count as its whole height.",
     tolerance="Peak above PB's. Balance within 0.05 N, the damper's force at the speed that counts as settled. "
     "Distance strictly the smallest; below 1e-9 everywhere the trial cannot tell.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=lambda study: study.starts(),
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("tilt", "clearance"),
-    map_panels="part",
+    draw=lambda study, region: study.fresh(study.starts(), region, FEW),
+    axes=("tilt", "clearance", "part"),
 )

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from verification.claims.claim import Claim
-from verification.claims.closeness import INDISTINGUISHABLE, count
-from verification.claims.conditions import Condition, columns
-from verification.finding import Column, Row, Table, table_of
+from verification.claims.closeness import INDISTINGUISHABLE, MANY, count
+from verification.claims.conditions import START_COLUMNS, Condition, columns
+from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, root_mean_square, share_limited
 from verification.scenes.trace import COORDINATES
 
@@ -22,18 +21,15 @@ MOST, LEAST = "saturating loses most", "spreading loses least"
 RENDERINGS = ("saturate", "scale", "spread")
 COLUMNS = (
     Column("part", part=True),
-    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
+    *START_COLUMNS,
+    *columns("force_limit"),
     *(Column(rendering) for rendering in RENDERINGS),
     Column("impacts limited"),
 )
 
 
-def measure(study: Study) -> Table:
-    """Every start with two device limits, in three renderings."""
-    return table_of(COLUMNS, study.each(study.limited(), partial(_trials, study)))
-
-
-def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    """One start and device limit in three renderings, per coordinate."""
     full = study.trace(condition, "IAPB")
     traces = {rendering: study.trace(condition, "IAPB", rendering) for rendering in RENDERINGS}
     window = comparison_window([full, *traces.values()])
@@ -74,9 +70,11 @@ CLAIM = Claim(
     quantity="RMS distance of the device trajectory from that of a device without limits, per coordinate.",
     tolerance="Strictly the largest, strictly the smallest of the three. Trials in which no impulse reached the limit, "
     "or all are within 1e-7 of the unlimited device, cannot tell.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=lambda study: study.limited(),
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("tilt", "clearance"),
-    map_panels="part",
+    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    axes=("tilt", "clearance", "part"),
 )

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from verification.claims.claim import Claim
 from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
-from verification.claims.closeness import by_coordinate, closest, count, distances
+from verification.claims.closeness import FEW, by_coordinate, closest, count, distances
 from verification.claims.conditions import Condition, columns
-from verification.finding import Row, Table, table_of
+from verification.finding import Row, Table
 from verification.scenes.measures import deepest_penetration
 
 if TYPE_CHECKING:
@@ -22,12 +21,8 @@ PENETRATION = "penetration"
 COLUMNS = (*columns("force_limit"), *DISTANCE_COLUMNS)
 
 
-def measure(study: Study) -> Table:
-    """Every start with two device limits; the impulses of IAPB spread over steps."""
-    return table_of(COLUMNS, study.each(study.limited(), partial(_trials, study)))
-
-
-def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    """One start and device limit, the impulses of IAPB spread over steps, per coordinate."""
     yield from distances(study, condition, "spread")
     depths = {
         "IAPB": deepest_penetration(study.trace(condition, "IAPB", "spread")),
@@ -60,9 +55,11 @@ CLAIM = Claim(
     quantity="As C10, with the impulses spread over steps at 1 and 0.3 times the paper's limits; deepest overlap of "
     "tool and walls.",
     tolerance="Strictly the smallest. Where all three are within 1e-7 of ideal the trial cannot tell.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=lambda study: study.limited(),
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("tilt", "clearance"),
-    map_panels="coordinate",
+    draw=lambda study, region: study.fresh(study.limited(), region, FEW),
+    axes=("tilt", "clearance", "coordinate"),
 )

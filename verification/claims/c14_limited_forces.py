@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from verification.claims.claim import Claim
-from verification.claims.closeness import count
-from verification.claims.conditions import Condition, columns
-from verification.finding import Column, Row, Table, table_of
+from verification.claims.closeness import MANY, count
+from verification.claims.conditions import START_COLUMNS, Condition, columns
+from verification.finding import Column, Row, Table
 from verification.scenes.measures import peak_force
 from verification.scenes.trace import COORDINATES
 
@@ -19,7 +18,8 @@ if TYPE_CHECKING:
     from verification.claims.study import Study
 
 COLUMNS = (
-    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
+    *START_COLUMNS,
+    *columns("force_limit"),
     Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),
@@ -29,12 +29,8 @@ COLUMNS = (
 NOT_FELT = {"x": 5e-4, "y": 5e-4, "theta": 5e-6}
 
 
-def measure(study: Study) -> Table:
-    """Every start with two device limits; the impulses of IAPB spread over steps."""
-    return table_of(COLUMNS, study.each(study.limited(), partial(_trials, study)))
-
-
-def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    """One start and device limit, the impulses of IAPB spread over steps, per coordinate."""
     limited, penalty = peak_force(study.trace(condition, "IAPB", "spread")), peak_force(study.trace(condition, "PB"))
     for i, coordinate in enumerate(COORDINATES):
         yield condition.record() | {"coordinate": coordinate, "IAPB": float(limited[i]), "PB": float(penalty[i])}
@@ -64,9 +60,11 @@ CLAIM = Claim(
     place="Section VI, Fig. 11",
     quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
     tolerance="Strictly larger. Coordinates in which neither reaches a hundredth of what can be felt do not count.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=lambda study: study.limited(),
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("tilt", "force_limit"),
-    map_panels="coordinate",
+    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    axes=("tilt", "force_limit", "coordinate"),
 )

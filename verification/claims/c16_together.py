@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
-from verification.claims.closeness import count
-from verification.claims.conditions import Condition, columns
-from verification.finding import Column, Row, Table, table_of
+from verification.claims.closeness import MANY, count
+from verification.claims.conditions import START_COLUMNS, Condition, columns
+from verification.finding import Column, Row, Table
 from verification.scenes.measures import largest_separation, share_limited
 
 if TYPE_CHECKING:
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
 RENDERINGS = ("saturate", "scale", "spread")
 COLUMNS = (
     Column("rendering", part=True),
-    *columns("tilt", "clearance", "travel", "friction", "approach_velocity", "force_limit"),
+    *START_COLUMNS,
+    *columns("force_limit"),
     Column("distance", "m"),
     Column("angle", "rad"),
     Column("impacts limited"),
@@ -29,12 +29,8 @@ COLUMNS = (
 TOGETHER, APART = 1e-9, 1e-6
 
 
-def measure(study: Study) -> Table:
-    """Every start with two device limits, in three renderings."""
-    return table_of(COLUMNS, study.each(study.limited(), partial(_trials, study)))
-
-
-def _trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
+    """One start and device limit in three renderings."""
     limited = share_limited(study.trace(condition, "IAPB", "scale"))
     for rendering in RENDERINGS:
         x, y, theta = map(float, largest_separation(study.trace(condition, "IAPB", rendering)))
@@ -66,9 +62,11 @@ CLAIM = Claim(
     place="Section VI",
     quantity="Largest difference of tool and device over the run, in position and angle.",
     tolerance="Together: 1e-9 m and rad, rounding over 1536 steps. Apart: more than 1e-6.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=lambda study: study.limited(),
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("tilt", "force_limit"),
-    map_panels="rendering",
+    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    axes=("tilt", "force_limit", "rendering"),
 )

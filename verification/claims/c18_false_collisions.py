@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from verification.claims.claim import Claim
-from verification.finding import Column, Row, Table, table_of
+from verification.finding import Column, Region, Row, Table
 from verification.mechanics.false_collisions import EDGE_JUMP, FalseCollisions, count_false, socket
 
 if TYPE_CHECKING:
-    from iapb.run import Run
-    from iapb.scene import Scene
     from verification.claims.study import Study
 
-REACHES = "coherence that reaches the contact on the next facet"
-SHORT = "coherence above speed × step, short of the next facet"
+REACHES = "coherence that reaches the contact on the next facet (our condition)"
+SHORT = "coherence above speed × step (the paper's condition), short of the next facet"
 CLUSTERING = "clustering alone"
 CLUSTER = {"quick": (0.0, 4.0, 6.0), "full": (0.0, 2.0, 4.0, 6.0, 10.0)}  # [mm]
 COHERENCE = {"quick": (0.0, 1.0, 2.0, 4.0, 6.0, 10.0), "full": (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)}  # [mm]
 DAMPING = (10.0, 20.0, 40.0, 60.0)  # [N s/m]
+FRESH = 40  # sockets that confirm a region; those short of the next facet are no trial of ours
 RATES = {"quick": (1000.0,), "full": (500.0, 1000.0, 2000.0)}  # [Hz]
 
 COLUMNS = (
@@ -39,25 +40,41 @@ COLUMNS = (
 )
 
 
-def measure(study: Study) -> Table:
-    """The ball in the socket at every pair of distances, over damping and rate."""
-    return table_of(COLUMNS, study.each(product(RATES[study.depth], DAMPING), lambda case: _trials(study, *case)))
+class Socket(NamedTuple):
+    """A ball in the socket: distances of the filters [mm], damping [N s/m] and rate [Hz]."""
+
+    rate: float
+    damping: float
+    cluster: float
+    coherence: float
 
 
-def _trials(study: Study, rate: float, damping: float) -> Iterator[dict[str, Any]]:
-    def simulate(scene: Scene) -> Run:
-        return study.run(scene, "IAPB", "full")
+def cases(study: Study) -> list[Socket]:
+    """Every pair of distances, over damping and rate."""
+    depth = study.depth
+    every = (Socket(*case) for case in product(RATES[depth], DAMPING, CLUSTER[depth], COHERENCE[depth]))
+    return [case for case in every if case.cluster or case.coherence]
 
-    def found(cluster: float, coherence: float) -> FalseCollisions:
-        distances = {"cluster_distance": 1e-3 * cluster, "coherence_distance": 1e-3 * coherence}
-        return count_false(socket(distances | {"damping": damping}, rate), simulate)
 
-    plain = found(0.0, 0.0)
-    for cluster in CLUSTER[study.depth]:
-        for coherence in COHERENCE[study.depth]:
-            if cluster or coherence:
-                head = {"cluster_distance": cluster, "coherence_distance": coherence, "damping": damping}
-                yield head | {"rate": rate} | _row(plain, found(cluster, coherence), coherence, rate)
+def draw(study: Study, region: Region) -> list[Socket]:
+    """Fresh sockets: each condition between its ends."""
+    rng, depth = np.random.default_rng(study.seed), study.depth
+    ends = (region.ends("rate", RATES[depth]), region.ends("damping", DAMPING),
+            region.ends("cluster_distance", CLUSTER[depth]), region.ends("coherence_distance", COHERENCE[depth]))
+    return [Socket(*(float(f"{rng.uniform(*each):.4g}") for each in ends)) for _ in range(FRESH)]
+
+
+def trials(study: Study, case: Socket) -> Iterator[dict[str, Any]]:
+    """The ball with these filters against the ball without any."""
+    plain, filtered = (_found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case))
+    yield {"cluster_distance": case.cluster, "coherence_distance": case.coherence, "damping": case.damping,
+           "rate": case.rate} | _row(plain, filtered, case.coherence, case.rate)  # fmt: skip
+
+
+def _found(study: Study, case: Socket) -> FalseCollisions:
+    distances = {"cluster_distance": 1e-3 * case.cluster, "coherence_distance": 1e-3 * case.coherence}
+    scene = socket(distances | {"damping": case.damping}, case.rate)
+    return study.once(("socket", case), lambda: count_false(scene, lambda scene: study.run(scene, "IAPB", "full")))
 
 
 def _row(plain: FalseCollisions, filtered: FalseCollisions, coherence: float, rate: float) -> dict[str, Any]:
@@ -121,9 +138,11 @@ CLAIM = Claim(
     quantity="Collisions after the first contact of a ball that rolls in a faceted socket: in the round one that the "
     "facets stand for there are none.",
     tolerance="None is left. Trials whose coherence distance is below speed × step, as the paper asks, cannot tell.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=cases,
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("cluster_distance", "coherence_distance"),
-    map_panels="damping",
+    draw=draw,
+    axes=("cluster_distance", "coherence_distance", "damping"),
 )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
-from verification.finding import Column, Row, Table, table_of
+from verification.finding import Column, Row, Table
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -26,28 +27,28 @@ ROUNDING = 1e-11  # of the turnover: the sums of 4000 steps, each rounded to 2e-
 _STEPS = 2000
 
 
-def measure(study: Study) -> Table:
+def cases(study: Study) -> list[tuple[float, ...]]:
     """The motion that a wall feeds most (see `hand_port.quickest_motion`), against walls on both sides of the bound."""
-    cases = (
+    return [
         (rate, stiffness, device, share)
         for rate in (512.0, 1000.0) for stiffness in STIFFNESSES for device in DEVICE_DAMPINGS
         for share in (DAMPINGS if device > 1.0 else (0.0, 1.0))
-    )  # fmt: skip
-    return table_of(COLUMNS, study.each(cases, lambda case: [_trial(*case)]))
+    ]  # fmt: skip
 
 
-def _trial(rate: float, K: float, device: float, share: float) -> dict[str, Any]:
-    """`share` is of b − KT/2; where that is negative no B is allowed, and it is of KT/2."""
+def trials(study: Study, case: tuple[float, ...]) -> Iterator[dict[str, Any]]:
+    """One wall; its damping is a share of b − KT/2, or of KT/2 where that is negative and no damping is allowed."""
     from verification.laws.engine_laws.hand_port import leak, ours, quickest_motion
 
+    rate, K, device, share = case
     half = 0.5 * K / rate
     b = device * half
     B = share * (b - half if b > half else half)
-    case = quickest_motion(K, B, b, 1.0 / rate, _STEPS)
-    turnover = (b + half + B) * float(((case.readings[1:] - case.readings[:-1]) ** 2).sum()) * rate
-    return {
+    motion = quickest_motion(K, B, b, 1.0 / rate, _STEPS)
+    turnover = (b + half + B) * float(((motion.readings[1:] - motion.readings[:-1]) ** 2).sum()) * rate
+    yield {
         "rate": rate, "stiffness": K, "device damping": device, "virtual damping": share if b > half else None,
-        "energy from the wall": leak(case, ours), "wall's turnover": turnover,
+        "energy from the wall": leak(motion, ours), "wall's turnover": turnover,
     }  # fmt: skip
 
 
@@ -79,8 +80,10 @@ CLAIM = Claim(
     quantity="Energy that the hand draws from the engine's penalty (5), read every T and held, by the motion that "
     "draws most: forth and back at half the sampling rate, well inside the wall.",
     tolerance="1e-11 of the energy turned over: the rounding of the sums.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=cases,
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("device damping", "stiffness"),
+    axes=("device damping", "stiffness"),
 )

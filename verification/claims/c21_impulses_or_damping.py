@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from verification.claims.claim import Claim
-from verification.finding import Column, Row, Table, table_of
+from verification.finding import Column, Region, Row, Table
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -15,8 +16,10 @@ if TYPE_CHECKING:
 
 SAME, EQUAL_GAIN, BEST = "the same wall without", "sustained damping of equal gain", "the best larger damping"
 
+FRESH = 5  # walls of each loop that confirm a region
+
 COLUMNS = (
-    Column("against", condition=True, part=True),
+    Column("against", part=True),
     Column("rate", "Hz", condition=True),
     Column("delay", "samples", condition=True),
     Column("device damping", "N s/m", condition=True),
@@ -27,33 +30,48 @@ COLUMNS = (
 )
 
 
-def measure(study: Study) -> Table:
-    """Each loop and stiffness: impulses at the paper's damping against three penalties."""
+def cases(study: Study) -> list[tuple[StabilityMap, StabilityMap]]:
+    """Each loop: impulses at the paper's damping, and penalties."""
     from verification.stability.maps import stability_maps
 
     maps = stability_maps(study.depth)
-    pairs = zip(maps[::2], maps[1::2], strict=True)  # the two laws of a loop follow each other
-    return table_of(COLUMNS, (record for penalty, impulses in pairs for record in _trials(penalty, impulses)))
+    return list(zip(maps[::2], maps[1::2], strict=True))  # the two laws of a loop follow each other
 
 
-def _trials(penalty: StabilityMap, impulses: StabilityMap) -> list[dict[str, Any]]:
+def draw(study: Study, region: Region) -> list[tuple[StabilityMap, StabilityMap]]:
+    """Fresh walls inside a region, for every loop: stiffnesses drawn by decades."""
+    from verification.stability.maps import StabilityMap, grid, loops, walls
+    from verification.stability.sampled_wall import LAWS, touch_walls
+
+    stiffness, damping = grid(study.depth)
+    low, high = region.ends("stiffness", stiffness.tolist())
+    rng, found = np.random.default_rng(study.seed), []
+    for loop in loops():
+        fresh = np.array([float(f"{low * (high / low) ** share:.4g}") for share in rng.random(FRESH)])
+        K, B = walls(fresh, damping)
+        penalty, impulses = (StabilityMap(loop, law, fresh, damping, touch_walls(loop, K, B, law)) for law in LAWS)
+        found.append((penalty, impulses))
+    return found
+
+
+def trials(study: Study, case: tuple[StabilityMap, StabilityMap]) -> Iterator[dict[str, Any]]:
+    """The walls of one loop: impulses at the paper's damping against three penalties."""
     from verification.stability.maps import PAPER_DAMPING
 
+    penalty, impulses = case
     loop, raised = penalty.loop, penalty.damping[penalty.damping >= PAPER_DAMPING]
     times = np.array([penalty.settling(damping) for damping in raised])
     best, ours = times.argmin(axis=0), impulses.settling(PAPER_DAMPING)
     gain, sustained = _equal_gain(penalty)
-    records = []
     for i, K in enumerate(penalty.stiffness):
         rivals = {SAME: (times[0, i], PAPER_DAMPING), EQUAL_GAIN: (sustained[i], gain),
                   BEST: (times[best[i], i], raised[best[i]])}  # fmt: skip
         for against, (theirs, damping) in rivals.items():
-            records.append({
+            yield {
                 "against": against, "rate": loop.rate, "delay": loop.delay, "device damping": loop.device_damping,
                 "stiffness": float(K), "impulses settle after": float(ours[i]), "penalty settles after": float(theirs),
                 "at a damping of": float(damping),
-            })  # fmt: skip
-    return records
+            }  # fmt: skip
 
 
 def _equal_gain(penalty: StabilityMap) -> tuple[float, np.ndarray]:
@@ -91,9 +109,11 @@ CLAIM = Claim(
     "impulses at the paper's damping against penalties at the same damping, at the one whose force on touching is the "
     "impulse's, (1 + e) m/T, and at the best of all larger ones, chosen afterwards for each wall.",
     tolerance="None: the smaller time wins; walls that neither holds cannot tell.",
-    measure=measure,
+    columns=COLUMNS,
+    cases=cases,
+    trials=trials,
     holds=holds,
     finding=finding,
-    map_axes=("stiffness", "rate"),
-    map_panels="against",
+    draw=draw,
+    axes=("stiffness", "rate", "against"),
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.conditions import Condition, columns
+from verification.claims.conditions import START_COLUMNS, Condition
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, largest_distance, root_mean_square
 from verification.scenes.trace import COORDINATES
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from verification.claims.study import Study
 
 COLUMNS = (
-    *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
+    *START_COLUMNS,
     Column("coordinate", part=True),
     Column("IAPB"),
     Column("PB"),
@@ -26,6 +26,8 @@ COLUMNS = (
     Column("CBuc, largest"),
 )
 
+# Fresh starts that confirm a region where the rigid worlds, a second each, are asked; else.
+FEW, MANY = 12, 30
 # Distances below this [m, rad] are nothing that a hand or a figure could tell apart (a tenth of a micrometre): a
 # coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat, cannot tell.
 INDISTINGUISHABLE = 1e-7

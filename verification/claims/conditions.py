@@ -6,13 +6,14 @@ are from the two when the hand begins to push. Then come friction, stiffness and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from iapb.scene import Scene
-from verification.finding import Column
+from verification.finding import Column, Region
 from verification.scenes.trace import HALF_SIZE
 
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
@@ -105,6 +106,25 @@ def limited_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
 
+def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) -> list[Condition]:
+    """Return conditions drawn at random inside a region, each of them between the ends of what was tested.
+
+    All conditions vary at once, the approach velocity by decades. Four digits are kept, so that they repeat anywhere.
+    """
+    rng = np.random.default_rng([seed, count])
+    found = []
+    for _ in range(count):
+        values = {}
+        for name in UNITS:
+            low, high = region.ends(name, [getattr(condition, name) for condition in tested])
+            share = rng.random()
+            by_decades = name == "approach_velocity"
+            value = low * (high / low) ** share if by_decades else low + share * (high - low)
+            values[name] = float(f"{value:.4g}")
+        found.append(Condition(**values))
+    return found
+
+
 def wall_conditions() -> tuple[Condition, ...]:
     """Stiffness and damping of the walls, at two tilts (C17)."""
     return tuple(
@@ -122,6 +142,9 @@ UNITS = {
 def columns(*names: str) -> tuple[Column, ...]:
     """Return the condition columns of these names."""
     return tuple(Column(name, UNITS[name], condition=True) for name in names)
+
+
+START_COLUMNS = columns("tilt", "clearance", "travel", "friction", "approach_velocity")
 
 
 def describe(condition: Condition) -> dict[str, Any]:

@@ -8,24 +8,24 @@ Nothing is written here; whoever wants the runs kept passes a `run` that keeps t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.claims.claim import ClaimResult
 from verification.claims.conditions import (
     Condition,
     describe,
+    drawn,
     limited_conditions,
     start_conditions,
     wall_conditions,
 )
-from verification.finding import Failure, attempt, of_each
+from verification.finding import Failure, Finding, Region, attempt, check_depth, of_each, with_failures
 from verification.scenes.trace import Trace, trace_of
 
 Case = TypeVar("Case")
@@ -33,7 +33,6 @@ Result = TypeVar("Result")
 Runner = Callable[[Scene, str, str], Run]
 Asked = Callable[[Scene, str, str], None]
 
-DEPTHS = ("quick", "full")
 SEED = 20050601  # of the random instances; the month the paper appeared
 
 
@@ -61,11 +60,11 @@ class Study:
     asked: Asked | None = None
     failures: list[Failure] | None = None
     _traces: dict[tuple[Any, ...], Trace] = field(default_factory=dict, repr=False)
+    _results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
     _scenes: dict[Any, Scene] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        if self.depth not in DEPTHS:
-            raise ArgumentError("depth", self.depth, one_of(self.depth, DEPTHS))
+        check_depth(self.depth)
 
     def scene(self, name: str) -> Scene:
         """A scene that comes with the project."""
@@ -83,6 +82,10 @@ class Study:
         """The starting conditions of the peg at this depth, with limits of the device."""
         return limited_conditions(self.depth)
 
+    def fresh(self, tested: Sequence[Condition], region: Region, count: int) -> list[Condition]:
+        """Conditions drawn inside a region, between the ends of those tested."""
+        return drawn(tested, region, self.seed, count)
+
     def trace(self, condition: Condition, world: str, rendering: str = "full") -> Trace:
         """The peg under a condition in a world, run once for all conditions that this world cannot tell apart."""
         seen = condition.seen_by(world, rendering)
@@ -93,6 +96,12 @@ class Study:
             run = self.run(self.place(seen), world, rendering)
             self._traces[key] = trace_of(run)
         return self._traces[key]
+
+    def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
+        """What `compute` returns, computed once for each key."""
+        if key not in self._results:
+            self._results[key] = compute()
+        return cast(Result, self._results[key])
 
     def place(self, condition: Condition) -> Scene:
         """The peg scene under a condition."""
@@ -116,8 +125,8 @@ def check_claims(
     ids: Sequence[str] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     asked: Asked | None = None,
-) -> tuple[ClaimResult, ...]:
-    """Check the paper's claims and return one record each; what raises is among the failures of its claim.
+) -> tuple[Finding, ...]:
+    """Check the paper's claims and return one finding each; what raises is among the failures of its claim.
 
     Parameters
     ----------
@@ -145,7 +154,7 @@ def check_claims(
         failures: list[Failure] = []
         study.failures = failures
         result = attempt(name, partial(CLAIMS[name].check, study), failures) or CLAIMS[name].not_computed()
-        results.append(replace(result, failures=tuple(failures)))
+        results.append(with_failures(result, failures))
     if progress is not None:
         progress(len(chosen), len(chosen), "")
     return tuple(results)

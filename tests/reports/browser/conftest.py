@@ -19,9 +19,9 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.pages.records import Claim, CrossCheck, Evidence, Verdict
+from reports.pages.records import CrossCheck, Evidence, Verdict
 from reports.report import build_report
-from verification.finding import LIMITED, REPRODUCED, Part, finding_of, titled
+from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
@@ -103,7 +103,8 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     return Evidence(
         inputs={**runs, "arm_energies": arm_energies()},
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),
-        claims=(Claim("C01", "energy never rises", "Theorem 1", LIMITED, "half: $\\frac{1}{2}$", numbers=table),),
+        claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
+                           (Part("p.", MIXED, "as printed"),), {"C01": table}),),
         cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         topics=(finding_of("scene-ledger", "The scenes", "Asked.", "", (Part("It holds.", REPRODUCED),),
                            {"wide": table}),),

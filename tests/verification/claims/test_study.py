@@ -51,8 +51,8 @@ def test_rigid_worlds_do_not_see_friction_or_penalties():
 
 
 def test_worlds_under_the_wrong_name_are_found_out(few):
-    right = {result.id: result for result in check_claims(ids=["C14", "C15"])}
-    wrong = {result.id: result for result in check_claims(run=swapped, ids=["C14", "C15", "C16"])}
+    right = {result.key: result for result in check_claims(ids=["C14", "C15"])}
+    wrong = {result.key: result for result in check_claims(run=swapped, ids=["C14", "C15", "C16"])}
     assert {result.verdict for result in right.values()} == {REPRODUCED}
     assert (wrong["C14"].verdict, wrong["C15"].verdict) == (REFUTED, REFUTED)
     assert wrong["C16"].verdict == NOT_TESTABLE  # a world without impulses reaches no limit

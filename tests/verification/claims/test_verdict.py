@@ -1,17 +1,28 @@
-"""The rule that turns trials into a verdict, and the words about them."""
+"""The rule that turns trials into a verdict, the search for regions, and the words about them."""
 
+import numpy as np
 import pytest
 
-from verification.claims.claim import Claim, Part, overall
+from verification.claims.claim import Claim
 from verification.finding import (
+    LEAST_CONFIRMING,
     MIXED,
+    NOT_COMPUTED,
     NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
+    WHERE,
     Column,
+    Part,
+    judge_part,
+    search_region,
     table_of,
+    verdict_of,
     verdict_of_trials,
 )
+
+COLUMNS = (Column("part", part=True), Column("tilt", "rad", condition=True), Column("error"))
+GRID = (Column("tilt", "rad", condition=True), Column("width", "m", condition=True))
 
 
 @pytest.mark.parametrize(
@@ -33,22 +44,23 @@ def test_verdict_follows_from_the_trials(holds, verdict):
 @pytest.mark.parametrize(
     ("verdicts", "verdict"),
     [
-        ([REPRODUCED, REPRODUCED, NOT_TESTABLE], REPRODUCED),
-        ([REPRODUCED, REFUTED], MIXED),
-        ([MIXED, REPRODUCED], MIXED),
-        ([REFUTED, REFUTED], REFUTED),
-        ([NOT_TESTABLE], NOT_TESTABLE),
+        ([REPRODUCED] * 2, REPRODUCED),
+        ([REPRODUCED, WHERE], WHERE),
+        ([REPRODUCED, NOT_TESTABLE], NOT_TESTABLE),
+        ([WHERE, NOT_COMPUTED], NOT_COMPUTED),
+        ([REPRODUCED] * 1000 + [REFUTED], REFUTED),
+        ([NOT_COMPUTED, MIXED], MIXED),
+        ([], NOT_COMPUTED),
     ],
 )
-def test_a_claim_is_refuted_only_where_no_part_of_it_stands(verdicts, verdict):
-    assert overall([Part("", one, 0, 0) for one in verdicts]) == verdict
+def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
+    assert verdict_of(Part("", one) for one in verdicts) == verdict
 
 
-COLUMNS = (Column("part", part=True), Column("tilt", "rad", condition=True), Column("error"))
-
-
-def claim():
-    return Claim("C99", "", "", "", "", lambda study: None, lambda row: row["error"] < 1.0, lambda table: "")
+def claim(**options):
+    words = dict.fromkeys(("id", "statement", "place", "quantity", "tolerance"), "C99")
+    functions = {"holds": lambda row: row["error"] < 1.0, "finding": lambda table: "Found."}
+    return Claim(**words, **functions, **{"columns": COLUMNS, "cases": None, "trials": None} | options)
 
 
 def concluded(*trials):
@@ -56,18 +68,105 @@ def concluded(*trials):
     return claim().conclude(claim().judge(table))
 
 
+def test_a_claim_with_one_refuted_part_among_a_thousand_is_not_reproduced():
+    true = [(f"part {n}", 0.0, 0.5) for n in range(1000)]
+    found = concluded(*true, ("one", 0.0, 2.0), ("one", 0.3, 2.0))
+    assert found.verdict == REFUTED
+    assert [part.name for part in found.parts if part.verdict == REFUTED] == ["one"]
+    assert concluded(*true).verdict == REPRODUCED
+
+
 def test_failures_are_told_apart_by_part_with_their_conditions():
-    result = concluded(("x", 0.0, 0.5), ("x", 0.3, 2.0), ("y", 0.0, 0.5), ("y", 0.3, 0.5))
-    assert result.verdict == MIXED
-    assert result.fails == "x: in 1 of 2 trials, with tilt 0.3 rad"
-    assert result.conditions == "tilt 0, 0.3 rad"
-    assert (result.held, result.decided) == (3, 4)
-    assert result.parts == (Part("x", MIXED, 1, 2), Part("y", REPRODUCED, 2, 2))
+    found = concluded(("x", 0.0, 0.5), ("x", 0.3, 2.0), ("y", 0.0, 0.5), ("y", 0.3, 0.5))
+    x, y = found.parts
+    assert (found.verdict, x.verdict, y.verdict) == (MIXED, MIXED, REPRODUCED)
+    assert x.fails == "in 1 of 2 trials, with tilt 0.3 rad" and y.fails == ""
+    assert found.details["conditions"] == "tilt 0, 0.3 rad"
+    assert (x.held, x.decided, y.held, y.decided) == (1, 2, 2, 2)
 
 
 def test_a_part_that_never_holds_says_so():
-    assert concluded(("x", 0.0, 2.0), ("x", 0.3, 2.0), ("y", 0.0, 0.0)).fails == "x: in all 2 trials"
+    x, _ = concluded(("x", 0.0, 2.0), ("x", 0.3, 2.0), ("y", 0.0, 0.0)).parts
+    assert (x.verdict, x.fails) == (REFUTED, "in all 2 trials")
 
 
-def test_nothing_is_said_about_failures_where_there_are_none():
-    assert concluded(("x", 0.0, 0.5)).fails == ""
+def test_trials_that_cannot_tell_are_counted_apart():
+    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * 3, holds=(True, None, None)))
+    assert (part.verdict, part.held, part.decided, part.unknown) == (REPRODUCED, 1, 1, 2)
+    assert part.sentence == "holds in 1 of 1 trials; 2 of 3 cannot tell."
+
+
+def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
+    """The outcomes on a grid of 13 tilts and some widths."""
+    rows = [{"tilt": n / 40, "width": width} for n in range(13) for width in widths]
+    return table_of(GRID, rows, holds=tuple(holds(row) for row in rows))
+
+
+def drawn_by(holds, count=20):
+    """Fresh trials: `count` rows inside a region."""
+
+    def draw(region):
+        rng = np.random.default_rng(5)
+        tilt, width = region.ends("tilt", (0.0, 0.3)), region.ends("width", (1.0, 4.0))
+        rows = [{"tilt": rng.uniform(*tilt), "width": rng.uniform(*width)} for _ in range(count)]
+        assert all(region.contains(row) for row in rows)
+        return table_of(GRID, rows, holds=tuple(holds(row) for row in rows))
+
+    return draw
+
+
+def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
+    def holds(row):
+        return row["tilt"] <= 0.2
+
+    part = judge_part("x", trials(holds), drawn_by(holds))
+    assert part.outcome == "reproduced where tilt <= 0.2 rad"
+    assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
+    assert part.region.searched + part.region.others == part.held
+    assert "67% of the tested range" in part.sentence
+
+
+def test_a_region_may_bound_two_conditions():
+    region = search_region(trials(lambda row: row["tilt"] >= 0.1 and 2.0 <= row["width"] <= 3.0))
+    assert str(region) == "tilt >= 0.1 rad and 2 <= width <= 3 m"
+
+
+def test_a_second_condition_must_pay():
+    region = search_region(trials(lambda row: row["tilt"] <= 0.15 or (row["tilt"] <= 0.2 and row["width"] == 1.0)))
+    assert str(region) == "tilt <= 0.15 rad"
+
+
+def test_fresh_trials_that_fail_refute_a_region_that_the_grid_holds():
+    table = trials(lambda row: row["tilt"] <= 0.2)
+    part = judge_part("x", table, drawn_by(lambda row: row["tilt"] <= 0.1))
+    assert (part.verdict, part.region) == (MIXED, None)
+    assert "fresh trials" in part.sentence
+
+
+@pytest.mark.parametrize("count", [LEAST_CONFIRMING - 1, LEAST_CONFIRMING])
+def test_too_few_fresh_trials_confirm_nothing(count):
+    def holds(row):
+        return row["tilt"] <= 0.2
+
+    part = judge_part("x", trials(holds), drawn_by(holds, count))
+    assert (part.verdict == WHERE) == (count >= LEAST_CONFIRMING)
+
+
+def test_without_fresh_trials_the_other_half_must_confirm():
+    small = trials(lambda row: row["tilt"] <= 0.2, widths=(1.0,))
+    assert judge_part("x", small).verdict == MIXED
+    assert judge_part("x", trials(lambda row: row["tilt"] <= 0.2)).verdict == WHERE
+
+
+@pytest.mark.parametrize("share", [0.55, 0.75, 0.85])
+def test_a_region_of_random_outcomes_is_not_confirmed(share):
+    found = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        outcomes = lambda row, rng=rng: bool(rng.random() < share)  # noqa: E731
+        found += judge_part("x", trials(outcomes), drawn_by(outcomes)).verdict == WHERE
+    assert found <= 5  # 0.85 ** 20 = 4 %
+
+
+def test_a_part_that_fails_in_more_than_half_is_refuted_whatever_its_region():
+    assert judge_part("x", trials(lambda row: row["tilt"] <= 0.1)).verdict == REFUTED
