@@ -1,29 +1,40 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
-The file's name carries a hash of what determines the records: the stage's inputs, the sources of the engine, the
-references and the verification, the scenes, and what else the stage says that it depends on. So a changed line of
-theirs makes the stage run again, a change of the report not. Beside the records stand the runs they were made from.
+A record's tables are typed columns of that file, its words a JSON text without their rows. The file's name carries a
+hash of what determines the records: the stage's inputs, the sources of the engine, the references and the verification,
+the scenes, and what else the stage says that it depends on. So a changed line of theirs makes the stage run again, a
+change of the report not. Beside the records stand the runs they were made from.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reports.evidence.tables import numbers_tables
 from reports.provenance import collect_provenance
 from reports.runner import Runner
 from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
-from reports.store.tables import Column, Table, read_tables, write_tables
+from reports.store.tables import (
+    Column,
+    Table,
+    columns_of,
+    finding_table,
+    read_tables,
+    safe_name,
+    write_tables,
+)
 from reports.uses import UsedRun, add_use
+from verification import finding
 from verification.finding import Failure
 
 _RECORDS, _RUNS = "records", "runs used"
+_LAYOUT = 2  # of the files: 1 had the rows of tables in the JSON as well
 
 
 class Stage:
@@ -47,7 +58,8 @@ class Stage:
     def __init__(
         self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any], depends: Mapping[str, str] | None = None
     ) -> None:
-        given = {"stage": name, "inputs": inputs, "code": evidence_version(), "depends": depends or {}}
+        given = {"stage": name, "layout": _LAYOUT, "inputs": inputs, "code": evidence_version(),
+                 "depends": depends or {}}  # fmt: skip
         self.key = hash_of(given)
         self.name = name
         self.path = folder / f"{name}-{self.key[:16]}.h5"
@@ -66,8 +78,9 @@ class Stage:
         if self.path.is_file():
             return self._read(adapter, runner)
         records = self._computed(compute, runner)
-        text = json.dumps(plain_records(records), ensure_ascii=False)  # writes NaN and Infinity, and reads them
-        read_back = adapter.validate_python(json.loads(text))  # what is no such record is not written
+        tables: dict[str, Table] = {}
+        text = json.dumps(plain_records(records, tables), ensure_ascii=False)  # writes NaN and Infinity, and reads them
+        read_back = adapter.validate_python(_whole(json.loads(text), tables))  # what is no such record is not written
         self.failures += getattr(records, "failures", ())
         incomplete = self.path.with_name(f"{self.path.stem}-incomplete.h5")
         incomplete.unlink(missing_ok=True)
@@ -75,7 +88,7 @@ class Stage:
             self.path = incomplete
         mark_store(self.path.parent)
         runs = (self._runs_table(),) if self.runs else ()
-        write_tables(self.path, (self._records_table(text), *numbers_tables(records), *runs),
+        write_tables(self.path, (self._records_table(text), *(one for one in tables.values() if one.columns), *runs),
                      collect_provenance() | {SOURCES: evidence_version()})
         return read_back
 
@@ -93,14 +106,14 @@ class Stage:
         if runner is not None:
             for run in self.runs.values():
                 add_use(runner.used, run)
-        return adapter.validate_python(json.loads(tables[_RECORDS]["json"][0]))
+        return adapter.validate_python(_whole(json.loads(tables[_RECORDS]["json"][0]), tables))
 
     def _records_table(self, text: str) -> Table:
-        column = Column("json", (text,), "1", "the records as JSON")
+        column = Column("json", (text,), "1", "the records as JSON, without the rows of their tables")
         return Table(_RECORDS, (column,), f"Records of the stage {self.name}", tuple(self.runs), "iapb reproduce")
 
     def _runs_table(self) -> Table:
-        rows = [plain_records(run) for run in self.runs.values()]
+        rows = [plain_records(run, {}) for run in self.runs.values()]
         texts = [Column(name, tuple(row[name] for row in rows), "1", meaning) for name, meaning in _RUN_TEXTS.items()]
         users = Column("used_by", tuple("\n".join(row["used_by"]) for row in rows), "1", "what used it, a line each")
         size = Column("size", np.array([row["size"] for row in rows], np.int64), "byte", "size of the file")
@@ -119,14 +132,28 @@ def _runs_of(table: Table) -> Iterator[UsedRun]:
         yield UsedRun(**texts, size=int(table["size"][row]), used_by=tuple(str(users).split("\n")) if users else ())
 
 
-def plain_records(records: Any) -> Any:
-    """Records as plain values, numpy's included."""
-    from dataclasses import fields, is_dataclass
-
+def plain_records(records: Any, tables: dict[str, Table], name: str = "table") -> Any:
+    """Return records as plain values, numpy's included; `tables` receives their tables, each named after its holder."""
+    if isinstance(records, finding.Table):
+        label, count = safe_name(name), 2
+        while label in (*tables, _RECORDS, _RUNS):
+            label, count = f"{safe_name(name)}_{count}", count + 1
+        tables[label], words = columns_of(label, records)
+        return words
     if is_dataclass(records) and not isinstance(records, type):
-        return {field.name: plain_records(getattr(records, field.name)) for field in fields(records)}
+        own = str(getattr(records, "id", None) or getattr(records, "key", None) or name)
+        return {field.name: plain_records(getattr(records, field.name), tables, own) for field in fields(records)}
     if isinstance(records, Mapping):
-        return {str(name): plain_records(value) for name, value in records.items()}
+        return {str(key): plain_records(value, tables, str(key)) for key, value in records.items()}
     if isinstance(records, list | tuple):
-        return [plain_records(value) for value in records]
+        return [plain_records(value, tables, name) for value in records]
     return plain(records)
+
+
+def _whole(value: Any, tables: Mapping[str, Table]) -> Any:
+    """The plain records with their tables back in them."""
+    if isinstance(value, dict):
+        if {"table", "columns", "judged"} <= set(value):
+            return finding_table(tables.get(value["table"]), value)
+        return {name: _whole(item, tables) for name, item in value.items()}
+    return [_whole(item, tables) for item in value] if isinstance(value, list) else value

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from iapb.errors import RunFileError
+from iapb.errors import ArgumentError, RunFileError
 from iapb.scene import find_scene, load_scene
 from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records
-from reports.evidence.tables import numbers_table, numbers_tables
 from reports.runner import Runner
 from reports.store import keys
-from reports.store.tables import read_table
-from verification.finding import Table, titled
+from reports.store.tables import columns_of, finding_table, read_table, read_tables, write_table
+from verification.finding import VERDICTS, Column, Failure, Finding, Part, Table, finding_of, titled
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def test_numpy_values_become_plain_ones(tmp_path):
     stage = Stage(tmp_path, "one", Record, {})
     [computed, read] = [stage.get_or_compute(lambda: record) for _ in range(2)]
     assert same(computed, read) and type(read.value) is float and type(read.holds) is bool
-    assert plain_records({"a": (np.int64(1),)}) == {"a": [1]}
+    assert plain_records({"a": (np.int64(1),)}, {}) == {"a": [1]}
 
 
 def test_runs_are_remembered_beside_the_records(tmp_path):
@@ -135,18 +134,57 @@ def test_a_damaged_file_is_an_error_not_a_result(tmp_path):
         stage.get_or_compute(lambda: RECORDS[0])
 
 
-def test_tables_are_columns_with_units_and_missing_numbers_are_nan(tmp_path):
+def test_a_table_is_columns_with_units_and_no_rows_are_in_the_words(tmp_path):
     stage = Stage(tmp_path, "claims", tuple[Record, ...], {})
     stage.get_or_compute(lambda: RECORDS)
     columns = read_table(stage.path, "C01")
-    assert [column.name for column in columns.columns] == ["00 scene", "01 time_s", "02 gain", "03 holds"]
-    assert list(columns["00 scene"]) == ["peg", "arm"] and columns["01 time_s"].tolist() == [0.25, 1.5]
+    assert [column.name for column in columns.columns] == [
+        "00 scene", "01 time", "02 gain", "kind of 02 gain", "03 holds", "kind of 03 holds"]
+    assert list(columns["00 scene"]) == ["peg", "arm"] and columns["01 time"].tolist() == [0.25, 1.5]
     assert math.isnan(columns["02 gain"][0]) and columns["02 gain"][1] == 1e-16
     assert columns["03 holds"].tolist() == [1.0, 0.0]
-    units = [column.unit for column in numbers_table("C01", TABLE).columns]
-    assert units == ["1", "s", "1", "1"]
+    assert [column.unit for column in columns.columns][:2] == ["1", "s"]
+    [text] = read_table(stage.path, "records")["json"]
+    assert "arm" not in text and "of the peg" in text  # a cell, and the note
 
 
-def test_every_table_is_found_and_none_replaces_another():
-    records = (RECORDS[0], {"C01": TABLE, "part b": [TABLE, titled(("empty",), ())]}, RECORDS[1])
-    assert [table.name for table in numbers_tables(records)] == ["C01", "C01_2", "part_b"]
+ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
+       "", "é", "nan", "True", "None")  # fmt: skip
+CELLS = {
+    "floats": (1.5, math.nan, -math.inf), "with none": (1.5, None, math.nan), "whole": (1, 2**53, -3),
+    "whole with none": (None, 2, 3), "large": (2**53 + 1, 1.5, 2), "truths": (True, False, True),
+    "truths with none": (True, None, False), "texts": ("a", "", "ä/b"), "texts with none": ("a", None, ""),
+    "nothing": (None, None, None), "mixed": (1, 2.0, True), "all": (1.5, "1.5", 7),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("cells", [*CELLS.values(), ANY], ids=[*CELLS, "any"])
+def test_every_cell_comes_back_with_its_type(tmp_path, cells):
+    table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in cells))
+    stored, words = columns_of("t", table)
+    assert same(finding_table(read_table(write_table(tmp_path / "t.h5", stored)), words), table)
+
+
+def test_a_finding_comes_back_equal_in_every_field(tmp_path):
+    flags = (Column("n", "N s", "number", condition=True, part=True), Column("time", "s", timed=True),
+             Column("said", prose=True))  # fmt: skip
+    judged = Table(flags, ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")), (True, None, False), 3, "a note", True)
+    parts = (Part("s", VERDICTS[0], "p", 1, 2, "x", timed=True),)
+    made = finding_of("mechanics", "Title", "Asked?", "Answered.", parts,
+                      {"judged": judged, "empty": Table(flags), "bare": Table(())}, [Failure("c", "E", "why", "where")])
+    stage = Stage(tmp_path, "mechanics", Finding, {})
+    [computed, read] = [stage.get_or_compute(lambda: made) for _ in range(2)]
+    assert same(computed, read) and same(read.tables["judged"], judged) and read == made
+    assert stage.path.name.endswith("-incomplete.h5")  # it has a case that failed
+
+
+def test_a_cell_that_no_file_holds_is_refused():
+    with pytest.raises(ArgumentError, match="truth value"):
+        columns_of("t", titled(("x",), (([1],),)))
+
+
+def test_every_table_is_found_and_none_replaces_another(tmp_path):
+    records = ({"C01": TABLE, "part b": [TABLE, titled(("empty",), ())], "C01 again": [TABLE, TABLE]},)
+    stage = Stage(tmp_path, "many", tuple[dict[str, Table | list[Table]], ...], {})
+    assert same(stage.get_or_compute(lambda: records), records)
+    assert {"C01", "part_b", "part_b_2", "C01_again", "C01_again_2"} < set(read_tables(stage.path))
