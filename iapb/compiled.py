@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import struct
+import warnings
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
@@ -63,7 +64,12 @@ def kernel(function: Callable[..., Any]) -> Any:
     if config.DISABLE_JIT:
         return function
     compiled = compile_as_whole(function, fastmath=False, _nrt=False)
-    compiled.enable_caching()
+    try:
+        compiled.enable_caching()
+    except RuntimeError:  # no folder for it can be written, as where others installed the package
+        warnings.warn("kernels are compiled anew in each process, half a minute: neither the package's folder nor the "
+                      "user's cache can be written; NUMBA_CACHE_DIR names one that can", stacklevel=1)  # fmt: skip
+        return compiled
     compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
     return compiled
 

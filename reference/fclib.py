@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.complementarity.problem import ImpactProblem
+from reference.hdf5 import leads_out
 
 Floats = NDArray[np.float64]
 
@@ -70,6 +71,8 @@ def read_fclib(path: Path | str) -> StoredProblem:
     path, h5py = Path(path), _h5py()
     try:
         with h5py.File(path, "r") as file:
+            if outside := leads_out(file):
+                raise DatasetError(path, f"{outside}: a problem file holds everything itself")
             kinds = [name for name in ("fclib_local", "fclib_global") if name in file]
             if not kinds:
                 raise DatasetError(path, "is HDF5 but holds neither fclib_local nor fclib_global")

@@ -10,7 +10,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from itertools import islice
@@ -95,8 +95,13 @@ def cluster(address: str) -> Scheduler:
 
     def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
         client = _client(address)
+        from distributed.comm import CommClosedError
+
         try:
             yield from _on_cluster(client, compute, parts)
+        except (CommClosedError, CancelledError) as error:
+            raise IapbError(f"the scheduler at {address} is gone; what was done is kept, and the same command goes on "
+                            "from there, with a scheduler that lives") from error
         finally:
             client.close()
 

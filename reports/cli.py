@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from functools import wraps
 from importlib import import_module
-from typing import Any
+from typing import Any, cast
 
 import typer
 
@@ -78,11 +80,52 @@ def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+# What a terminal obeys, and what turns the order of letters round; a tab and the end of a line are neither.
+_ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+_COLOUR = re.compile(r"(\x1b\[[0-9;]*m)")  # as rich prints it; it can do no harm but to the looks
+_BARS = re.compile(r"(\x1b\[(?:[0-9;]*m|[0-9]*[ABK]|\?25[hl])|\r)")
+
+
+class Harmless:
+    """A stream on which no text of a file can give the terminal orders: those are spelled out, as ``\\x1b``.
+
+    Parameters
+    ----------
+    stream : a stream of texts
+    kept : orders that pass where the stream is a terminal; it matches them as one group
+    """
+
+    def __init__(self, stream: Any, kept: re.Pattern[str]) -> None:
+        self._stream, self._kept = stream, kept
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text; return its length."""
+        parts = self._kept.split(text) if self._stream.isatty() else [text]
+        self._stream.write("".join(part if i % 2 else harmless(part) for i, part in enumerate(parts)))
+        return len(text)
+
+
+def harmless(text: str) -> str:
+    """Return a text with every order to a terminal spelled out."""
+    return _ORDERS.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
-    given = sys.argv[1:] if arguments is None else arguments
     if arguments is None:
         signal.signal(signal.SIGTERM, _end_politely)
+    out, err = cast(Any, Harmless(sys.stdout, _COLOUR)), cast(Any, Harmless(sys.stderr, _BARS))
+    with redirect_stdout(out), redirect_stderr(err):
+        status = _main(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        sys.exit(status)
+    return status
+
+
+def _main(given: list[str]) -> int:
     try:
         _refuse_empty(given)
         status = _app(given)(args=given, standalone_mode=False)
@@ -92,12 +135,10 @@ def main(arguments: list[str] | None = None) -> int:
     except (IapbError, OSError) as error:
         if _Options.debug:
             raise
-        print(f"iapb: {_sentence(error)}", file=sys.stderr)
+        print(f"iapb: {harmless(_sentence(error))}", file=sys.stderr)
         status = 1
     except Exception as error:
         status = _usage(error)
-    if arguments is None:
-        sys.exit(status or 0)
     return status or 0
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +27,14 @@ from reports.store.tables import TABLE_FORMAT, Column, Table, read_table, write_
 from verification.impacts import ImpactCase
 from verification.laws import bounds
 from verification.laws.bounds import LawResidual
-from verification.laws.campaign import Found, Subject, drawn, residuals
+from verification.laws.campaign import IMPACTS, PARTS, UNEQUAL, Found, Subject, drawn, residuals
 from verification.laws.counterexample import Struck, as_test
 from verification.laws.engine_laws import ENGINE_LAWS
 from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
 from verification.laws.trajectory_laws import judge_run
 
 ENGINE = "iapb:resolve_impact"
+BOUNDS = ("FACTORED", "KIT")  # tolerances, by their names in verification.laws.bounds
 _TABLE = "counterexample"
 
 
@@ -76,7 +77,8 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
     record = {**_origin(found, request), "law": found.law, "value": found.residual.value,
               "tolerance": found.residual.tolerance, "case": plain(asdict(found.case))}  # fmt: skip
     columns = (Column("json", (json.dumps(record),), "1", "law, tolerances and input as JSON"),)
-    return write_table(path, Table(_TABLE, columns, found.law, command=f"iapb verify --recheck {path.name}"))
+    command = recheck_command(Path(path.name), request.resolver)
+    return write_table(path, Table(_TABLE, columns, found.law, command=command))
 
 
 def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
@@ -104,8 +106,25 @@ def _write_fclib(path: Path, case: ImpactCase) -> None:
         path.unlink(missing_ok=True)
 
 
-def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
-    """Judge a counterexample again: an impact by its resolver, a run as recorded and as it comes out now."""
+def recheck_command(path: Path, resolver: str) -> str:
+    """Return the command that judges a counterexample of this resolver again."""
+    return f"iapb verify --recheck {path}" + ("" if resolver == ENGINE else " --allow-code")
+
+
+def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResidual]]:
+    """Judge a counterexample again: an impact by a resolver, a run as recorded and as it comes out now.
+
+    Parameters
+    ----------
+    path : of its file
+    allow_code : whether the resolver that the file names is imported and called. A file may name any module, so
+        without leave the engine's own judges, and the law's name says so.
+
+    Raises
+    ------
+    RunFileError
+        The file is absent, damaged, or no counterexample.
+    """
     if not path.is_file():
         raise RunFileError(f"{path}: no such file")
     try:
@@ -113,30 +132,33 @@ def recheck(path: Path) -> Iterator[tuple[str, LawResidual]]:
             pass
     except RunFileError:
         broken = read_broken_impact(path)
-        yield from _recheck_run(path) if broken is None else _recheck_impact(broken)
+        if broken is None:
+            yield from _recheck_run(path)
+        else:
+            yield _judged(path, broken.law, broken.found, broken.struck.case, allow_code)
         return
-    yield from _recheck_drawn(json.loads(read_table(path, _TABLE)["json"][0]))
+    record = json.loads(read_table(path, _TABLE)["json"][0])
+    yield _judged(path, str(record["law"]), record, None, allow_code)
 
 
-def _recheck_impact(broken: BrokenImpact) -> Iterator[tuple[str, LawResidual]]:
-    """The stored impact itself, by its resolver."""
-    yield _judged(broken.law, broken.found, broken.struck.case)
-
-
-def _recheck_drawn(record: dict[str, Any]) -> Iterator[tuple[str, LawResidual]]:
-    """What is no impact: the case that its part, seed and number draw."""
-    case = drawn(record["part"], record["index"], _subject(record))
-    yield _judged(record["law"], record, case)
-
-
-def _judged(law: str, origin: dict[str, Any], case: Any) -> tuple[str, LawResidual]:
+def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code: bool) -> tuple[str, LawResidual]:
+    """Judge a stored impact or, for None, the case that part, seed and number draw."""
+    try:
+        request = CampaignRequest(**origin["request"])
+        part, index, own = origin["part"], origin["index"], request.resolver == ENGINE or allow_code
+        if part not in PARTS or request.bounds not in BOUNDS:
+            raise ValueError(f"part {part!r}, bounds {request.bounds!r}")
+    except (TypeError, KeyError, ValueError) as error:
+        raise RunFileError(f"{path}: is no counterexample: {error}") from error
+    subject = (request if own else replace(request, resolver=ENGINE)).subject()
     with one_thread():  # as it was found
-        return law, residuals(origin["part"], case, _subject(origin))[0][law]
-
-
-def _subject(origin: dict[str, Any]) -> Subject:
-
-    return CampaignRequest(**origin["request"]).subject()
+        found = residuals(part, drawn(part, index, subject) if case is None else case, subject)[0]
+    if law not in found:
+        raise RunFileError(f"{path}: is no counterexample: no law {law!r} of {part}")
+    if own or part not in (IMPACTS, UNEQUAL):
+        return law, found[law]
+    return (f"{law} (by {ENGINE}; {request.resolver}, which the file names, is code that --allow-code runs)",
+            found[law])  # fmt: skip
 
 
 def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:

@@ -261,6 +261,8 @@ def parse_robot(path: Path) -> ElementTree.Element:
         The file cannot be read, is larger than MAX_BYTES, is no well-formed XML, or no URDF robot.
     """
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise ValueError("no regular file")  # a pipe would be waited for
         with path.open("rb") as file:
             text = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reports.commands.run import describe
+from reports.counterexamples import recheck_command
 from reports.store.impact import BrokenImpact, read_broken_impact
 from reports.store.runs import read_provenance, read_stored
 
@@ -66,7 +67,7 @@ def describe_impact(broken: BrokenImpact, file: Path) -> None:
     print(f"{case.contacts} rows on {case.coordinates} coordinates ({case.family or 'no family'}), in bare numbers.")
     origin = broken.found
     print(f"Found as case {origin['index']} of the part {origin['part']!r}, seed {origin['request']['seed']}. "
-          f"Judged again by: iapb verify --recheck {file}")
+          f"Judged again by: {recheck_command(file, origin['request']['resolver'])}")
     given = {"mass matrix M": case.mass_matrix, "contact Jacobian J": case.contact_jacobian,
              "velocity before": case.velocity, "restitution": case.given_restitution(),
              "velocity after": broken.struck.velocity_after}  # fmt: skip

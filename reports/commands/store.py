@@ -53,7 +53,7 @@ def store(
 
     repair and gc act in marked stores only, and there on files of iapb only.
     """
-    if not where.exists():
+    if not (where.is_file() or where.is_dir()):
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
     if where.is_file() and action in (Action.repair, Action.gc, Action.mark):
         raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")

@@ -13,7 +13,7 @@ from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
 from reports.commands.progress import stage_progress, to_log
 from reports.compiling import compiling_told
-from reports.counterexamples import ENGINE, CampaignRequest, recheck
+from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
 from verification.engines import SETTINGS, compare_engines, sentence, verdict
 from verification.engines.record import EngineRecord
@@ -39,6 +39,8 @@ def verify(
     workers: Annotated[int, typer.Option(min=1, max=512, help="Processes of --full.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the batches of --full.")] = Path("out/verify"),
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
+    allow_code: Annotated[bool, typer.Option(
+        "--allow-code", help="With --recheck: import and call the resolver that the file names.")] = False,
     simulator: Annotated[list[str] | None, typer.Option(
         help="Instead, an engine on the fixed scenes: mujoco, drake, ... or all; may be repeated.")] = None,
     scene: Annotated[list[str] | None, typer.Option(
@@ -51,7 +53,7 @@ def verify(
         verify_simulators(simulator, scene or ())
         return
     if recheck is not None:
-        passed = print_recheck(recheck)
+        passed = print_recheck(recheck, allow_code)
     elif full:
         passed = verify_full(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
     else:
@@ -92,7 +94,7 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
         print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law. Impacts and "
               "trajectories are runs, for iapb inspect FILE. Judged again by:")
     for path in found[:_SHOWN]:
-        print(f"  iapb verify --recheck {path}")
+        print(f"  {recheck_command(path, resolver)}")
     return kept
 
 
@@ -114,11 +116,11 @@ def count_in_words(count: LawCount) -> str:
     return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
 
 
-def print_recheck(path: Path) -> bool:
+def print_recheck(path: Path, allow_code: bool) -> bool:
     """Print every residual of a stored counterexample; return whether all laws are kept now."""
     kept = True
     with compiling_told(to_log):
-        judged = tuple(recheck(path))
+        judged = tuple(recheck(path, allow_code))
     for law, residual in judged:
         print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")
         kept = kept and residual.passed

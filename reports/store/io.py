@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
+from reference.hdf5 import leads_out
 from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 MARK_NAME = "iapb-store.json"
@@ -216,10 +217,13 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
 
     path = Path(path)
     if not path.is_file():
-        raise RunFileError(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
+        what = "a folder, not a file" if path.is_dir() else "no regular file" if path.exists() else "no such file"
+        raise RunFileError(f"{path}: {what}")
     check_seal(path)
     try:
         with h5py.File(path, "r") as file:
+            if outside := leads_out(file):
+                raise RunFileError(f"{path}: {outside}: a file of results holds everything itself")
             if expected_format is not None:
                 _check_format(file, path, expected_format)
             yield file

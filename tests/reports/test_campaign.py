@@ -16,6 +16,7 @@ from iapb.errors import RunFileError
 from reports.campaign import Campaign
 from reports.cli import main
 from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
+from reports.store.impact import read_broken_impact, write_broken_impact
 from reports.store.tables import read_table
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
@@ -60,10 +61,31 @@ def test_a_broken_law_leaves_files_that_still_show_it(tmp_path: Path, capsys: py
     campaign.run(BATCHES[:1], _silent)
     kept = [path for path in campaign.counterexamples() if "kinetic_energy" in path.name]
     assert kept and any(path.with_suffix(".hdf5").is_file() for path in kept)
-    [(law, residual)] = recheck(kept[0])
+    [(law, residual)] = recheck(kept[0], allow_code=True)
     assert law == "kinetic_energy" and not residual.passed
-    assert main(["verify", "--recheck", str(kept[0])]) == 1
+    assert main(["verify", "--recheck", str(kept[0]), "--allow-code"]) == 1
     assert "BROKEN kinetic_energy" in capsys.readouterr().out
+
+
+def test_a_file_that_names_a_module_does_not_run_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The attack: a counterexample that names a module of the working directory, which leaves a trace if imported."""
+    campaign = Campaign(tmp_path / "out", BROKEN)
+    campaign.run(BATCHES[:1], _silent)
+    broken = next(found for path in campaign.counterexamples() if (found := read_broken_impact(path)) is not None)
+    broken.found["request"]["resolver"] = "trap_of_theirs:resolver"
+    (tmp_path / "trap_of_theirs.py").write_text("from pathlib import Path\nPath('trace').touch()\nresolver = print\n")
+    monkeypatch.chdir(tmp_path)
+    write_broken_impact(Path("evil.h5"), broken)
+    assert main(["verify", "--recheck", "evil.h5"]) == 0  # the engine keeps the law
+    said = capsys.readouterr().out
+    assert "by iapb:resolve_impact; trap_of_theirs:resolver, which the file names" in said
+    assert not Path("trace").exists() and "trap_of_theirs" not in sys.modules
+    broken.found["request"]["bounds"] = "__loader__"
+    write_broken_impact(Path("evil.h5"), broken)
+    with pytest.raises(RunFileError, match="is no counterexample"):
+        list(recheck(Path("evil.h5")))
 
 
 def test_a_trajectory_is_kept_as_its_run(tmp_path: Path) -> None:

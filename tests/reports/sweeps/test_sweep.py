@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 
 from iapb import find_scene
 from iapb.errors import ArgumentError, IapbError
-from reports.batches import cluster, here, processes
+from reports.batches import cluster, do_missing, here, processes
 from reports.store.tables import read_table
 from reports.sweeps.study import Point, Study, study_from_text
 from reports.sweeps.sweep import (
@@ -93,6 +94,35 @@ def test_a_dask_cluster_gives_the_same(study: Study, undisturbed: SweepOutcome, 
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:
         outcome = run_sweep(study, SCENE, tmp_path, cluster(local.scheduler_address))
     assert outcome.content_hash == undisturbed.content_hash
+
+
+def test_a_scheduler_that_dies_is_told_in_one_sentence_and_what_was_done_is_kept(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    place = tmp_path / "scheduler.json"
+    tool, where = [sys.executable, "-m"], ["--scheduler-file", str(place), "--no-dashboard"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    master = subprocess.Popen([*tool, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *where],
+                              **quiet)  # type: ignore[call-overload]
+    worker = subprocess.Popen([*tool, "distributed.cli.dask_worker", *where, "--nthreads", "1", "--no-nanny"],
+                              **quiet)  # type: ignore[call-overload]
+    kept: list[float] = []
+
+    def keep(part: float, _: None) -> None:
+        kept.append(part)
+        master.kill()
+
+    try:
+        while not place.is_file():
+            time.sleep(0.05)
+        address = json.loads(place.read_text())["address"]
+        with pytest.raises(IapbError, match="the scheduler at tcp://127.0.0.1:.* is gone; what was done is kept"):
+            do_missing([0.2] * 50, time.sleep, keep, done=lambda part: False, scheduler=cluster(address),
+                       progress=lambda done, total: None)  # fmt: skip
+    finally:
+        for process in (master, worker):
+            process.kill()
+            process.wait()
+    assert 1 <= len(kept) < 50
 
 
 def test_an_address_where_nobody_answers_is_refused(study: Study, tmp_path: Path) -> None:
