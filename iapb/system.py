@@ -168,6 +168,7 @@ def make_world(system: System, law: Any) -> World:
         limit[slice(*system.tool_dofs)] = _force_limit(scene)
     switches = Switches(
         **{name: name in on for name in Switches._fields if name in EFFECT_NAMES},
+        pushing=law.impulses and law.pushing,
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
         contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions")),
@@ -208,7 +209,6 @@ def make_state(system: System) -> State:
     if cholesky(mass, lower):
         raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
     sliding, tangents = slides_in_impacts(system.scene), 2 if isinstance(system.scene, SpatialScene) else 1
-    pushing = sliding or len(system.restitutions) > 1
     vectors = {name: np.zeros(d) for name in (
         "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
         "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
@@ -222,7 +222,7 @@ def make_state(system: System) -> State:
         row_budget=np.array([d], np.int64), spreading=np.zeros(trees, np.bool_), start_q=np.zeros(nq),
         contact_impulse=np.zeros(rows), rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64),
         row_impulse=np.zeros(rows), row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
-        push_work=make_push_work(d * pushing, rows * pushing),
+        push_work=make_push_work(d, rows),
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents), impacts=_make_log(trees, d),
         **vectors, **squares,
     ))

@@ -7,6 +7,7 @@
 | PB | penalties | four-channel |
 | CBuc | rigid constraints | unilateral coupler |
 | IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
+| IAPB-push | impulses that only push (two LCPs), and penalties | four-channel |
 
 Restitution that differs between bodies needs no world of its own: IAPB does as the scene says.
 """
@@ -50,6 +51,9 @@ WORLDS: dict[str, Callable[[str], World]] = {
     "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
     "IAPB-friction": lambda rendering: World(
         "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
+    ),
+    "IAPB-push": lambda rendering: World(
+        "IAPB-push", ImpulseAugmented(rendering=rendering, pushing=True), "four-channel"
     ),
 }
 

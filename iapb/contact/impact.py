@@ -7,7 +7,7 @@ the row space of A. `factored` applies P through an orthonormal basis; `gram_pin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -90,7 +90,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
         Poisson's law by two LCPs (compression, then restitution; contacts only push), which is passive for
         all of them; equal values obey the scalar rule.
     method : ``factored`` (default, passive in floating point), ``gram_pinv`` (the paper's (20)-(21) to the
-        letter), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated).
+        letter), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated); ``poisson``:
+        contacts only push, where the others take every row as an equality (with one e in [0, 1], Newton's LCP).
     budget : at most this many rows are used, the most violated first (``factored`` only). Passive at any value.
     clamp : scale Δv so that energy cannot rise by rounding either. Default: on for ``factored``, ``damped``,
         ``svd`` and Poisson's law, off for the two ``gram`` methods.
@@ -117,6 +118,10 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     """
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)
+    if method == "poisson" and problem.unequal is None:
+        if problem.restitution < 0.0:
+            raise ArgumentError("restitution", problem.restitution, "a number in [0, 1] with method 'poisson'")
+        problem = replace(problem, unequal=np.full(problem.contacts, problem.restitution))
     _check_options(method, budget, rank_tolerance, problem)
     if clamp is not None and not isinstance(clamp, bool | np.bool_):
         raise ArgumentError("clamp", clamp, "True, False or None")
@@ -132,8 +137,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
 
 
 def _method(method: Any) -> tuple[Any, bool]:
-    if not isinstance(method, str) or method not in METHODS or method == "poisson":
-        raise ArgumentError("method", method, one_of(method, [name for name in METHODS if name != "poisson"]))
+    if not isinstance(method, str) or method not in METHODS:
+        raise ArgumentError("method", method, one_of(method, METHODS))
     return METHODS[method]
 
 

@@ -23,6 +23,7 @@ from iapb.run import COLLIDING, FREE, RESTING
 Floats = NDArray[np.float64]
 
 IMPULSE_AUGMENTED = "impulse-augmented penalty"
+PUSHING = "impulse-augmented penalty, contacts only push"
 WITH_IMPACT_FRICTION = "impulse-augmented penalty with impact friction"
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
@@ -120,23 +121,29 @@ class ImpulseAugmented(_EngineLaw):
         collision until the rest is rendered. Without limits in the scene all four are the same.
     friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and never with a gain
         of energy (`iapb.resolve_frictional_impact`). Default: no, as in the paper, which leaves it to the future.
+    pushing : whether contacts can only push: Poisson's law by two LCPs at every collision (`method="poisson"` of
+        `iapb.resolve_impact`), where (21) takes every row as an equality. Default: no, as in the paper.
     """
 
     rendering: str = "full"
     friction_in_impacts: bool = False
+    pushing: bool = False
     impulses = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rendering not in RENDERINGS:
             raise ArgumentError("rendering", self.rendering, one_of(self.rendering, RENDERINGS))
-        if not isinstance(self.friction_in_impacts, bool):
-            raise ArgumentError("friction_in_impacts", self.friction_in_impacts, "True or False")
+        for name in ("friction_in_impacts", "pushing"):
+            if not isinstance(getattr(self, name), bool):
+                raise ArgumentError(name, getattr(self, name), "True or False")
+        if self.friction_in_impacts and self.pushing:
+            raise ArgumentError("pushing", True, "False with friction_in_impacts, whose split is that of the equality")
 
     @property
     def name(self) -> str:
-        """The law, and whether friction acts in its impacts."""
-        return WITH_IMPACT_FRICTION if self.friction_in_impacts else IMPULSE_AUGMENTED
+        """The law, and whether friction acts in its impacts or contacts only push."""
+        return WITH_IMPACT_FRICTION if self.friction_in_impacts else PUSHING if self.pushing else IMPULSE_AUGMENTED
 
     @property
     def uses(self) -> frozenset[str]:
@@ -145,9 +152,10 @@ class ImpulseAugmented(_EngineLaw):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Integrator, rendering, and whether friction acts in impacts."""
-        return {"integrator": self.integrator, "rendering": self.rendering,
-                "friction_in_impacts": self.friction_in_impacts}
+        """Integrator, rendering, and whether friction acts in impacts; `pushing` where it is asked for."""
+        settings = {"integrator": self.integrator, "rendering": self.rendering,
+                    "friction_in_impacts": self.friction_in_impacts}
+        return settings | ({"pushing": True} if self.pushing else {})
 
 
 @dataclass(frozen=True)
@@ -156,7 +164,7 @@ class Penalty(_EngineLaw):
 
     name = "penalty"
     impulses = False
-    friction_in_impacts = False
+    friction_in_impacts = pushing = False
     rendering = "full"
     uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS})  # the record says which contacts are new
 
@@ -167,5 +175,7 @@ class Penalty(_EngineLaw):
 
 
 ENGINE_LAWS: dict[str, ContactLaw] = {
-    law.name: law for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty())
+    law.name: law for law in (
+        ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), ImpulseAugmented(pushing=True), Penalty(),
+    )
 }

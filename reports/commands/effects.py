@@ -18,8 +18,8 @@ from verification.cost.effects import effects_of, summary
 def effects(
     scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
     world: Annotated[str | None, typer.Option(
-        help="Decide for one world (ideal, IAPB, PB, CBuc, IAPB-friction); else an effect is on if some world needs "
-             "it.")] = None,
+        help="Decide for one world (ideal, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an effect is on if some "
+             "world needs it.")] = None,
     rendering: Annotated[str, typer.Option(help="full, saturate, scale or spread.")] = "full",
     measure: Annotated[bool, typer.Option(
         "--measure", help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "

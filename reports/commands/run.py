@@ -18,8 +18,8 @@ from reports.uses import parsed
 
 def run(
     scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
-    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); IAPB-friction: "
-                                            "with Coulomb friction in the impacts.")] = "IAPB",
+    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); IAPB-friction: with "
+                                            "Coulomb friction in impacts; IAPB-push: contacts only push.")] = "IAPB",
     rendering: Annotated[str, typer.Option(
         help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")] = "full",
     set_: Annotated[list[str] | None, typer.Option(

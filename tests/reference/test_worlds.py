@@ -17,9 +17,10 @@ PEG = load_scene(find_scene("peg_corner"))
 STEPS = 60
 
 COUPLINGS = {"ideal": "four-channel", "IAPB": "four-channel", "PB": "four-channel", "CBuc": "unilateral",
-             "IAPB-friction": "four-channel"}
+             "IAPB-friction": "four-channel", "IAPB-push": "four-channel"}
 LAWS = {"ideal": "rigid constraints", "IAPB": "impulse-augmented penalty", "PB": "penalty", "CBuc": "rigid constraints",
-        "IAPB-friction": "impulse-augmented penalty with impact friction"}
+        "IAPB-friction": "impulse-augmented penalty with impact friction",
+        "IAPB-push": "impulse-augmented penalty, contacts only push"}
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -38,6 +39,12 @@ def test_a_world_runs_as_its_parts_do(name):
     parts = simulate(PEG, world.law, world.coupling_in(PEG), steps=STEPS)
     assert run.world == name and run.complete
     assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
+
+
+def test_contacts_of_the_pushing_world_never_pull_and_those_of_iapb_do():
+    least = {name: run_world(PEG, name).contacts.impulse.min() for name in ("IAPB", "IAPB-push")}
+    assert least["IAPB"] < -1e-6 and least["IAPB-push"] >= 0.0
+    assert run_world(PEG, "IAPB-push").impacts.energy_lost.min() >= 0.0
 
 
 def test_a_scene_may_be_given_by_name_or_path():

@@ -191,8 +191,9 @@ def resolve_rows(world, state, size, count):
     """(20)-(21), or what the scene and the law ask for beyond; return (rank, clamp, share of friction, solved)."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
-    if world.switches.unequal_restitution:
+    if world.switches.unequal_restitution or world.switches.pushing:
         e, unequal = gather_restitution(world, state, count)
+        unequal = unequal or world.switches.pushing
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e)
     else:

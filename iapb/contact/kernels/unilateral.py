@@ -40,10 +40,13 @@ def make_push_work(coordinates: int, contacts: int) -> PushWork:
 
 
 @kernel
-def _solve_passive(rows, b, passive, size, q, triangle, solution):
-    """Least squares on the passive rows: solution[j] for passive[j]; False if they are dependent."""
+def _solve_passive(rows, b, passive, known, size, q, triangle, solution):
+    """Least squares on the passive rows: solution[j] for passive[j]; return how many are independent, `size` if all.
+
+    The first `known` directions are there from the call before, with the same rows: they are not computed again.
+    """
     d = b.shape[0]
-    for j in range(size):
+    for j in range(known, size):
         for k in range(d):
             q[j, k] = rows[k, passive[j]]
         for m in range(j):
@@ -60,7 +63,7 @@ def _solve_passive(rows, b, passive, size, q, triangle, solution):
         for k in range(d):
             square += q[j, k] * q[j, k]
         if square <= _CLOSING * _CLOSING:
-            return False
+            return j
         triangle[j, j] = math.sqrt(square)
         for k in range(d):
             q[j, k] /= triangle[j, j]
@@ -71,7 +74,7 @@ def _solve_passive(rows, b, passive, size, q, triangle, solution):
         for m in range(j + 1, size):
             total -= triangle[j, m] * solution[m]
         solution[j] = total / triangle[j, j]
-    return True
+    return size
 
 
 @kernel
@@ -95,7 +98,7 @@ def push_only(rows, count, b, p, residual, work):
     rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a `PushWork`.
     """
     d = b.shape[0]
-    norm, size = 0.0, 0
+    norm, size, known = 0.0, 0, 0
     for k in range(d):
         residual[k] = b[k]
         norm += b[k] * b[k]
@@ -109,12 +112,14 @@ def push_only(rows, count, b, p, residual, work):
             return True
         work.passive[size] = entering
         size += 1
-        if size > d or not _solve_passive(rows, b, work.passive, size, work.q, work.triangle, work.solution):
+        if size <= d:
+            known = _solve_passive(rows, b, work.passive, known, size, work.q, work.triangle, work.solution)
+        if known < size:
             work.banned[entering] = True  # dependent to rounding: it cannot close by itself
             size -= 1
             continue
         work.held[entering] = True
-        size = _retreat(rows, b, size, p, work)
+        size, known = _retreat(rows, b, size, p, work)
         _set_residual(rows, b, work.passive, size, p, residual)
         for i in range(count):
             work.banned[i] = False
@@ -123,7 +128,8 @@ def push_only(rows, count, b, p, residual, work):
 
 @kernel
 def _retreat(rows, b, size, p, work):
-    """Move p towards the passive solution, letting go of rows that would pull; return the passive size."""
+    """Move p towards the passive solution, letting go of rows that would pull; return the passive size, and how many
+    of its directions are known."""
     passive, solution = work.passive, work.solution
     while True:
         step, blocking = 1.0, -1
@@ -135,14 +141,15 @@ def _retreat(rows, b, size, p, work):
         for j in range(size):
             p[passive[j]] += step * (solution[j] - p[passive[j]])
         if blocking < 0:
-            return size
+            return size, size
         p[passive[blocking]] = 0.0
         work.held[passive[blocking]] = False
         for j in range(blocking, size - 1):
             passive[j] = passive[j + 1]
         size -= 1
-        if not _solve_passive(rows, b, passive, size, work.q, work.triangle, solution):
-            return size
+        known = _solve_passive(rows, b, passive, blocking, size, work.q, work.triangle, solution)
+        if known < size:
+            return size, known
 
 
 @kernel

@@ -22,6 +22,7 @@ class Switches(NamedTuple):
     velocity_terms: bool
     impulses: bool
     unequal_restitution: bool
+    pushing: bool
     impact_friction: bool
     clustering: bool
     impulse_limit: bool

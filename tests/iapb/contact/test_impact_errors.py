@@ -72,7 +72,6 @@ def call(**changed: object) -> object:
         ("restitution", [0.5, np.nan], "restitution[1]"),
         ("restitution", [-2.0, -2.0], "restitution[0]"),
         ("method", "magic", "method"),
-        ("method", "poisson", "method"),
         ("method", ["factored"], "method"),
         ("budget", -1, "budget"),
         ("budget", 1.5, "budget"),

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.errors import SolverError
+from iapb import resolve_impact
+from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
 from reference.complementarity.laws import LAWS, newton_equality, newton_lcp, per_body_rows, poisson
@@ -168,6 +169,19 @@ def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: fl
     problem = ImpactProblem.from_impact(0.5 * (mass + mass.T), both, rng.normal(size=6), 0.5)
     p = newton_equality(problem).impulse
     assert p[:3] == pytest.approx(p[3:], rel=1e-4)
+
+
+@given(st.integers(0, 100_000), st.floats(0.0, 1.0))
+def test_the_engines_pushing_method_is_the_newton_lcp(seed: int, e: float) -> None:
+    problem = random_problem(seed, 1 + seed % 8, e)
+    impact = problem.mass_matrix, problem.contact_jacobian, problem.velocity
+    found, law = resolve_impact(*impact, e, method="poisson"), newton_lcp(problem)
+    assert found.impulses.min() >= 0.0 and found.energy_change <= 0.0
+    kinetic = np.linalg.cholesky(problem.mass_matrix).T
+    distance = np.linalg.norm(kinetic @ (found.velocity - law.velocity))
+    assert distance <= 1e-9 * np.linalg.norm(kinetic @ problem.velocity)
+    with pytest.raises(ArgumentError, match="restitution"):
+        resolve_impact(*impact, -0.5, method="poisson")
 
 
 def test_every_law_says_what_it_is() -> None:
