@@ -15,6 +15,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import NamedTuple
 
 from iapb.errors import ArgumentError
@@ -152,9 +153,7 @@ def word_expression(word: Word, scalars: Scalars = (), coefficient: Fraction = F
 
 def names_in(value: Expression) -> set[str]:
     """Names of all letters and scalars that occur."""
-    return {letter.name for letter in value.letters} | {
-        name for scalars, _ in value.terms for name in scalars
-    }
+    return {letter.name for letter in value.letters} | {name for scalars, _ in value.terms for name in scalars}
 
 
 def transposed(word: Word) -> Word:
@@ -179,3 +178,82 @@ def _common_shape(left: Expression, right: Expression) -> tuple[str, str]:
     if len(set(shapes)) > 1 or lone_identity:
         raise ArgumentError("sum", f"{left.rows}x{left.cols} + {right.rows}x{right.cols}", "equal shapes")
     return shapes[0] if shapes else (ANY, ANY)
+
+
+@dataclass(frozen=True)
+class Equation:
+    """lhs = rhs, for all values of the letters that satisfy the other facts."""
+
+    name: str
+    lhs: Expression
+    rhs: Expression
+
+    @cached_property
+    def difference(self) -> Expression:
+        return self.lhs - self.rhs
+
+    @cached_property
+    def T(self) -> Equation:
+        """The transposed equation, as good as the equation itself."""
+        return Equation(f"({self.name})ᵀ", self.lhs.T, self.rhs.T)
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.lhs, self.rhs)
+
+
+@dataclass(frozen=True)
+class NonNegative:
+    """value >= 0: a commuting scalar or a 1 x 1 product as a number, a square matrix in the Loewner order
+    (x' value x >= 0 for every x)."""
+
+    name: str
+    value: Expression
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.value,)
+
+
+@dataclass(frozen=True)
+class Definite:
+    """x' value x > 0 for every x other than 0."""
+
+    name: str
+    value: Expression
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.value,)
+
+
+@dataclass(frozen=True)
+class Entrywise:
+    """Every entry of a vector or matrix is >= 0 (impulses that only push, restitution between 0 and 1, ...)."""
+
+    name: str
+    value: Expression
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.value,)
+
+
+@dataclass(frozen=True)
+class Nonzero:
+    """A commuting scalar is not 0."""
+
+    name: str
+    value: Expression
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.value,)
+
+
+Fact = Equation | NonNegative | Definite | Entrywise | Nonzero
+
+
+def equation(name: str, lhs: Operand, rhs: Operand) -> Equation:
+    """An equation whose sides may be plain numbers (multiples of the identity, or zero)."""
+    return Equation(name, expression(lhs), expression(rhs))

@@ -65,10 +65,7 @@ class Attack:
 
 
 def attack(
-    resolve: BulkResolver,
-    count: int = 10_000,
-    seed: int = 1,
-    bound: Callable[[int, float], float] = gain_bound,
+    resolve: BulkResolver, count: int = 10_000, seed: int = 1, bound: Callable[[int, float], float] = gain_bound
 ) -> Attack:
     """Resolve `count` adversarial impacts and compare their energy gains, in double-double, with a bound.
 
@@ -145,9 +142,7 @@ def draw(rng: np.random.Generator, family: str, n: int) -> Impacts:
 def one_by_one(resolve: Callable[[Floats, Floats, Floats, float], Floats]) -> BulkResolver:
     """A bulk resolver from a call for one impact."""
 
-    def in_bulk(
-        mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats
-    ) -> Floats:
+    def in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
         cases = zip(mass_matrix, contact_jacobian, velocity, restitution, strict=True)
         return np.array([resolve(m, j, v, float(e)) for m, j, v, e in cases])
 
@@ -161,9 +156,7 @@ def engine_resolver(method: str = "factored", clamp: bool | None = None) -> Bulk
     return one_by_one(lambda m, j, v, e: resolve_impact(m, j, v, e, method=method, clamp=clamp).velocity)
 
 
-def factored_in_bulk(
-    mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats
-) -> Floats:
+def factored_in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
     """The engine's compiled kernel as the simulation step calls it, without the public call around it."""
     from verification.proofs.attack_kernel import resolve_batch
 

@@ -38,6 +38,8 @@ def checked(statement: Statement, started: float | None = None) -> ProofRecord:
         needed=needed,
         twins=twins,
         remarks=statement.remarks,
+        assumed=statement.assumed,
+        measured=statement.measured,
         verdict="not proved" if problems else "proved",
         problems=problems,
         seconds=time.perf_counter() - started,
@@ -64,10 +66,7 @@ def _needed(without: Without, statement: Statement) -> Refutation:
     dropped = [fact for fact in statement.given if fact.name in without.names]
     false = [fact for fact in statement.conclusions if not holds(fact, case)]
     refuted = (
-        set(without.names) <= set(names)
-        and all_hold(others, case)
-        and not all_hold(dropped, case)
-        and bool(false)
+        set(without.names) <= set(names) and all_hold(others, case) and not all_hold(dropped, case) and bool(false)
     )
     shown = false[0] if false else statement.conclusions[0]
     title = "without " + " and ".join(f"'{name}'" for name in without.names)
@@ -89,9 +88,7 @@ def _loose_ends(statement: Statement, known: Known) -> list[str]:
     """What would make the theorem say less than it seems: unused, unneeded or contradictory hypotheses."""
     shown = {name for without in statement.needed for name in without.names}
     open_ends = [f"hypothesis never used: {f.name}" for f in statement.given if f.name not in known.used]
-    open_ends += [
-        f"hypothesis not shown to be needed: {f.name}" for f in statement.given if f.name not in shown
-    ]
+    open_ends += [f"hypothesis not shown to be needed: {f.name}" for f in statement.given if f.name not in shown]
     names = {fact.name for fact in statement.conclusions}
     open_ends += [f"conclusion never reached: {name}" for name in statement.concludes if name not in names]
     open_ends += _circular_definitions(statement)

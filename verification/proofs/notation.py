@@ -5,9 +5,18 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import groupby
 
-from verification.proofs.algebra import Expression, Letter, Term
+from verification.proofs.algebra import (
+    Definite,
+    Entrywise,
+    Equation,
+    Expression,
+    Fact,
+    Letter,
+    NonNegative,
+    Nonzero,
+    Term,
+)
 from verification.proofs.exact import Instance, Matrix
-from verification.proofs.facts import Definite, Entrywise, Equation, Fact, NonNegative, Nonzero
 from verification.proofs.statement import Line
 from verification.proofs.steps import Cancelling, Cofactor, Dividing, Exact, Identity, Pairing, Square, Step
 from verification.proofs.steps import Term as SumTerm
@@ -34,9 +43,7 @@ def latex(value: Expression) -> str:
 
 def _sum(value: Expression, write) -> str:  # type: ignore[no-untyped-def]
     pieces: list[str] = []
-    unit = (
-        "" if value.rows in ("*", "1") else "I"
-    )  # a bare number among matrices is a multiple of the identity
+    unit = "" if value.rows in ("*", "1") else "I"  # a bare number among matrices is a multiple of the identity
     for term, coefficient in value.ordered():
         sign = "−" if coefficient < 0 else "+"
         piece = write(term, abs(coefficient), unit)
@@ -48,9 +55,7 @@ def _sum(value: Expression, write) -> str:  # type: ignore[no-untyped-def]
 def _text_term(term: Term, coefficient: Fraction, unit: str) -> str:
     scalars, word = term
     factors = [name + _raised(len(list(group))) for name, group in groupby(scalars)]
-    factors += (
-        [letter.name + ("ᵀ" if letter.flipped else "") for letter in word] if word else [unit] * bool(unit)
-    )
+    factors += [letter.name + ("ᵀ" if letter.flipped else "") for letter in word] if word else [unit] * bool(unit)
     number = [] if coefficient == 1 and factors else [str(coefficient)]
     return " ".join(number + factors)
 

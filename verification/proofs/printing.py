@@ -24,13 +24,11 @@ def proof_text(record: ProofRecord) -> str:
     lines += _section("HYPOTHESES", (_formula(line) for line in record.hypotheses))
     lines += _section("NOTATION", (_formula(line) for line in record.definitions))
     lines += _section("CONCLUSIONS", (_formula(line) for line in record.conclusions))
-    lines += _section(
-        "PROOF", (row for number, step in enumerate(record.steps, 1) for row in _step(number, step))
-    )
-    lines += _section(
-        "EACH HYPOTHESIS IS NEEDED", (row for case in record.needed for row in _refutation(case))
-    )
+    lines += _section("PROOF", (row for number, step in enumerate(record.steps, 1) for row in _step(number, step)))
+    lines += _section("EACH HYPOTHESIS IS NEEDED", (row for case in record.needed for row in _refutation(case)))
     lines += _section("WRONG TWINS", (row for twin in record.twins for row in _refutation(twin)))
+    lines += _section("ASSUMED ABOUT ROUNDING", (plain(line) for line in record.assumed))
+    lines += _section("MEASURED ON THE COMPILED CODE", (plain(line) for line in record.measured))
     lines += _section("REMARKS", (plain(remark) for remark in record.remarks))
     return "\n".join(lines) + "\n"
 
@@ -85,3 +83,7 @@ def _refutation(refutation: Refutation) -> list[str]:
     if case:
         rows.append(f"     exact case:  {case}")
     return rows + ([f"     {plain(refutation.note)}"] if refutation.note else [])
+
+
+if TYPE_CHECKING:
+    from verification.proofs.statement import Line, ProofRecord, Refutation, StepRecord

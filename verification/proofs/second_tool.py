@@ -23,8 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from verification.proofs.algebra import Expression, expression, transposed, word_expression
-from verification.proofs.facts import Equation
+from verification.proofs.algebra import Equation, Expression, expression, transposed, word_expression
 from verification.proofs.second_tool_prelude import PRELUDE, NotExportable, in_coq, spelled
 from verification.proofs.statement import Statement
 from verification.proofs.steps import (
@@ -41,9 +40,7 @@ from verification.proofs.steps import (
 
 CERTIFIED = ("theorem_1", "theorem_2", "independent_subset")
 PATIENCE = 120.0  # seconds for one script; the three take up to 20 each on a loaded machine
-CLOSED = (
-    "Closed under the global context"  # Coq's words for a lemma that leans on nothing but its own hypotheses
-)
+CLOSED = "Closed under the global context"  # Coq's words for a lemma that leans on nothing but its own hypotheses
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from verification.proofs.algebra import Equation, Fact
 from verification.proofs.exact import Instance
-from verification.proofs.facts import Equation, Fact
-from verification.proofs.mathml import proof_html
 from verification.proofs.printing import proof_text
 from verification.proofs.steps import Exact, Step
 
@@ -48,10 +47,10 @@ class Statement:
     `definitions` give names to expressions (a letter or scalar on the left); they say nothing about the world, so
     they need no counterexample. `statement` and `remarks` are prose with LaTeX between dollar signs. `concludes`
     names the steps that are the conclusions; the others are lemmas on the way. `witness` is one exact case in
-    which every hypothesis holds, so that the theorem speaks of something.
+    which every hypothesis holds, so that the theorem speaks of something. What a floating-point statement takes from
+    elsewhere is kept apart: `assumed` of rounding, `measured` on the compiled code. `name` is given by `load`.
     """
 
-    name: str
     title: str
     source: str
     statement: str
@@ -63,6 +62,9 @@ class Statement:
     needed: tuple[Without, ...] = ()
     twins: tuple[Twin, ...] = ()
     remarks: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
+    name: str = ""
 
     @property
     def conclusions(self) -> tuple[Fact, ...]:
@@ -115,6 +117,8 @@ class ProofRecord:
     needed: tuple[Refutation, ...]
     twins: tuple[Refutation, ...]
     remarks: tuple[str, ...]
+    assumed: tuple[str, ...]
+    measured: tuple[str, ...]
     verdict: str
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
@@ -126,7 +130,3 @@ class ProofRecord:
     def as_text(self) -> str:
         """The whole proof in plain text, to be followed without the code."""
         return proof_text(self)
-
-    def as_mathml(self) -> str:
-        """The whole proof as an HTML fragment with MathML, for the report."""
-        return proof_html(self)

@@ -6,10 +6,18 @@ Delassus matrix W = J M⁻¹ Jᵀ, v (d) velocity before the impact, e restituti
 
 from __future__ import annotations
 
-from verification.proofs.algebra import Expression, expression, matrix, scalar, vector
-from verification.proofs.facts import Definite, Equation, NonNegative, equation
-from verification.proofs.rewriting import identity
-from verification.proofs.steps import Cancelling, Cofactor, Identity, Step
+from verification.proofs.algebra import (
+    Definite,
+    Equation,
+    Expression,
+    NonNegative,
+    equation,
+    expression,
+    matrix,
+    scalar,
+    vector,
+)
+from verification.proofs.steps import Cancelling, Cofactor, Identity, Step, identity
 
 ONE = expression(1)
 M = matrix("M", "d", "d")
@@ -30,11 +38,7 @@ GENERALIZED_INVERSE = equation("G is a {1}-inverse of J M⁻¹ Jᵀ", W * G * W,
 
 INVERSE_SYMMETRIC = Identity(
     equation("M⁻¹ is symmetric", MI.T, MI),
-    (
-        Cofactor(-MI.T, INVERSE_MASS, ONE),
-        Cofactor(-MI.T, SYMMETRIC_MASS, MI),
-        Cofactor(ONE, INVERSE_MASS.T, MI),
-    ),
+    (Cofactor(-MI.T, INVERSE_MASS, ONE), Cofactor(-MI.T, SYMMETRIC_MASS, MI), Cofactor(ONE, INVERSE_MASS.T, MI)),
     "M⁻ᵀ = M⁻ᵀ (M M⁻¹) = (M⁻ᵀ Mᵀ) M⁻¹ = M⁻¹",
 )
 INVERSE_FROM_LEFT = Identity(
@@ -66,9 +70,7 @@ def column_space_lemmas(inverse: Expression, name: str, given: Equation) -> tupl
     )
 
 
-def _vanishing_residual(
-    residual: Expression, words: str, lemma: Equation, given: Equation
-) -> tuple[Step, ...]:
+def _vanishing_residual(residual: Expression, words: str, lemma: Equation, given: Equation) -> tuple[Step, ...]:
     half = equation(f"M⁻¹ Nᵀ = 0 for N = {words}", MI * residual.T, 0)
     square = identity(
         f"(M⁻¹ Nᵀ)ᵀ M (M⁻¹ Nᵀ) = 0 for N = {words}",
@@ -80,9 +82,7 @@ def _vanishing_residual(
     zero = half.T if lemma.lhs.rows == "c" else half
     outer = (ONE, M.T) if lemma.lhs.rows == "c" else (M, ONE)
     rules = (INVERSE_MASS, INVERSE_MASS.T)
-    end = identity(
-        lemma.name, lemma.lhs, lemma.rhs, rules, "Nᵀ = M (M⁻¹ Nᵀ)", (Cofactor(outer[0], zero, outer[1]),)
-    )
+    end = identity(lemma.name, lemma.lhs, lemma.rhs, rules, "Nᵀ = M (M⁻¹ Nᵀ)", (Cofactor(outer[0], zero, outer[1]),))
     return square, Cancelling(half, square.claim, DEFINITE_MASS), end
 
 

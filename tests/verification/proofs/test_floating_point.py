@@ -17,7 +17,7 @@ from verification.proofs.bounds import (
     promised_bound,
     unclamped_bound,
 )
-from verification.proofs.statements.fp_gram_pinv import energy_factor, energy_factor_above_cutoff
+from verification.proofs.statements.floating_point import energy_factor, energy_factor_above_cutoff
 
 # The bound is within this factor of the worst impact seen: it is a bound that means something.
 SLACK = 20.0

@@ -7,11 +7,9 @@ import pytest
 
 from iapb.errors import ArgumentError
 from verification.proofs import all_proofs, load
-from verification.proofs.algebra import matrix, scalar, vector
+from verification.proofs.algebra import Definite, Entrywise, NonNegative, equation, matrix, scalar, vector
 from verification.proofs.checking import checked
 from verification.proofs.exact import FlintBackend, SympyBackend, evaluate, instance, signature_allows
-from verification.proofs.facts import Definite, Entrywise, NonNegative, equation
-from verification.proofs.rewriting import identity
 from verification.proofs.statement import Statement
 from verification.proofs.steps import (
     Cancelling,
@@ -24,6 +22,7 @@ from verification.proofs.steps import (
     Refused,
     Square,
     Term,
+    identity,
 )
 
 A, B = matrix("A", "m", "n"), matrix("B", "n", "m")

@@ -3,8 +3,17 @@
 import random
 from fractions import Fraction
 
-from verification.proofs.exact import FlintBackend, Instance, Matrix, SympyBackend, completed, holds
-from verification.proofs.linear import delassus, impact_case, inverse
+from verification.proofs.exact import (
+    FlintBackend,
+    Instance,
+    Matrix,
+    SympyBackend,
+    completed,
+    delassus,
+    holds,
+    impact_case,
+    inverse,
+)
 from verification.proofs.statement import Statement, Twin
 from verification.proofs.steps import Exact
 
@@ -27,7 +36,8 @@ def random_case(draw: random.Random) -> Instance:
     return impact_case(mass, rows, [number() for _ in range(d)], e=Fraction(draw.randint(-6, 6), 6))
 
 
-def statement() -> Statement:
+def exact_instances() -> Statement:
+    """Theorem 2 on random rational impacts, on two exact libraries."""
     from verification.proofs import load
 
     draw = random.Random(SEED)
@@ -36,34 +46,26 @@ def statement() -> Statement:
     redundant = sum(_is_redundant(case) for case in cases)
     total = Fraction(CASES)
     agree = {
-        backend.name: sum(
-            all(holds(fact, case, backend) for fact in theorem.conclusions) for case in cases[:count]
-        )
+        backend.name: sum(all(holds(fact, case, backend) for fact in theorem.conclusions) for case in cases[:count])
         for backend, count in ((FlintBackend, CASES), (SympyBackend, CASES // 4))
     }
     hypotheses = sum(all(holds(fact, case) for fact in theorem.given) for case in cases)
     wrong = sum(_printed_loss_holds(case) for case in cases)
     return Statement(
-        name="exact_instances",
         title="Both sides as rational numbers",
         source="random rational instances",
         statement=(
             rf"{CASES} random rational impacts ($d \leq {LARGEST}$, redundant rows included, "
-            r"$G$ the exact Moore-Penrose inverse): hypotheses and conclusions of Theorem 2 hold as "
-            r"equalities of rational numbers, on two exact libraries."
+            r"$G$ the exact Moore-Penrose inverse): hypotheses and conclusions of Theorem 2 hold as equalities of "
+            r"rational numbers, on two exact libraries."
         ),
         steps=(
             Exact("cases with redundant rows", Fraction(redundant), ">", Fraction(CASES // 2)),
             Exact("cases that satisfy the hypotheses", Fraction(hypotheses), "=", total),
             Exact(
-                "cases where all conclusions hold, python-flint",
-                Fraction(agree["python-flint"]),
-                "=",
-                Fraction(CASES),
+                "cases where all conclusions hold, python-flint", Fraction(agree["python-flint"]), "=", Fraction(CASES)
             ),
-            Exact(
-                "cases where all conclusions hold, sympy", Fraction(agree["sympy"]), "=", Fraction(CASES // 4)
-            ),
+            Exact("cases where all conclusions hold, sympy", Fraction(agree["sympy"]), "=", Fraction(CASES // 4)),
             Exact(
                 "cases where the loss as printed in (24) holds (only those that lose nothing)",
                 Fraction(wrong),
@@ -71,11 +73,7 @@ def statement() -> Statement:
                 Fraction(CASES // 2),
             ),
         ),  # fmt: skip
-        twins=(
-            Twin(
-                "the printed loss holds in all cases", Exact("cases", Fraction(wrong), "=", Fraction(CASES))
-            ),
-        ),
+        twins=(Twin("the printed loss holds in all cases", Exact("cases", Fraction(wrong), "=", Fraction(CASES))),),
     )
 
 
