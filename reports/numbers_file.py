@@ -84,10 +84,6 @@ def _checks(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     yield "counterexamples", titled(("who and law", "what happens"),
                                      tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples),
                                      prose=("what happens",))  # fmt: skip
-    yield "cross-checks", titled(
-        ("quantity", "against", "cases", "worst", "tolerance", "agrees"),
-        tuple((one.quantity, one.against, one.cases, one.worst, one.tolerance, one.agrees)
-              for one in evidence.cross_checks))  # fmt: skip
 
 
 def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Table]]:

@@ -10,7 +10,6 @@ from typing import Any
 from reports.evidence import (
     claims,
     counterexamples,
-    cross_checks,
     hard_cases,
     proofs,
     properties,
@@ -23,7 +22,6 @@ from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.evidence.verdicts import verdicts
 from reports.pages.records import (
     Counterexample,
-    CrossCheck,
     Evidence,
     FailedCases,
     HardCase,
@@ -63,7 +61,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     laws = kept.stage("properties", tuple[Property, ...], properties.compute)
     broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)
     bulk = kept.stage("bulk impacts", Table, partial(properties.bulk, depth), None)
-    checks = kept.stage("cross-checks", tuple[CrossCheck, ...], cross_checks.compute)
     hard = kept.stage("hard cases", tuple[HardCase, ...], partial(hard_cases.compute, runner))
     timed = kept.stage("accuracy", Table, _methods, None)
     topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
@@ -72,7 +69,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs["effect_costs"] = effects.summary(needed)
     evidence = Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
-        cross_checks=checks, hard_cases=hard, effects=needed, topics=topics, failed=kept.failed(),
+        hard_cases=hard, effects=needed, topics=topics, failed=kept.failed(),
         provenance=provenance(), manifest=manifest(runner.used, kept.stages, out), bulk=bulk,
     )  # fmt: skip
     return _with_verdicts(evidence)

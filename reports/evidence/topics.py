@@ -10,6 +10,7 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 
 # key of the finding -> module and function of its study
 TOPICS: dict[str, str] = {
+    "cross-checks": "verification.mechanics.cross_checks:cross_checks",
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
     "stability": "verification.stability.contact_stability:contact_stability",

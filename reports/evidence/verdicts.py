@@ -74,16 +74,6 @@ def _laws(evidence: Evidence) -> Iterator[Verdict]:
     yield Verdict("Properties", REPRODUCED if good else REFUTED, sentence, "properties")
 
 
-def _checks(evidence: Evidence) -> Iterator[Verdict]:
-    if not evidence.cross_checks:
-        return
-    agreed = sum(check.agrees for check in evidence.cross_checks)
-    sentence = (f"{agreed} of {len(evidence.cross_checks)} comparisons with Pinocchio and with complementarity "
-                "solvers agree to the stated tolerance.")
-    outcome = REPRODUCED if agreed == len(evidence.cross_checks) else REFUTED
-    yield Verdict("Independent answers", outcome, sentence, "cross-checks")
-
-
 def _hard_cases(evidence: Evidence) -> Iterator[Verdict]:
     if not evidence.hard_cases:
         return
@@ -106,11 +96,11 @@ def _topics(evidence: Evidence) -> Iterator[Verdict]:
 
 # stage -> its sentences; stage -> title and section
 _STAGES = {
-    "bulk impacts": _passivity, "proofs": _proofs, "properties": _laws, "cross-checks": _checks,
+    "bulk impacts": _passivity, "proofs": _proofs, "properties": _laws,
     "hard cases": _hard_cases,
 }  # fmt: skip
 TITLES = {
     "claims": ("The paper's claims", "claims"), "bulk impacts": ("Passive in floating point", "properties"),
     "proofs": ("Proofs", "proofs"), "properties": ("Properties", "properties"),
-    "cross-checks": ("Independent answers", "cross-checks"), "hard cases": ("Hard cases", "hard-cases"),
+    "hard cases": ("Hard cases", "hard-cases"),
 }  # fmt: skip

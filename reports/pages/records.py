@@ -55,19 +55,6 @@ class Counterexample:
 
 
 @dataclass(frozen=True)
-class CrossCheck:
-    """A quantity of the engine against somebody else's."""
-
-    quantity: str
-    against: str
-    cases: int
-    worst: float
-    tolerance: float
-    agrees: bool
-    reason: str = ""
-
-
-@dataclass(frozen=True)
 class HardCase:
     """A named problem with a certain answer.
 
@@ -132,7 +119,6 @@ class Evidence:
     proofs: tuple[ProofRecord, ...] = ()
     properties: tuple[Property, ...] = ()
     counterexamples: tuple[Counterexample, ...] = ()
-    cross_checks: tuple[CrossCheck, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
     bulk: Table | None = None  # energy gains of very many impacts, a row per method and decade of κ(M)
     effects: Mapping[str, Table] = field(default_factory=dict)  # of each scene, as `verification.cost.effects` has them

@@ -42,7 +42,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
     Section("properties", "Properties", lambda evidence: bool(evidence.properties),
             tables=("properties", "counterexamples", "bulk impacts")),
-    Section("cross-checks", "Cross-checks", lambda evidence: bool(evidence.cross_checks), tables=("cross-checks",)),
+    _topic("cross-checks", "Cross-checks"),
     _topic("mechanics", "Linkages and free bodies"),
     _topic("scene-ledger", "The scenes"),
     _topic("complementarity", "Against complementarity"),

@@ -18,7 +18,6 @@ from reports.commands import reproduce
 from reports.evidence import (
     claims,
     counterexamples,
-    cross_checks,
     gather,
     hard_cases,
     proofs,
@@ -31,9 +30,10 @@ from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
 from verification.claims import c07_plastic
 from verification.cost import effects, impacts
-from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
+from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
 from verification.laws import engine_laws, impact_laws, trajectory_laws
+from verification.mechanics import cross_checks
 
 Patch = pytest.MonkeyPatch
 Found = tuple[Any, list[Failure]]
@@ -121,13 +121,19 @@ def of_bulk(patch: Patch, folder: Path) -> list[str]:
 
 def of_cross_checks(patch: Patch, folder: Path) -> list[str]:
     patch.setattr(cross_checks, "_STATES", 2)
-    patch.setattr(cross_checks, "shipped_scene", broken(cross_checks.shipped_scene, "peg_corner".__eq__))
+    patch.setattr(cross_checks, "find_scene", broken(cross_checks.find_scene, "peg_corner".__eq__))
     patch.setattr(cross_checks, "_impulse_dynamics", lambda name: iter(()))
-    patch.setattr(cross_checks, "_complementarity", broken(lambda name: iter((name,)), "daqp".__eq__))
-    failures: list[Failure] = []
-    found = cross_checks.compute(nothing, failures)
-    assert len(found) == 4 and found[2:] == ("cvxpy_clarabel", "lemke")
-    return [failure.case for failure in failures]
+    patch.setattr(cross_checks, "_complementarity", broken(lambda name: iter([made_up(name)]), "daqp".__eq__))
+    found = cross_checks.cross_checks(Runner(folder), "quick", nothing)
+    assert found.tables["comparisons"].column("quantity")[2:] == ["cvxpy_clarabel", "lemke"]
+    assert [part.verdict for part in found.parts] == [REPRODUCED] * 3 + [REFUTED, NOT_COMPUTED]
+    return [failure.case for failure in found.failures]
+
+
+def made_up(solver: str) -> dict[str, Any]:
+    """A comparison that fails by Lemke's method."""
+    difference = 1.0 if solver == "lemke" else 0.0
+    return {"quantity": solver, "against": solver, "cases": 1, "largest difference": difference, "tolerance": 1e-9}
 
 
 def of_hard_cases(patch: Patch, folder: Path) -> list[str]:

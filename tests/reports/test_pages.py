@@ -19,7 +19,6 @@ from reports.figures.fig03_energy_loss import arm_energies
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
 from reports.pages.records import (
-    CrossCheck,
     Evidence,
     FailedCases,
     HardCase,
@@ -91,7 +90,6 @@ def full() -> Evidence:
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "properties"),),
         claims=(claim, finding_of("C02", "C02", "the same", "no", (Part("n.", REFUTED),))),
         properties=(Property("KE", 10, "0", "1", True, "sign", True),),
-        cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
         topics=(finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
                            (Part("It holds to 1e-14.", REPRODUCED),),

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
+from iapb.simulation import simulate
 from verification.finding import MIXED, REFUTED, REPRODUCED, Failure, Part, Table, of_each, titled
 
 DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: from a ball that bounces at edges to one that does not
@@ -64,7 +65,7 @@ class FalseCollisions:
 
 
 def study_false_collisions(
-    dampings: Sequence[float] = DAMPINGS, simulate: Simulate | None = None, failures: list[Failure] | None = None
+    dampings: Sequence[float] = DAMPINGS, simulate: Simulate = simulate, failures: list[Failure] | None = None
 ) -> tuple[FalseCollisions, ...]:
     """Return the counts for each damping and each of the four settings of the filters, at the scene's distances."""
 
@@ -82,15 +83,13 @@ def _switched_off(filters: tuple[bool, bool]) -> dict[str, float]:
 
 def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
     """The scene with some of its contact's values changed, and its rate [Hz]."""
-    from iapb.scene import find_scene, load_scene
-
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
     return load_scene(find_scene(SCENE)).with_values(values if rate is None else values | {"rate": rate})
 
 
-def count_false(scene: Scene, simulate: Simulate | None = None) -> FalseCollisions:
+def count_false(scene: Scene, simulate: Simulate = simulate) -> FalseCollisions:
     """Simulate the socket and count."""
-    run, contact = (simulate or _simulated)(scene), scene.contact
+    run, contact = simulate(scene), scene.contact
     per_step = np.diff(run.contacts.offsets)
     first = int(np.flatnonzero(per_step)[0])
     later = run.impacts.step > first
@@ -106,12 +105,6 @@ def count_false(scene: Scene, simulate: Simulate | None = None) -> FalseCollisio
         largest_speed=float(np.hypot(run.v[:, 0], run.v[:, 1]).max()),
         times=tuple((run.impacts.step[later] * run.dt).tolist()), losses=tuple(lost.tolist()),
     )  # fmt: skip
-
-
-def _simulated(scene: Scene) -> Run:
-    from iapb.simulation import simulate
-
-    return simulate(scene)
 
 
 def filters_table(found: Sequence[FalseCollisions]) -> Table:

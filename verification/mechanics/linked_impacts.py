@@ -18,6 +18,8 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impact
+from reference.event_driven import LinearSystem, event_driven
 from verification.finding import REFUTED, REPRODUCED, Failure, Part, Table, of_each, titled
 
 Floats = NDArray[np.float64]
@@ -118,8 +120,6 @@ def outcomes(balls: LinkedBalls) -> tuple[LinkedOutcome, ...]:
 
 
 def _mapped(balls: LinkedBalls, treatment: str, rows_in_words: str, rows: Floats) -> LinkedOutcome:
-    from iapb.contact.impact import resolve_impact
-
     v = balls.velocity.ravel()
     after = resolve_impact(np.eye(len(v)), rows, v, 1.0).velocity
     return LinkedOutcome(balls.name, treatment, rows_in_words, balls.velocity, after.reshape(-1, 2))
@@ -140,8 +140,6 @@ def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
 
 
 def _event_driven(balls: LinkedBalls, order: str, start: Floats) -> LinkedOutcome:
-    from reference.event_driven import LinearSystem, event_driven
-
     d = balls.velocity.size
     rows = balls.relative_rows(range(len(balls.contacts)))
     system = LinearSystem(np.eye(d), np.zeros(d), rows, start, 1.0)

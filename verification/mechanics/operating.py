@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import IapbError
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import Simulation
 from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
 from verification.mechanics.hand_paths import PATHS, Path
@@ -81,8 +81,6 @@ def operating(depth: str = "quick", failures: list[Failure] | None = None) -> Ta
 
 
 def _rows(depth: str, failures: list[Failure] | None) -> Iterator[dict[str, Any]]:
-    from iapb.scene import find_scene, load_scene
-
     scene = load_scene(find_scene(SCENE))
     grips = [Grip(body, part * length) for body, length in LENGTHS.items() for part in HOLDS[depth]]
 

@@ -15,8 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.laws import Penalty
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.scene import find_scene, load_scene
+from iapb.simulation import simulate
 from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
 from verification.mechanics.power_balance import by, span, words
 from verification.mechanics.torque_free import TorqueFreeBody
@@ -123,9 +126,6 @@ def path_by_python(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumb
 
 def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumble:
     """The states over DURATION by the simulation."""
-    from iapb.contact.laws import Penalty
-    from iapb.simulation import simulate
-
     start = [float(x) for x in (*DRIFT, *body.rates(0.0))]
     values = {"rate": steps / DURATION, "duration": DURATION, "bodies.tennis_racket.mass": MASS,
               "bodies.tennis_racket.inertia": list(body.moments), "bodies.tennis_racket.velocity": start}  # fmt: skip
@@ -135,8 +135,6 @@ def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumbl
 
 @cache
 def _scene() -> Any:
-    from iapb.scene import find_scene, load_scene
-
     return load_scene(find_scene("tumbling_body"))
 
 

@@ -19,7 +19,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.fig03_energy_loss import arm_energies
-from reports.pages.records import CrossCheck, Evidence, Verdict
+from reports.pages.records import Evidence, Verdict
 from reports.report import build_report
 from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
 
@@ -105,7 +105,6 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
         verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),
         claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
                            (Part("p.", MIXED, "as printed"),), {"C01": table}),),
-        cross_checks=(CrossCheck("M", "Pinocchio", 3, 1e-16, 1e-12, True),),
         topics=(finding_of("scene-ledger", "The scenes", "Asked.", "", (Part("It holds.", REPRODUCED),),
                            {"wide": table}),),
         provenance={"commit": "0123456789abcdef" * 4},

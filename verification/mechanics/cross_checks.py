@@ -1,43 +1,78 @@
-"""Stage: the engine against independent answers: Pinocchio and complementarity solvers."""
+"""The engine against independent answers: Pinocchio and complementarity solvers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
-from reports.evidence.runs import shipped_scene
-from reports.pages.records import CrossCheck
-from verification.finding import Failure, of_each
+from iapb import resolve_impact
+from iapb.run import Run
+from iapb.scene import find_scene, load_scene
+from iapb.scene.mechanism import mechanism_of
+from reference.complementarity import ImpactProblem, solve
+from reference.rigid_body import impulse_dynamics, model_of
+from verification.finding import (
+    REFUTED,
+    REPRODUCED,
+    Column,
+    Failure,
+    Finding,
+    Part,
+    Row,
+    finding_of,
+    of_each,
+    table_of,
+)
 
 _STATES = 100
 _SCENES = ("two_link_arm_a", "peg_corner")
 _SOLVERS = ("cvxpy_clarabel", "lemke", "daqp")
 _EPS = float(np.finfo(float).eps)
+COLUMNS = (
+    Column("quantity"), Column("against"), Column("cases"), Column("largest difference"), Column("tolerance"),
+    Column("why this tolerance", prose=True),
+)  # fmt: skip
 
 
-def compute(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[CrossCheck, ...]:
-    """Mass matrices and Jacobians, impacts of independent rows, one contact by an LCP, redundant contacts."""
-    rng = np.random.default_rng(1)
+def cross_checks(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Compare mass matrices and Jacobians, impacts of independent rows, one contact by an LCP; `run` is not asked."""
+    rng, failures = np.random.default_rng(1), list[Failure]()
     checks = [
         *of_each(_SCENES, lambda name: _mechanism(name, rng), failures),
         *of_each(("impulse dynamics",), _impulse_dynamics, failures),
         *of_each(_SOLVERS, _complementarity, failures),
     ]
     progress(1, 1)
-    return tuple(checks)
+    return finding(checks, failures)
 
 
-def _check(quantity: str, against: str, values: list[float], tolerance: float, reason: str) -> CrossCheck:
-    worst = float(max(values))
-    return CrossCheck(quantity, against, len(values), worst, tolerance, bool(worst <= tolerance), reason)
+def finding(checks: list[dict[str, Any]], failures: list[Failure]) -> Finding:
+    """Return one part per comparison."""
+    table = table_of(COLUMNS, checks, digits=2).judged(_agrees)
+    parts = [
+        Part(f"{row['quantity']}: at most {row['largest difference']:.1e} from {row['against']} in {row['cases']} "
+             f"cases (tolerance {row['tolerance']:.0e}).", REPRODUCED if _agrees(row) else REFUTED)
+        for row in checks
+    ]  # fmt: skip
+    answer = (f"{sum(map(_agrees, checks))} of {len(checks)} comparisons with Pinocchio and with complementarity "
+              "solvers agree to the stated tolerance.")
+    question = "The same quantities from programs that share no algorithm with the engine."
+    return finding_of("cross-checks", "Independent answers", question, answer, parts, {"comparisons": table}, failures)
 
 
-def _mechanism(name: str, rng: np.random.Generator) -> Iterator[CrossCheck]:
-    from iapb.scene.mechanism import mechanism_of
-    from reference.rigid_body import model_of
+def _agrees(row: Row) -> bool:
+    return bool(row["largest difference"] <= row["tolerance"])
 
-    mechanism = mechanism_of(shipped_scene(name))
+
+def _check(quantity: str, against: str, values: list[float], tolerance: float, reason: str) -> dict[str, Any]:
+    return {"quantity": quantity, "against": against, "cases": len(values), "largest difference": float(max(values)),
+            "tolerance": tolerance, "why this tolerance": reason}  # fmt: skip
+
+
+def _mechanism(name: str, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    mechanism = mechanism_of(load_scene(find_scene(name)))
     model, mass, rows = model_of(mechanism), [], []
     for _ in range(_STATES):
         q, point = rng.normal(size=mechanism.nq), np.append(rng.normal(size=2), 0.0)
@@ -54,10 +89,7 @@ def _distance(ours: np.ndarray, theirs: np.ndarray) -> float:
     return float(np.max(np.abs(ours - theirs)) / max(1.0, float(np.max(np.abs(theirs)))))
 
 
-def _impulse_dynamics(_name: str) -> Iterator[CrossCheck]:
-    from iapb import resolve_impact
-    from reference.rigid_body import impulse_dynamics
-
+def _impulse_dynamics(_name: str) -> Iterator[dict[str, Any]]:
     rng = np.random.default_rng(2)
     ratio, easy = [], []
     for _ in range(2000):
@@ -80,10 +112,7 @@ def _impulse_dynamics(_name: str) -> Iterator[CrossCheck]:
     yield _check("v⁺ where κ(A) ≤ 10, kinetic metric", "Pinocchio impulseDynamics", easy, 1e-12, "plain rounding")
 
 
-def _complementarity(name: str) -> Iterator[CrossCheck]:
-    from iapb import resolve_impact
-    from reference.complementarity import ImpactProblem, solve
-
+def _complementarity(name: str) -> Iterator[dict[str, Any]]:
     rng, errors = np.random.default_rng(3), []
     for _ in range(60):
         d = int(rng.integers(1, 9))
