@@ -14,7 +14,8 @@ import hashlib
 import inspect
 import struct
 import warnings
-from collections.abc import Callable
+from collections import namedtuple
+from collections.abc import Callable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ def _source_stamp() -> str:
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         text = path.read_bytes()
-        if b"iapb.compiled" in text or path.name in ("compiled.py", "inlining.py", "run.py", "arrays.py"):
+        if b"iapb.compiled" in text or path.name in ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays.py"):
             digest.update(str(path.relative_to(folder)).encode() + b"\0" + text)
     return digest.hexdigest()
 
@@ -153,6 +154,11 @@ class Block:
         if name.startswith("_"):  # not yet made, as when unpickling
             raise AttributeError(name)
         return getattr(self._content, name)
+
+
+def columns(name: str, arrays: Mapping[str, Any]) -> Any:
+    """Return a NamedTuple of arrays by name, to be laid out by `block`."""
+    return namedtuple(name, arrays)(**arrays)
 
 
 def block(content: Any) -> Any:

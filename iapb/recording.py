@@ -1,60 +1,39 @@
-"""Recording of a simulation, chunk by chunk: what the loop writes and how it becomes a Run."""
+"""Recording of a simulation, chunk by chunk: what the loop writes, and how it becomes a Run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iapb.compiled import block, copy_into, kernel
+from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
+from iapb.mechanics.energy import energy_of_run
 from iapb.mechanics.kernels.vectors import load, store
-from iapb.run import ContactTable, ImpactTable
+from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities
+from iapb.system import System
+
+Floats = NDArray[np.float64]
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
 _STEPS_PER_CHUNK = 512  # one second of the paper's loop: progress and Ctrl-C answer at least that often
 
+_STATES, _STEPS = quantities(Run, "time"), quantities(Run, "step")
+_CONTACTS, _IMPACTS = quantities(ContactTable, "contact"), quantities(ImpactTable)
+_KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
+                      "device_actuator_work")
+
 
 class Record(NamedTuple):
-    """Arrays of one chunk of n steps; states are those at the *end* of each step."""
+    """Arrays of one chunk of n steps, by the names of `iapb.run`."""
 
-    q: np.ndarray  # (n, nq)
-    v: np.ndarray  # (n, d)
-    device_q: np.ndarray  # (n, nq_t)
-    device_v: np.ndarray  # (n, d_t)
-    hand_force: np.ndarray  # (n, d)
-    coupling_force: np.ndarray  # (n, d)
-    penalty_force: np.ndarray  # (n, d)
-    friction_force: np.ndarray  # (n, d)
-    impulse: np.ndarray  # (n, d)
-    environment_force: np.ndarray  # (n, d)
-    device_force: np.ndarray  # (n, d_t)
-    state: np.ndarray  # (n,) int8
+    steps: Any  # n lines; states are those at the *end* of each step
     contact_count: np.ndarray  # (n,) int64
-    body_a: np.ndarray  # (m,) contacts, m the capacity of the chunk
-    body_b: np.ndarray
-    point: np.ndarray  # (m, 3)
-    normal: np.ndarray  # (m, 3)
-    gap: np.ndarray
-    normal_velocity: np.ndarray
-    normal_force: np.ndarray
-    contact_friction: np.ndarray  # (m, 3)
-    contact_impulse: np.ndarray
-    is_new: np.ndarray
-    impact_step: np.ndarray  # (n t,) impacts, one line per island and step
-    impact_group: np.ndarray
-    impact_rows: np.ndarray
-    impact_rank: np.ndarray
-    impact_scale: np.ndarray
-    impact_clamp: np.ndarray
-    impact_energy: np.ndarray
-    impact_friction_share: np.ndarray
-    impact_approaching: np.ndarray
-    impact_solved: np.ndarray
-    impact_v_minus: np.ndarray  # (n t, d)
-    impact_v_plus: np.ndarray
-    impact_impulse: np.ndarray
+    contacts: Any  # up to m lines, m the capacity of the chunk
+    impacts: Any  # up to n t lines, one per island and step, t trees
     used: np.ndarray  # (2,) int64: contacts and impacts written so far
 
 
@@ -65,48 +44,34 @@ def chunk_steps(contacts: int, remaining: int) -> int:
 
 def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
     """Allocate one chunk; `coordinates` = (nq, d, nq_t, d_t)."""
-    nq, d, tool_nq, tool_d = coordinates
-    m, k = steps * contacts, steps * trees
-    floats = {
-        "q": (steps, nq), "v": (steps, d), "device_q": (steps, tool_nq), "device_v": (steps, tool_d),
-        **dict.fromkeys(("hand_force", "coupling_force", "penalty_force", "friction_force", "impulse",
-                         "environment_force"), (steps, d)),
-        "device_force": (steps, tool_d),
-        **dict.fromkeys(("point", "normal", "contact_friction"), (m, 3)),
-        **dict.fromkeys(("gap", "normal_velocity", "normal_force", "contact_impulse"), (m,)),
-        **dict.fromkeys(("impact_scale", "impact_clamp", "impact_energy", "impact_friction_share"), (k,)),
-        **dict.fromkeys(("impact_v_minus", "impact_v_plus", "impact_impulse"), (k, d)),
-    }
-    integers = {
-        **dict.fromkeys(("body_a", "body_b"), (m,)), "contact_count": (steps,), "used": (2,),
-        **dict.fromkeys(("impact_step", "impact_group", "impact_rows", "impact_rank", "impact_approaching"), (k,)),
-    }
-    arrays: dict[str, Any] = {name: np.zeros(shape) for name, shape in floats.items()}
-    arrays |= {name: np.zeros(shape, np.int64) for name, shape in integers.items()}
-    arrays |= {"state": np.zeros(steps, np.int8), "is_new": np.zeros(m, np.bool_),
-               "impact_solved": np.zeros(k, np.bool_)}
-    return block(Record(**arrays))
+    lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
+    lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
+    return block(Record(
+        columns("StepLines", blank(_STATES + _STEPS, lengths)), np.zeros(steps, np.int64),
+        columns("ContactLines", blank(_CONTACTS, lengths)), columns("ImpactLines", blank(_IMPACTS, lengths)),
+        np.zeros(2, np.int64)))
 
 
 @kernel
 def write_step(record, k, step, state, port):
     """Copy step number `step` into line k of the chunk."""
+    line = record.steps
     for i in range(state.q.shape[0]):
-        record.q[k, i] = state.q[i]
+        line.q[k, i] = state.q[i]
     for i in range(state.v.shape[0]):  # one loop: eight short ones would cost more than what they copy
-        record.v[k, i] = state.v[i]
-        record.hand_force[k, i] = port.hand_force[i]
-        record.coupling_force[k, i] = port.coupling_force[i]
-        record.penalty_force[k, i] = state.penalty_force[i]
-        record.friction_force[k, i] = state.friction_force[i]
-        record.impulse[k, i] = state.impulse[i]
-        record.environment_force[k, i] = port.environment_force[i]
+        line.v[k, i] = state.v[i]
+        line.hand_force[k, i] = port.hand_force[i]
+        line.coupling_force[k, i] = port.coupling_force[i]
+        line.penalty_force[k, i] = state.penalty_force[i]
+        line.friction_force[k, i] = state.friction_force[i]
+        line.impulse[k, i] = state.impulse[i]
+        line.environment_force[k, i] = port.environment_force[i]
     for i in range(port.device_q.shape[0]):
-        record.device_q[k, i] = port.device_q[i]
+        line.device_q[k, i] = port.device_q[i]
     for i in range(port.device_v.shape[0]):
-        record.device_v[k, i] = port.device_v[i]
-        record.device_force[k, i] = port.device_force[i]
-    record.state[k] = contact_state(state, port.tool_tree)
+        line.device_v[k, i] = port.device_v[i]
+        line.device_force[k, i] = port.device_force[i]
+    line.state[k] = contact_state(state, port.tool_tree)
     _write_contacts(record, k, state)
     if state.impacts.logged[0] > 0:
         _write_impacts(record, step, state)
@@ -114,57 +79,110 @@ def write_step(record, k, step, state, port):
 
 @kernel
 def _write_contacts(record, k, state):
-    contacts, count, m = state.contacts, state.contact_count[0], record.used[0]
+    line, contacts, count, m = record.contacts, state.contacts, state.contact_count[0], record.used[0]
     record.contact_count[k] = count
     record.used[0] = m + count
     for i in range(count):
-        record.body_a[m], record.body_b[m] = contacts.body_a[i], contacts.body_b[i]
-        store(record.point, m, load(contacts.point, i))
-        store(record.normal, m, load(contacts.normal, i))
-        store(record.contact_friction, m, load(contacts.friction_force, i))
-        record.gap[m], record.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
-        record.normal_force[m] = contacts.normal_force[i]
-        record.contact_impulse[m], record.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
+        line.body_a[m], line.body_b[m] = contacts.body_a[i], contacts.body_b[i]
+        store(line.point, m, load(contacts.point, i))
+        store(line.normal, m, load(contacts.normal, i))
+        store(line.friction_force, m, load(contacts.friction_force, i))
+        line.gap[m], line.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
+        line.normal_force[m] = contacts.normal_force[i]
+        line.impulse[m], line.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
         m += 1
 
 
 @kernel
 def _write_impacts(record, step, state):
-    log = state.impacts
+    line, log = record.impacts, state.impacts
     for i in range(log.logged[0]):
         m = record.used[1]
-        record.impact_step[m], record.impact_group[m] = step, log.group[i]
-        record.impact_rows[m], record.impact_rank[m] = log.rows[i], log.rank[i]
-        record.impact_scale[m], record.impact_clamp[m] = log.scale[i], log.clamp[i]
-        record.impact_energy[m], record.impact_friction_share[m] = log.energy_lost[i], log.friction_share[i]
-        record.impact_approaching[m], record.impact_solved[m] = log.approaching[i], log.solved[i]
-        copy_into(record.impact_v_minus[m], log.v_minus[i])
-        copy_into(record.impact_v_plus[m], log.v_plus[i])
-        copy_into(record.impact_impulse[m], log.impulse[i])
+        line.step[m], line.group[m] = step, log.group[i]
+        line.rows[m], line.rank[m] = log.rows[i], log.rank[i]
+        line.scale[m], line.clamp[m] = log.scale[i], log.clamp[i]
+        line.energy_lost[m], line.friction_share[m] = log.energy_lost[i], log.friction_share[i]
+        line.approaching[m], line.solved[m] = log.approaching[i], log.solved[i]
+        copy_into(line.v_minus[m], log.v_minus[i])
+        copy_into(line.v_plus[m], log.v_plus[i])
+        copy_into(line.impulse[m], log.impulse[i])
         record.used[1] = m + 1
 
 
-def joined(records: Sequence[Record], steps: Sequence[int], name: str, used: int | None = None) -> np.ndarray:
-    """One array over all chunks; `used` picks the ragged count (0 contacts, 1 impacts), None the steps."""
-    sizes = steps if used is None else [int(record.used[used]) for record in records]
-    return np.concatenate([getattr(record, name)[:size] for record, size in zip(records, sizes, strict=True)])
+class Recorder:
+    """The chunks of a simulation in the making, joined into a Run with its energy ledger and effects."""
+
+    def __init__(self, simulation: Any) -> None:
+        self.simulation = simulation
+        port, state = simulation.port, simulation.state
+        self.start = {"q": state.q.copy(), "v": state.v.copy(),
+                      "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
+        self.records: list[Record] = []
+        self.sizes: list[int] = []
+        self.seconds: list[float] = []
+        self.steps = 0
+
+    def chunk(self, total: int) -> BaseException | None:
+        """Do and keep the next chunk; return what stopped it before its end."""
+        record, size = self.blank(total)
+        if self.steps == 0:
+            self.simulation.prepare(record)  # what is timed is steps alone
+        started = time.perf_counter()
+        done, stop = self.simulation.advance_chunk(record, size)
+        self.keep(record, done, time.perf_counter() - started)
+        return stop
+
+    def blank(self, total: int) -> tuple[Record, int]:
+        """Return an empty record for the next chunk and its number of steps; the whole run has `total`."""
+        system, port = self.simulation.system, self.simulation.port
+        size = chunk_steps(system.capacity, total - self.steps)
+        coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
+        return make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs)), size
+
+    def keep(self, record: Record, steps: int, seconds: float) -> None:
+        """Take a chunk of which `steps` lines are written, in `seconds` of work."""
+        self.records.append(record)
+        self.sizes.append(steps)
+        self.seconds.append(seconds)
+        self.steps += steps
+
+    def joined(self, lines: str, name: str) -> np.ndarray:
+        """One array over all chunks: a column of the record's `steps`, `contacts` or `impacts`."""
+        sizes = self.sizes if lines == "steps" else [int(each.used[int(lines == "impacts")]) for each in self.records]
+        return np.concatenate([
+            getattr(getattr(each, lines), name)[:size] for each, size in zip(self.records, sizes, strict=True)])
+
+    def run(self, world: str, stopped: str) -> Run:
+        """Everything recorded so far as a Run; `stopped` says why it is not complete."""
+        simulation, system = self.simulation, self.simulation.system
+        states = {each.name: np.concatenate([self.start[each.name][None], self.joined("steps", each.name)])
+                  for each in _STATES}
+        counts = [each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)]
+        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+        law, coupling = simulation.law, simulation.coupling
+        run = Run(
+            scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
+            scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
+            law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
+            coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
+            coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
+            velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
+            body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
+            time=np.arange(self.steps + 1, dtype=np.float64) * system.dt, **states,
+            **{each.name: self.joined("steps", each.name) for each in _STEPS},
+            contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in _CONTACTS}),
+            impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in _IMPACTS}),
+            energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason) for one in simulation.effects),
+            chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
+            kernel="compiled" if simulation.compiled else "python", stopped=stopped,
+        )
+        return replace(run, energy=_energy(run, system))
 
 
-def contact_table(records: Sequence[Record], steps: Sequence[int]) -> ContactTable:
-    """The ragged table of all contacts."""
-    counts = joined(records, steps, "contact_count")
-    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    names = {"impulse": "contact_impulse", "friction_force": "contact_friction"}
-    fields = ("body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
-              "impulse", "is_new")
-    columns = {field: joined(records, steps, names.get(field, field), used=0) for field in fields}
-    return ContactTable(offsets=offsets, **columns)
-
-
-def impact_table(records: Sequence[Record], steps: Sequence[int]) -> ImpactTable:
-    """The table of all impacts."""
-    names = {"step": "impact_step", "group": "impact_group", "rows": "impact_rows", "rank": "impact_rank",
-             "scale": "impact_scale", "clamp": "impact_clamp", "energy_lost": "impact_energy",
-             "friction_share": "impact_friction_share", "approaching": "impact_approaching", "solved": "impact_solved",
-             "v_minus": "impact_v_minus", "v_plus": "impact_v_plus", "impulse": "impact_impulse"}
-    return ImpactTable(**{field: joined(records, steps, name, used=1) for field, name in names.items()})
+def _energy(run: Run, system: System) -> dict[str, Floats]:
+    """The ledger; without the tool's balance under a unilateral coupler, where the tool is carried at times."""
+    device = system.device_mechanism() if run.coupling != "none" else None
+    ledger = energy_of_run(run, system.mechanism, system.gravity, device)
+    if run.coupling != "unilateral":
+        return ledger
+    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED}

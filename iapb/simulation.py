@@ -25,11 +25,9 @@ from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
-from iapb.haptics.device import Device
-from iapb.haptics.external import DeviceLink
+from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
-from iapb.recorder import Recorder
-from iapb.recording import Record, write_step
+from iapb.recording import Record, Recorder, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, load_scene
 from iapb.system import System

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import Entry, block
+from iapb.compiled import Entry, block, columns
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.impact import make_impact_work
@@ -16,7 +16,7 @@ from iapb.contact.kernels.impact_friction import make_friction_work
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
-from iapb.contact.kernels.world import ImpactLog, State, Switches, World
+from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError, IapbError
@@ -26,6 +26,7 @@ from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.mechanics.mechanism import Mechanism
+from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
     mechanism_of,
@@ -228,15 +229,13 @@ def make_state(system: System) -> State:
     ))
 
 
-def _make_log(trees: int, d: int) -> ImpactLog:
+def _make_log(trees: int, d: int) -> Any:
     """An empty log; what a law written in Python says nothing of stays as it is here."""
-    counts = {name: np.zeros(trees, np.int64) for name in ("group", "rows", "rank")}
-    numbers = {name: np.ones(trees) for name in ("scale", "clamp", "friction_share")}
-    vectors = {name: np.zeros((trees, d)) for name in ("v_minus", "v_plus", "impulse")}
-    return ImpactLog(
-        logged=np.zeros(1, np.int64), energy_lost=np.zeros(trees), approaching=np.full(trees, -1, np.int64),
-        solved=np.ones(trees, np.bool_), **counts, **numbers, **vectors,
-    )
+    lines = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
+    for name in ("scale", "clamp", "friction_share", "solved"):
+        lines[name][:] = 1
+    lines["approaching"][:] = -1
+    return columns("ImpactLog", {"logged": np.zeros(1, np.int64), **lines})
 
 
 def _make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Port:

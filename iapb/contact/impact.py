@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.contact.impact_methods import (
+    ImpactInput,
     Method,
     Whitened,
+    check_input,
     damped,
     factored,
     gram_cholesky,
@@ -23,7 +25,6 @@ from iapb.contact.impact_methods import (
     poisson,
     svd,
 )
-from iapb.contact.impact_problem import ImpactInput, check_input
 from iapb.double_double import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
 from iapb.names import one_of

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.impact_problem import ImpactInput, check_input
+from iapb.contact.impact_methods import ImpactInput, check_input
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction, make_friction_work
 from iapb.contact.kernels.unilateral import make_push_work
@@ -124,7 +124,7 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
     return found
 
 
-# The arguments of an impact with friction, checked and scaled as `impact_problem` does.
+# The arguments of an impact with friction, checked and scaled as `check_input` does.
 
 
 class FrictionInput(NamedTuple):

@@ -15,17 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.kernels.arrays import (
-    CONTINUOUS,
-    FIXED,
-    FREE_FLYER,
-    PLANAR,
-    PLANAR_SE2,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-)
 from iapb.names import one_of
+
+# Codes of the kinds in the kernels.
+FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR, PLANAR_SE2, SPHERICAL, FREE_FLYER = range(8)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, 
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.structure import collect_arrays, moving_parts, tree_ranges
+from iapb.mechanics.urdf import read_urdf
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
@@ -104,8 +105,6 @@ class Mechanism:
     @classmethod
     def from_urdf(cls, path: str | Path, floating_base: bool = False) -> Mechanism:
         """Read a URDF file; see `iapb.mechanics.urdf.read_urdf`."""
-        from iapb.mechanics.urdf import read_urdf
-
         return cls(read_urdf(path, floating_base))
 
     @property

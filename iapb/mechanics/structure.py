@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from iapb.dense import product
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2, SPHERICAL, MechanismArrays
+from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2, SPHERICAL
+from iapb.mechanics.kernels.arrays import MechanismArrays
 
 
 def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:

@@ -1,8 +1,7 @@
 """Scenes: what a scene file may say, read and checked."""
 
-from iapb.scene.model import Scene, SpatialScene
+from iapb.scene.model import Scene, SpatialScene, scene_schema
 from iapb.scene.reading import find_scene, load_scene, scene_folder, scene_from_text, scene_names
-from iapb.scene.schema import scene_schema
 
 __all__ = [
     "Scene",

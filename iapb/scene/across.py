@@ -10,7 +10,8 @@ from typing import Any
 
 from pydantic_core import InitErrorDetails
 
-from iapb.scene.bodies import JOINTS, WORLD
+from iapb.mechanics.joints import KINDS
+from iapb.scene.bodies import WORLD
 from iapb.scene.parts import located
 
 MAX_SHAPES = 4000  # bodies and walls together: candidate pairs grow with its square
@@ -139,6 +140,6 @@ def _tree_coordinates(bodies: list[dict[str, Any]], held: str) -> int | None:
     roots = _roots(bodies)
     held_root = roots[[_name(body) for body in bodies].index(held)]
     joints = [_name(body, "joint") for body in bodies]
-    if held_root is None or None in roots or any(joint not in JOINTS for joint in joints):
+    if held_root is None or None in roots or any(joint not in KINDS for joint in joints):
         return None
-    return sum(JOINTS[joint or ""].velocities for joint, root in zip(joints, roots, strict=True) if root == held_root)
+    return sum(KINDS[joint or ""].nv for joint, root in zip(joints, roots, strict=True) if root == held_root)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction as Exact
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from iapb.mechanics.joints import KINDS
 from iapb.scene.parts import (
     SMALLEST_POSITIVE,
     Name,
@@ -31,25 +32,6 @@ MAX_SHAPES_OF_BODY = 64
 MAX_VERTICES = 256  # a polygon with more is a circle
 UNIT_TOLERANCE = 1e-6  # length of a quaternion as written: six digits are enough
 _STRAIGHT = 1e-9  # sine of the smallest turn that counts as a corner: below it, rounding decides convexity
-
-
-class JointSize(NamedTuple):
-    """Entries of position and velocity of a joint, and its position at rest."""
-
-    coordinates: int
-    velocities: int
-    rest: tuple[float, ...]
-
-
-JOINTS = {
-    "fixed": JointSize(0, 0, ()),
-    "revolute": JointSize(1, 1, (0.0,)),
-    "continuous": JointSize(2, 1, (1.0, 0.0)),
-    "prismatic": JointSize(1, 1, (0.0,)),
-    "planar": JointSize(3, 3, ORIGIN),
-    "spherical": JointSize(4, 3, (*ORIGIN, 1.0)),
-    "free_flyer": JointSize(7, 6, (*ORIGIN, *ORIGIN, 1.0)),
-}
 
 
 def with_direction(vector: tuple[float, ...]) -> tuple[float, ...]:
@@ -217,7 +199,7 @@ class _AnyBody(Part):
         if joint is None:
             return given
         moving = info.field_name == "velocity"
-        count = JOINTS[joint].velocities if moving else JOINTS[joint].coordinates
+        count = KINDS[joint].nv if moving else KINDS[joint].nq
         if given and len(given) != count:
             noun = "velocity" if moving else "coordinate"
             raise expectation(f"{count} number{'' if count == 1 else 's'}, one per {noun} of a {joint} joint")
@@ -226,7 +208,7 @@ class _AnyBody(Part):
         turn = {"continuous": given, "spherical": given, "free_flyer": given[3:]}.get(joint)
         if turn and abs(math.hypot(*turn) - 1.0) > UNIT_TOLERANCE:
             raise expectation("a rotation of length one: cos, sin or quaternion x, y, z, w")
-        return given or JOINTS[joint].rest
+        return given or KINDS[joint].neutral
 
 
 class Body(_AnyBody):

@@ -10,6 +10,7 @@ import io
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic.json_schema import models_json_schema
 from pydantic_core import InitErrorDetails
 
 from iapb.errors import ArgumentError, SceneError
@@ -29,6 +30,7 @@ from iapb.scene.parts import (
     expectation,
     mistakes_of,
 )
+from iapb.scene.robots import Robot
 
 MAX_BODIES = 2000
 MAX_WALLS = 2000
@@ -280,3 +282,41 @@ def _key(place: Any, step: str, path: str) -> str | int:
         return int(step)
     known = [name for name in names if name] or [f"0 to {len(place) - 1}"]
     raise ArgumentError("values", path, one_of(step, known, f"at {step!r} one of: "))
+
+
+# The JSON Schema of scene files, for editors: planar scenes, and scenes in space with their robots.
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_HERE = "#/$defs/"
+
+
+def scene_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scene files; every default stands in its field's description.
+
+    A file with the field `dimensions` is judged as a scene in space, any other as a planar one, as the reader does.
+    """
+    _, schema = models_json_schema([(model, "validation") for model in (Scene, SpatialScene, Robot)])
+    parts = schema["$defs"]
+    parts["SpatialScene"] = _with_robots(parts["SpatialScene"])
+    return {
+        "$schema": DIALECT, "title": "Scene file", "type": "object",
+        "if": {"required": ["dimensions"]},
+        "then": {"$ref": f"{_HERE}SpatialScene"}, "else": {"$ref": f"{_HERE}Scene"},
+        "$defs": parts,
+    }
+
+
+def _with_robots(space: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of scenes in space with the field `robots`, which the reader turns into bodies.
+
+    A scene needs a body or a robot; where there are robots, `bodies` may be empty or left out.
+    """
+    robots = {"type": "array", "items": {"$ref": f"{_HERE}Robot"},
+              "description": "URDF files that become bodies; default: none"}
+    bodies = {name: value for name, value in space["properties"]["bodies"].items() if name != "minItems"}
+    return space | {
+        "properties": space["properties"] | {"bodies": bodies, "robots": robots},
+        "required": [name for name in space["required"] if name != "bodies"],
+        "anyOf": [{"required": ["bodies"], "properties": {"bodies": {"minItems": 1}}}, {"required": ["robots"]}],
+    }

@@ -24,8 +24,9 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from iapb.errors import ArgumentError, Mistake, shown
+from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
-from iapb.scene.bodies import JOINTS, ORIGIN, SpatialShape
+from iapb.scene.bodies import ORIGIN, SpatialShape
 from iapb.scene.parts import Name, Number, Part, Place, Text, Vector3, written
 
 HELD = ("box", "sphere")  # of the URDF's geometries, those that the compiled narrow phase knows
@@ -128,7 +129,7 @@ def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[s
         "mass": link.mass,
         "inertia": link.inertia.tolist(),
         "shapes": shapes,
-        "position": list(robot.position.get(link.name, JOINTS[link.joint.kind].rest)),
+        "position": list(robot.position.get(link.name, KINDS[link.joint.kind].neutral)),
         "velocity": list(robot.velocity.get(link.name, ())),
     }
     if link.joint.kind in ("revolute", "continuous", "prismatic"):

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import IapbError
-from iapb.recorder import Recorder
-from iapb.recording import Record
+from iapb.recording import Record, Recorder
 from iapb.run import Run
 from iapb.simulation import INTERRUPTED, Simulation
 from reports.live.budget import RowBudget

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
-from iapb.run import ContactTable, ImpactTable, Run
+from iapb.run import ContactTable, ImpactTable, Run, blank, quantities
 from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
 from reports.store.runs import write_run
 from verification.impacts import Floats, ImpactCase
@@ -64,25 +64,19 @@ def write_broken_impact(path: Path, broken: BrokenImpact) -> Path:
 def impact_run(broken: BrokenImpact) -> Run:
     """Return the run that such an impact is: it stops where its first step has struck."""
     case, after = broken.struck.case, broken.struck.velocity_after
-    names = tuple(f"v_{k}" for k in range(case.coordinates))
+    d = case.coordinates
+    lengths = {"time": 1, "step": 0, "step_edge": 1, "contact": 0, "axis": 3, "coordinate": 0, "velocity": d,
+               "device_coordinate": 0, "device_velocity": 0}  # fmt: skip
     none = {"coordinate_names": (), "coordinate_units": (), "body_names": (), "scene_resolved": {}, "energy": {},
             "coupling_settings": {}, "tool_dofs": (0, 0), "tool_coordinates": (0, 0), "effects": ()}  # fmt: skip
-    states = {"time": np.zeros(1), "q": np.zeros((1, 0)), "v": np.array([case.velocity], np.float64),
-              "device_q": np.zeros((1, 0)), "device_v": np.zeros((1, 0))}  # fmt: skip
-    forces = ("hand_force", "coupling_force", "penalty_force", "friction_force", "impulse", "environment_force")
-    steps = {name: np.zeros((0, case.coordinates)) for name in forces}
+    arrays = blank((*quantities(Run, "time"), *quantities(Run, "step")), lengths)
+    arrays["v"][0] = case.velocity
     return Run(scene_name=f"impact: {case.family or 'of bare numbers'}", scene_source=_SOURCE, world="no world",
                law=broken.resolver, law_settings={"restitution": np.asarray(case.given_restitution()).tolist()},
                coupling="none", dt=0.0, complete=False, stopped=broken.words(), kernel="none",
-               velocity_names=names, velocity_units=("1",) * len(names), device_force=np.zeros((0, 0)),
-               state=np.zeros(0, np.int8), contacts=_no_contacts(), impacts=_impacts(case, broken.struck.rows, after),
-               **none, **states, **steps)  # type: ignore[arg-type]  # fmt: skip
-
-
-def _no_contacts() -> ContactTable:
-    whole, number, axes = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3))
-    return ContactTable(np.zeros(1, np.int64), whole, whole, axes, axes, number, number, number, axes, number,
-                        np.zeros(0, np.bool_))  # fmt: skip
+               velocity_names=tuple(f"v_{k}" for k in range(d)), velocity_units=("1",) * d, time=np.zeros(1),
+               contacts=ContactTable(**blank(quantities(ContactTable), lengths)),
+               impacts=_impacts(case, broken.struck.rows, after), **none, **arrays)  # type: ignore[arg-type]  # fmt: skip
 
 
 def _impacts(case: ImpactCase, rows: tuple[int, ...], velocity_after: Floats) -> ImpactTable:

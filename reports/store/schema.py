@@ -1,10 +1,10 @@
-"""What a run file holds, and where: the table that the writer and the reader share.
+"""Where a run file holds what: the groups that the writer and the reader share, of the quantities of `iapb.run`.
 
     /scene, /law, /coupling   texts: name, YAML source, every setting as JSON
     /trajectory               states at n + 1 instants
     /steps                    forces, impulse and contact state of the n steps between them
     /contacts                 ragged: those of step k are the rows offsets[k]:offsets[k + 1]
-    /impacts                  one row per colliding group and step
+    /impacts                  one row per step and island of a colliding group
     /energy                   the ledger, on instants and on steps
     /effects                  what was on, and why
     /struck                   only where an impact of bare numbers broke a law: see reports.store.impact
@@ -16,100 +16,24 @@ Each group carries its own dimension scales, so that it opens as one xarray data
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.run import STATE_NAMES, Run
+from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Quantity, Run, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
 FORMAT_VERSION = 2  # 2: names and units of velocities, which quaternions need
 
-# Units of generalized quantities follow the unit of their coordinate or of their velocity.
-POSITION = {"m": "m", "rad": "rad", "1": "1"}
-# "1": an impact of bare numbers, which no scene gives a unit.
-VELOCITY = {"m/s": "m/s", "rad/s": "rad/s", "1": "1"}
-FORCE = {"m/s": "N", "rad/s": "N m", "1": "1"}
-IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One dataset: its name (also the attribute of the record), dimensions, unit and meaning.
-
-    A `unit` that is a mapping belongs to a generalized quantity: the unit for each unit of coordinate
-    or, along velocities, of velocity.
-    """
-
-    name: str
-    dimensions: tuple[str, ...]
-    unit: str | dict[str, str]
-    meaning: str
-
-
-TRAJECTORY = (
-    Quantity("q", ("time", "coordinate"), POSITION, "generalized configuration"),
-    Quantity("v", ("time", "velocity"), VELOCITY, "generalized velocity"),
-    Quantity("device_q", ("time", "device_coordinate"), POSITION, "configuration of the device"),
-    Quantity("device_v", ("time", "device_velocity"), VELOCITY, "velocity of the device"),
-)
-
-STEPS = (
-    Quantity("hand_force", ("step", "velocity"), FORCE, "generalized force of the hand on the tool"),
-    Quantity("coupling_force", ("step", "velocity"), FORCE, "force of the coupling on the tool"),
-    Quantity("penalty_force", ("step", "velocity"), FORCE, "normal contact forces, or constraint forces"),
-    Quantity("friction_force", ("step", "velocity"), FORCE, "friction forces"),
-    Quantity("impulse", ("step", "velocity"), IMPULSE, "generalized collision impulse of the step"),
-    Quantity("environment_force", ("step", "velocity"), FORCE, "contact forces + impulse / dt (26)"),
-    Quantity("device_force", ("step", "device_velocity"), FORCE, "what the device's actuators apply"),
-    Quantity("state", ("step",), "1", "contact state of the tool's group"),
-)
-
-CONTACTS = (
-    Quantity("offsets", ("step_edge",), "1", "first row of each step's contacts; the last entry closes"),
-    Quantity("body_a", ("contact",), "1", "moving body that the normal points into"),
-    Quantity("body_b", ("contact",), "1", "other body, -1 = the static world"),
-    Quantity("point", ("contact", "axis"), "m", "contact point, world axes"),
-    Quantity("normal", ("contact", "axis"), "1", "unit normal, from b into a"),
-    Quantity("gap", ("contact",), "m", "distance, negative = overlap"),
-    Quantity("normal_velocity", ("contact",), "m/s", "before the step's impulse, positive separates"),
-    Quantity("normal_force", ("contact",), "N", "force on a along the normal"),
-    Quantity("friction_force", ("contact", "axis"), "N", "friction force on a"),
-    Quantity("impulse", ("contact",), "N s", "collision impulse on a along the normal"),
-    Quantity("is_new", ("contact",), "1", "1 where the contact was not there in the step before"),
-)
-
-IMPACTS = (
-    Quantity("step", ("impact",), "1", "step in which it happened"),
-    Quantity("group", ("impact",), "1", "first tree of those resolved together"),
-    Quantity("v_minus", ("impact", "velocity"), VELOCITY, "generalized velocity before"),
-    Quantity("v_plus", ("impact", "velocity"), VELOCITY, "generalized velocity after"),
-    Quantity("impulse", ("impact", "velocity"), IMPULSE, "generalized impulse"),
-    Quantity("rows", ("impact",), "1", "rows given to the resolver"),
-    Quantity("rank", ("impact",), "1", "rows it found independent and used"),
-    Quantity("energy_lost", ("impact",), "J", "kinetic energy before minus after"),
-    Quantity("scale", ("impact",), "1", "factor by which the device limit scaled the impulse"),
-    Quantity("clamp", ("impact",), "1", "factor of the final energy clamp"),
-    Quantity("friction_share", ("impact",), "1", "factor by which friction was reduced (energy, cones)"),
-    Quantity("approaching", ("impact",), "1", "rows that approach still afterwards, -1 = the law does not say"),
-    Quantity("solved", ("impact",), "1", "0 where the law is not met (friction reduced); passive all the same"),
-)
-
-TIMINGS = (
-    Quantity("chunk_steps", ("chunk",), "1", "steps per timed chunk"),
-    Quantity("chunk_seconds", ("chunk",), "s", "wall time of each chunk"),
-)
-
 # group -> its quantities, the record that holds them, and the quantity that a plotting tool shows first
 GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any], str]] = {
-    "trajectory": (TRAJECTORY, lambda run: run, "v"),
-    "steps": (STEPS, lambda run: run, "environment_force"),
-    "contacts": (CONTACTS, lambda run: run.contacts, "gap"),
-    "impacts": (IMPACTS, lambda run: run.impacts, "energy_lost"),
-    "timings": (TIMINGS, lambda run: run, "chunk_seconds"),
+    "trajectory": (quantities(Run, "time"), lambda run: run, "v"),
+    "steps": (quantities(Run, "step"), lambda run: run, "environment_force"),
+    "contacts": (quantities(ContactTable), lambda run: run.contacts, "gap"),
+    "impacts": (quantities(ImpactTable), lambda run: run.impacts, "energy_lost"),
+    "timings": (quantities(Run, "chunk"), lambda run: run, "chunk_seconds"),
 }
 RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy ledger: the content hash
 

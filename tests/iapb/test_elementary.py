@@ -1,14 +1,25 @@
-"""Elementary functions against 100-digit arithmetic: the correctly rounded result, at all sizes."""
+"""Arithmetic without libm and BLAS against exact numbers: functions, double-double sums, small matrices."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from iapb.dense import product, solve
+from iapb.double_double import (
+    add_product,
+    kinetic_energies,
+    quadratic_forms,
+    two_product,
+    two_sum,
+)
 from iapb.elementary import arc_tangent, cosine, hypotenuse, sine, sine_cosine
 
 NUMBERS = np.random.default_rng(8)
@@ -57,3 +68,87 @@ def test_what_is_not_finite_stays_so() -> None:
     assert all(math.isnan(value) for x in (math.inf, -math.inf, math.nan) for value in sine_cosine(x))
     assert hypotenuse(-math.inf, 1.0) == math.inf
     assert math.isnan(hypotenuse(math.nan, 1.0))
+
+
+DOUBLES = st.floats(-1e100, 1e100, allow_nan=False).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
+
+
+@given(DOUBLES, DOUBLES)
+def test_sum_and_product_are_exact(a: float, b: float) -> None:
+    assert sum(map(Fraction, two_sum(a, b))) == Fraction(a) + Fraction(b)
+    assert sum(map(Fraction, two_product(a, b))) == Fraction(a) * Fraction(b)
+
+
+@given(DOUBLES, DOUBLES, DOUBLES)
+def test_accumulation_keeps_a_hundred_bits(a: float, b: float, c: float) -> None:
+    high, low = add_product(a, 0.0, b, 0.0, c)
+    exact = Fraction(a) + Fraction(b) * Fraction(c)
+    size = abs(Fraction(a)) + abs(Fraction(b) * Fraction(c))
+    assert abs(Fraction(high) + Fraction(low) - exact) <= size * Fraction(1, 2**100)
+
+
+def exact_form(mass: np.ndarray, x: np.ndarray, y: np.ndarray) -> Fraction:
+    d = len(x)
+    return sum(Fraction(x[i]) * Fraction(mass[i, j]) * Fraction(y[j]) for i in range(d) for j in range(d))
+
+
+def graded(seed: int, d: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """κ(M) = 1e14 and two velocities that differ in the last digits: what cancels in plain doubles."""
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass = basis * np.logspace(0, -14, d) @ basis.T
+    v = basis[:, -1] + 1e-9 * rng.normal(size=d)
+    return 0.5 * (mass + mass.T), v, v * (1.0 + 1e-13 * rng.normal(size=d))
+
+
+@given(st.integers(0, 10_000))
+def test_energies_are_right_to_the_last_digits(seed: int) -> None:
+    mass, before, after = graded(seed)
+    energy, change = kinetic_energies(mass, before, after)
+    exact_energy = exact_form(mass, before, before) / 2
+    exact_change = exact_form(mass, after, after) / 2 - exact_energy
+    assert abs(Fraction(energy) - exact_energy) <= exact_energy * Fraction(1, 2**51)
+    # What remains is 2^-100 of the terms that cancelled, here up to 1e14 times the energy.
+    assert abs(Fraction(change) - exact_change) <= abs(exact_change) / 2**51 + Fraction(1, 2**90)
+
+
+@given(st.integers(0, 10_000))
+def test_quadratic_forms_against_fractions(seed: int) -> None:
+    mass, v, other = graded(seed)
+    change = other - v
+    cross, square = quadratic_forms(mass, v, change)
+    for value, exact in ((cross, exact_form(mass, v, change)), (square, exact_form(mass, change, change))):
+        assert abs(Fraction(value) - exact) <= abs(exact) / 2**50 + Fraction(1, 2**95)
+
+
+def test_plain_doubles_would_not_do() -> None:
+    """The wrong twin: the same change of energy in doubles has no right digit."""
+    mass, before, after = graded(1)
+    exact = exact_form(mass, after, after) - exact_form(mass, before, before)
+    plain = after @ mass @ after - before @ mass @ before
+    assert abs(Fraction(float(plain)) - exact) > abs(exact) / 10
+
+
+def test_products_of_integers_are_exact() -> None:
+    numbers = np.random.default_rng(1)
+    a, b = numbers.integers(-9, 10, (4, 3)), numbers.integers(-9, 10, (3, 5))
+    np.testing.assert_array_equal(product(a, b), a @ b)
+    np.testing.assert_array_equal(product(b.T, a[0]), b.T @ a[0])
+    assert product(np.zeros((0, 3)), b).shape == (0, 5)
+    assert (product(np.zeros((2, 0)), np.zeros(0)) == 0.0).all()
+
+
+def test_terms_are_added_in_order() -> None:
+    assert product([[1.0, 1e16, -1e16]], [1.0, 1.0, 1.0])[0] == (1.0 + 1e16) - 1e16
+
+
+def test_solve_exchanges_rows() -> None:
+    matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [4.0, 1.0, 0.0]])
+    x = solve(matrix, [5.0, 1.0, 7.0])
+    exact = [sum(Fraction(m) * Fraction(value) for m, value in zip(row, x, strict=True)) for row in matrix]
+    assert exact == [5, 1, 7]
+
+
+def test_a_singular_matrix_is_refused() -> None:
+    with pytest.raises(ZeroDivisionError, match="singular"):
+        solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0])

@@ -1,4 +1,4 @@
-"""Errors cross processes: a pool's worker pickles what it raises."""
+"""Errors cross processes, and offer the nearest name."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from iapb.errors import (
     SceneError,
     SolverError,
 )
+from iapb.names import nearest, one_of
 
 ERRORS = [
     ArgumentError("mass", -1.0, "at least 0 kg"),
@@ -54,3 +55,23 @@ def test_a_value_that_cannot_travel_travels_as_text() -> None:
 def test_an_error_that_is_raised_elsewhere_is_caught_by_its_kind() -> None:
     with pytest.raises(ValueError, match="mass = -1"):
         raise pickle.loads(pickle.dumps(ERRORS[0]))
+
+
+SCENES = ("peg_corner", "peg_hole", "two_discs")
+
+
+@pytest.mark.parametrize(("wrong", "right"), [
+    ("peg_cornr", "peg_corner"), ("PEG_HOLE", "peg_hole"), ("twodiscs", "two_discs"), ("submarine", ""), ("", ""),
+    (3, ""), (None, ""),
+])
+def test_the_nearest_name_is_found_whatever_its_capitals(wrong, right):
+    assert nearest(wrong, SCENES) == right
+
+
+def test_all_names_are_listed_and_the_guess_comes_last():
+    assert one_of("peg_cornr", SCENES) == "one of peg_corner, peg_hole, two_discs; did you mean peg_corner?"
+    assert one_of("submarine", SCENES, "a file, or: ") == "a file, or: peg_corner, peg_hole, two_discs"
+
+
+def test_a_guess_is_spelt_as_it_is_known():
+    assert nearest("iapb", ["ideal", "IAPB", "PB"]) == "IAPB"

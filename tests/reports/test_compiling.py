@@ -49,7 +49,7 @@ def test_of_all_workers_only_the_first_tells_that_it_compiles(capsys):
 @needs_compiler
 def test_the_times_of_a_run_leave_out_compiling(monkeypatch):
     """The first call of a step compiles it: here it counts 1000 s for that."""
-    import iapb.recorder
+    import iapb.recording
     import iapb.simulation
 
     clock, calls = [0.0], []
@@ -61,7 +61,7 @@ def test_the_times_of_a_run_leave_out_compiling(monkeypatch):
             return super().__call__(*arguments)
 
     monkeypatch.setattr(iapb.simulation, "Entry", SlowAtFirst)
-    monkeypatch.setattr(iapb.recorder.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(iapb.recording.time, "perf_counter", lambda: clock[0])
     run = simulate(find_scene("peg_corner"), steps=600)
     assert calls == [0, 512, 88] and run.chunk_seconds.tolist() == [1.0, 1.0]
 

@@ -27,7 +27,7 @@ from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import scene_folder
-from iapb.scene.document import read_document
+from iapb.scene.reading import read_document
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import read_problem
 from reference.fclib import _write_rows, write_fclib

@@ -199,7 +199,7 @@ class Loop(RecordedLoop):
         """Seconds per step of one whole run."""
         seconds, every = super().sample(), slice(None, None, max(1, self.steps // SAMPLES))
         self.q, self.v, self.device_q = (
-            np.concatenate([getattr(record, name) for record in self.recording.records])[every]
+            np.concatenate([getattr(record.steps, name) for record in self.recording.records])[every]
             for name in ("q", "v", "device_q")
         )
         return seconds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from iapb.recorder import Recorder
+from iapb.recording import Recorder
 from verification.clock import timed
 
 

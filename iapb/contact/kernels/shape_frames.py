@@ -67,18 +67,8 @@ def relative_frame(shapes, onto, other, R, p):
 
 @kernel
 def store_in_plane(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
-    """Write one contact at row `count`; return the next row, or -1 when the buffer is full."""
-    if count >= buffer.gap.shape[0]:
-        return -1
-    buffer.shape_a[count] = a
-    buffer.shape_b[count] = b
-    buffer.body_a[count] = shapes.body[a]
-    buffer.body_b[count] = shapes.body[b]
-    buffer.feature[count] = feature
-    store(buffer.point, count, (x, y, 0.0))
-    store(buffer.normal, count, (nx, ny, 0.0))
-    buffer.gap[count] = gap
-    return count + 1
+    """`store_in_space` for a contact in the plane."""
+    return store_in_space(buffer, count, shapes, a, b, feature, (x, y, 0.0), (nx, ny, 0.0), gap)
 
 
 # The same in space, where vectors are tuples (see `iapb.mechanics.kernels.vectors`).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -106,22 +106,4 @@ class State(NamedTuple):
     work: ImpactWork
     push_work: PushWork
     friction_work: FrictionWork
-    impacts: ImpactLog
-
-
-class ImpactLog(NamedTuple):
-    """The impacts of one step, one row per colliding island."""
-
-    logged: np.ndarray  # (1,) int64: lines in use
-    group: np.ndarray  # (t,) int64
-    rows: np.ndarray  # (t,) int64
-    rank: np.ndarray  # (t,) int64
-    scale: np.ndarray  # (t,)
-    clamp: np.ndarray  # (t,)
-    friction_share: np.ndarray  # (t,)
-    energy_lost: np.ndarray  # (t,) [J]
-    approaching: np.ndarray  # (t,) int64
-    solved: np.ndarray  # (t,) bool
-    v_minus: np.ndarray  # (t, d)
-    v_plus: np.ndarray  # (t, d)
-    impulse: np.ndarray  # (t, d) [N s, N m s]
+    impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

@@ -7,9 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Codes of the joint kinds; iapb.mechanics.joints gives their layout.
-FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR, PLANAR_SE2, SPHERICAL, FREE_FLYER = range(8)
-
 
 class MechanismArrays(NamedTuple):
     """A mechanism as contiguous arrays; n bodies, d velocities. Parents come before children."""

@@ -6,7 +6,7 @@ composite's own centre of mass, where merging two bodies only adds positive term
 """
 
 from iapb.compiled import kernel
-from iapb.mechanics.kernels.arrays import FREE_FLYER, PLANAR_SE2
+from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2
 from iapb.mechanics.kernels.vectors import (
     accumulate,
     add,

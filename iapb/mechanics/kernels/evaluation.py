@@ -3,12 +3,10 @@
 The configurations come from outside, so these kernels check them; all others trust what they are given.
 """
 
-
-
 from math import isfinite, sqrt
 
 from iapb.compiled import kernel
-from iapb.mechanics.kernels.arrays import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
+from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia

@@ -1,10 +1,8 @@
 """Where every body is, and the world axis of every degree of freedom."""
 
-
-
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.mechanics.kernels.arrays import (
+from iapb.mechanics.joints import (
     CONTINUOUS,
     FIXED,
     FREE_FLYER,

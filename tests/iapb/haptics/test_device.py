@@ -1,19 +1,29 @@
-"""The simulated device: pure inertia, limits, delay and sensors."""
+"""The device, simulated, compiled or real: pure inertia, limits, delay and sensors."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.errors import ArgumentError
-from iapb.haptics.device import SimulatedDevice
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError, IapbError
+from iapb.haptics.coupling import FourChannel, UnilateralCoupler
+from iapb.haptics.device import DeviceReading, SimulatedDevice
+from iapb.haptics.kernels import engage, inside, move_device
+from iapb.recording import Recorder
+from iapb.run import FREE, RESTING
+from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.simulation import Simulation, simulate
+from iapb.system import System, coupling_of
+from reports.live.measure import simulated_device
 
 DT = 1.0 / 512.0
 MASS = np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0], [0.1, 0.0, 0.5]])
 REST = np.zeros(3)
-
 forces = st.lists(st.lists(st.floats(-20.0, 20.0), min_size=3, max_size=3), min_size=1, max_size=12)
 
 
@@ -88,3 +98,162 @@ def test_wrong_arguments_are_named(argument, settings):
     with pytest.raises(ArgumentError) as caught:
         SimulatedDevice(**{"mass_matrix": MASS, "q": REST, "dt": DT, **settings})
     assert caught.value.argument == argument
+
+
+GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
+
+
+def system_of(center: str, damping: str = "[0, 0, 0]") -> System:
+    """Two discs that overlap each other all the time, a tool that is the third body, and a wall."""
+    return System(scene_from_text(f"""
+name: three
+rate: 100
+duration: 1.0
+bodies:
+  - {{name: one, joint: planar, mass: 1, inertia: 1, shapes: [{{kind: circle, radius: 0.2}}], position: [5, 0, 0]}}
+  - {{name: other, joint: planar, mass: 1, inertia: 1, shapes: [{{kind: circle, radius: 0.2}}], position: [5.1, 0, 0]}}
+  - name: tool
+    joint: planar
+    mass: 2
+    inertia: 0.1
+    center_of_mass: {center}
+    shapes: [{{kind: box, size: [0.4, 0.2]}}]
+walls: [{{name: floor, kind: half_plane, point: [0, -0.5], normal: [0, 1]}}]
+contact: {{stiffness: 500}}
+hand: {{body: tool, force: [0, 0, 0]}}
+device: {{force_limit: [3, 2, 0.1], damping: {damping}}}
+"""))
+
+
+@pytest.mark.parametrize("center", ["[0, 0]", "[0.3, -0.2]"])
+@pytest.mark.parametrize("damping", [(0.0, 0.0, 0.0), (0.5, 2.0, 0.3)])
+def test_the_device_obeys_its_equation_of_motion(center: str, damping: tuple[float, ...]) -> None:
+    """M(q) a + B(q, v) = F_hand + F_actuators − b v; the new velocity moves it; the clock counts the step."""
+    system, rng = system_of(center, str(list(damping))), np.random.default_rng(0)
+    port = system.make_port(FourChannel(*GAINS))
+    device, world, state = system.device_mechanism(), system.world_under(Penalty()), system.make_state()
+    for step in range(5):
+        q = device.integrate(device.neutral(), rng.normal(size=3))
+        v, hand, actuators = rng.normal(size=(3, 3))
+        port.device_q[:], port.device_v[:] = q, v
+        port.device_hand_force[:], port.device_force[:] = hand, actuators
+        assert move_device(world, state, port)
+        force = hand + actuators - np.array(damping) * v - device.bias(q, v)
+        moved = v + world.dt * np.linalg.solve(device.mass_matrix(q), force)
+        assert port.device_v == pytest.approx(moved, abs=1e-13)
+        assert port.device_q == pytest.approx(device.integrate(q, moved, world.dt), abs=1e-13)
+        assert port.clock[0] == step + 1
+    for k in range(3):
+        port.device_q[:], port.device_v[:], port.device_force[:] = device.neutral(), 0.0, 0.0
+        port.device_force[k] = 1e200
+        assert not move_device(world, state, port)  # it left all bounds
+
+
+def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_something() -> None:
+    """Else the tool is where the device is. Other bodies that overlap do not count."""
+    system, rng, seen = system_of("[0.3, -0.2]"), np.random.default_rng(1), set()
+    world, state = system.world_under(Penalty()), system.make_state()
+    port: Any = system.make_port(UnilateralCoupler(*GAINS))
+    for _ in range(60):
+        state.q[6:], state.v[:] = rng.normal(size=3), rng.normal(size=9)
+        start = (4.9, 0.0) if rng.random() < 0.3 else (0.0, -0.3)
+        port.device_q[:], port.device_v[:] = [*(start + 0.3 * rng.normal(size=2)), rng.normal()], rng.normal(size=3)
+        at_device = state.q.copy()
+        at_device[6:] = port.device_q
+        found = system.contacts_at(at_device)
+        within = bool(np.any((found.body_a == 2) | (found.body_b == 2)))
+        q, v = state.q.copy(), state.v.copy()
+        assert bool(inside(world, state, port)) == within
+        state.state_of_tree[:] = (RESTING, RESTING, RESTING if rng.random() < 0.3 else FREE)
+        on = within or state.state_of_tree[2] != FREE
+        engage(world, state, port)
+        assert bool(port.engaged[0]) == on
+        q[6:], v[6:] = (q[6:], v[6:]) if on else (port.device_q, port.device_v)
+        np.testing.assert_array_equal(state.q, q)
+        np.testing.assert_array_equal(state.v, v)
+        seen.add((within, int(state.state_of_tree[2])))
+    assert len(seen) == 4
+
+
+PEG = load_scene(find_scene("peg_corner")).with_values({
+    "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
+    "device.damping": [0.5, 0.5, 0],
+})
+STEPS = 350  # past the fourth collision
+LAW = ImpulseAugmented(rendering="saturate")
+
+
+def run_with(scene, coupling, device):
+    simulation = Simulation(scene, LAW, coupling_of(scene, coupling), device)
+    recorder = Recorder(simulation)
+    while recorder.steps < STEPS:
+        assert recorder.chunk(STEPS) is None
+    return recorder.run("", "")
+
+
+# Unilateral, the compiled device carries the free tool without delay and sensors: that a real one cannot.
+CASES = [("four-channel", {}), ("unilateral", {}), ("four-channel", {"device.delay": 2}),
+         ("four-channel", {"device.position_resolution": [1e-5, 1e-5, 0]}),
+         ("four-channel", {"device.waveform": "brake"})]
+
+
+@pytest.mark.parametrize(("coupling", "values"), CASES, ids=str)
+def test_a_device_that_moves_by_itself_gives_the_run_of_the_compiled_one(coupling, values):
+    scene = PEG.with_values(values)
+    ours = simulate(scene, LAW, coupling_of(scene, coupling), steps=STEPS)
+    theirs = run_with(scene, coupling, simulated_device(scene))
+    late = values.get("device.delay", 0)
+    assert len(ours.impacts.step) > 0 or coupling == "unilateral"
+    for name in ("q", "v", "impulse", "coupling_force"):
+        assert getattr(theirs, name) == pytest.approx(getattr(ours, name), abs=1e-9), name
+    if not values:
+        assert theirs.device_q == pytest.approx(ours.device_q, abs=1e-10)
+        assert theirs.device_force == pytest.approx(ours.device_force, abs=1e-8)
+    if late:  # what is recorded is what was read
+        assert theirs.device_q[late:] == pytest.approx(ours.device_q[:-late], abs=1e-9)
+
+
+def test_a_weaker_device_is_noticed():
+    """The comparison can fail."""
+    weaker = simulated_device(PEG.with_values({"device.damping": [0.6, 0.5, 0]}))
+    ours = simulate(PEG, LAW, coupling_of(PEG, "four-channel"), steps=STEPS)
+    assert np.abs(run_with(PEG, "four-channel", weaker).q - ours.q).max() > 1e-6
+
+
+class Reads:
+    def __init__(self, q):
+        self.q, self.told = q, []
+
+    def read(self):
+        return DeviceReading(self.q, np.zeros(3))
+
+    def apply(self, force):
+        self.told.append(force)
+
+
+@pytest.mark.parametrize("q", [[0.0, np.nan, 0.0], [0.0, 0.0], [[0.0, 0.0, 0.0]]])
+def test_a_reading_that_is_no_position_stops_the_loop(q):
+    device = Reads(np.array([0.03, -0.02, 0.0]))
+    simulation = Simulation(PEG, LAW, coupling_of(PEG, "four-channel"), device)
+    simulation.step()
+    device.q = q
+    with pytest.raises(IapbError, match="the device read q = .*expected 3 finite numbers"):
+        simulation.step()
+
+
+def test_what_it_is_told_is_within_the_scenes_limits():
+    device = Reads(np.array([0.5, -0.5, 1.0]))  # far off: the spring would pull hard
+    simulation = Simulation(PEG, LAW, coupling_of(PEG, "four-channel"), device)
+    for _ in range(5):
+        simulation.step()
+    assert np.all(np.abs(device.told) <= [3.0, 3.0, 0.05]) and np.any(np.abs(device.told) == 3.0)
+
+
+def test_a_device_needs_a_coupling_and_a_tool_of_constant_inertia():
+    with pytest.raises(ArgumentError, match="device = .*none without a coupling"):
+        Simulation(PEG, device=Reads(np.zeros(3)))
+    with pytest.raises(ArgumentError, match="read.* and apply"):
+        Simulation(PEG, LAW, coupling_of(PEG, "four-channel"), device=object())
+    for name in ("arm_pushing", "two_discs"):
+        with pytest.raises(ArgumentError, match="scene"):
+            simulated_device(load_scene(find_scene(name)))

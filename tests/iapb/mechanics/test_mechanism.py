@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import KINDS
+from iapb.mechanics.kernels import add_point_force, forward_kinematics, vectors
+from iapb.mechanics.kernels.kinematics import frame_jacobian, motion_at, point_jacobian, point_velocity
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
 
 FIELD = np.array([0.3, -9.0, 2.0])  # a gravity field along no axis
 SCALED_CONDITION = 1e12  # beyond it a correct M may round to an indefinite one
 STEP = 1e-5  # of central differences: error STEP^2, rounding eps / STEP
-
 moving_kinds = tuple(kind for kind in KINDS if kind != "fixed")
 seeds = st.integers(0, 2**32 - 1)
 
@@ -224,3 +227,129 @@ def test_names_units_and_layout():
 def test_errors_name_the_argument(call, named):
     with pytest.raises(ArgumentError, match=named):
         call()
+
+
+def some_states(seed: int, count: int) -> tuple[Mechanism, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, 5)
+    states = [random_state(rng, mechanism) for _ in range(count)]
+    qs, vs = (np.array(rows).reshape(count, -1) for rows in zip(*states, strict=True))
+    return mechanism, qs, vs
+
+
+@given(seeds, st.integers(1, 5))
+def test_many_states_give_bit_for_bit_what_each_gives_alone(seed: int, count: int) -> None:
+    mechanism, qs, vs = some_states(seed, count)
+    np.testing.assert_array_equal(mechanism.mass_matrices(qs), [mechanism.mass_matrix(q) for q in qs])
+    alone = [mechanism.bias(q, v) for q, v in zip(qs, vs, strict=True)]
+    np.testing.assert_array_equal(mechanism.biases(qs, vs), alone)
+
+
+def test_any_layout_and_type_of_numbers_is_read_right() -> None:
+    mechanism, qs, vs = some_states(3, 4)
+    for layout in (np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=1)[:, ::2], list):
+        np.testing.assert_array_equal(mechanism.mass_matrices(layout(qs)), mechanism.mass_matrices(qs))
+        np.testing.assert_array_equal(mechanism.biases(layout(qs), layout(vs)), mechanism.biases(qs, vs))
+    columns = np.asfortranarray(qs)
+    np.testing.assert_array_equal(mechanism.mass_matrix(columns[1]), mechanism.mass_matrix(qs[1]))
+    whole = np.zeros(mechanism.nv, dtype=np.int64)
+    np.testing.assert_array_equal(mechanism.bias(qs[0], whole), mechanism.bias(qs[0], 0.0 * vs[0]))
+
+
+def test_no_states_give_no_matrices() -> None:
+    mechanism, qs, vs = some_states(4, 1)
+    d = mechanism.nv
+    assert mechanism.mass_matrices(qs[:0]).shape == (0, d, d)
+    assert mechanism.biases(qs[:0], vs[:0]).shape == (0, d)
+
+
+def test_the_row_at_fault_is_named() -> None:
+    mechanism = random_mechanism(np.random.default_rng(1), 3, ("spherical",))
+    qs, vs = np.tile(mechanism.neutral(), (4, 1)), np.zeros((4, mechanism.nv))
+    qs[2, 3] = 1.1
+    with pytest.raises(ArgumentError, match=r"qs\[2\] of body 'body 0.0'"):
+        mechanism.mass_matrices(qs)
+    qs[2, 3], vs[1, 0] = 1.0, np.nan
+    with pytest.raises(ArgumentError, match=r"vs\[1\]"):
+        mechanism.biases(qs, vs)
+    with pytest.raises(ArgumentError, match="as many rows as qs"):
+        mechanism.biases(qs, vs[:2])
+    with pytest.raises(ArgumentError, match="qs"):
+        mechanism.mass_matrices(qs[:, 1:])
+    with pytest.raises(ArgumentError, match="qs"):
+        mechanism.mass_matrices([["a"] * mechanism.nq])
+
+
+def placed(seed: int) -> tuple[Mechanism, Any, Any, np.ndarray, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, 6, tuple(kind for kind in KINDS if kind != "fixed"), trees=2)
+    q, v = random_state(rng, mechanism)
+    arrays, workspace = block(mechanism.arrays), block(mechanism.workspace())
+    forward_kinematics(arrays, q, workspace)
+    return mechanism, arrays, workspace, v, rng
+
+
+def carried(arrays: Any, k: int, body: int) -> bool:
+    """Does dof k move the body: is its own body on the way from there to the world?"""
+    while body >= 0:
+        if arrays.dof_body[k] == body:
+            return True
+        body = int(arrays.parent[body])
+    return False
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_points_and_frames_move_with_the_dofs_on_their_way_to_the_world(seed: int) -> None:
+    """Per unit rate: the axis of a sliding dof, axis × (x − origin) of a turning one; F does the work F · velocity."""
+    mechanism, arrays, w, v, rng = placed(seed)
+    d = mechanism.nv
+    for body in range(6):
+        x, force = rng.normal(size=3), rng.normal(size=3)
+        moving, turning, at_origin = np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, d))
+        for k in range(d):
+            axis, origin = w.axis[k], w.position[arrays.dof_body[k]]
+            turns = bool(arrays.dof_rotates[k])
+            motion = np.cross(axis, x - origin) if turns else axis
+            assert motion_at(arrays, w, k, tuple(x)) == pytest.approx(motion, abs=1e-13)
+            if carried(arrays, k, body):
+                moving[:, k], turning[:, k] = motion, turns * axis
+                at_origin[:, k] = np.cross(axis, w.position[body] - origin) if turns else axis
+        out = np.full((3, d), np.nan)
+        point_jacobian(arrays, w, body, x, out)
+        assert out == pytest.approx(moving, abs=1e-13)
+        frame = np.full((6, d), np.nan)
+        frame_jacobian(arrays, w, body, frame)
+        assert frame == pytest.approx(np.vstack([at_origin, turning]), abs=1e-13)
+        velocity, work = np.full(3, np.nan), np.ones(d)
+        point_velocity(arrays, w, body, x, v, velocity)
+        assert velocity == pytest.approx(moving @ v, abs=1e-12)
+        add_point_force(arrays, w, body, x, force, work)
+        assert work - 1.0 == pytest.approx(moving.T @ force, abs=1e-12)
+    velocity, work = np.full(3, np.nan), np.ones(d)
+    point_velocity(arrays, w, -1, x, v, velocity)
+    add_point_force(arrays, w, -1, x, force, work)
+    assert not velocity.any() and np.array_equal(work, np.ones(d))  # the static world
+
+
+def test_vectors_are_what_numpy_says() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        a, b = rng.normal(size=(2, 3))
+        ta, tb, s = tuple(a), tuple(b), float(rng.normal())
+        rows, frames = rng.normal(size=(4, 3)), rng.normal(size=(4, 3, 3))
+        assert vectors.load(rows, 2) == tuple(rows[2])
+        assert vectors.add(ta, tb) == tuple(a + b) and vectors.subtract(ta, tb) == tuple(a - b)
+        assert vectors.scale(s, ta) == tuple(s * a)
+        assert vectors.dot(ta, tb) == pytest.approx(a @ b, abs=1e-15)
+        assert vectors.cross(ta, tb) == pytest.approx(np.cross(a, b), abs=1e-15)
+        assert vectors.transform(frames, 1, ta) == pytest.approx(frames[1] @ a, abs=1e-14)
+        assert vectors.transform_back(frames, 1, ta) == pytest.approx(frames[1].T @ a, abs=1e-14)
+        assert vectors.column(frames, 3, 1) == tuple(frames[3, :, 1])
+        before, old, turned = frames[1].copy(), rows.copy(), frames.copy()
+        vectors.turn_frame(turned, 1, ta, tb, (0.5, s, -1.0))
+        assert turned[1] == pytest.approx(before @ np.column_stack([a, b, [0.5, s, -1.0]]), abs=1e-14)
+        vectors.store_columns(frames, 1, ta, tb, (0.5, s, -1.0))
+        assert np.array_equal(frames[1], np.column_stack([a, b, [0.5, s, -1.0]]))
+        vectors.store(rows, 1, ta)
+        vectors.accumulate(rows, 3, tb)
+        assert np.array_equal(rows, [old[0], a, old[2], old[3] + b])

@@ -1,15 +1,194 @@
-"""One compiled step: what it leaves at the contacts agrees with what it did to the bodies."""
+"""One compiled step of a crowd in space against the paper's page, (1) to (21), in plain numpy."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 
 import iapb.system
 from iapb.contact.kernels.step import OK, advance, locate, touching
-from iapb.contact.laws import Penalty
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
+
+K, B, MU, THRESHOLD, E, SLOW = 300.0, 2.0, 0.3, 0.05, 0.4, 1e-3
+BALL, BOX = "{kind: sphere, radius: 0.1, center: [0.02, 0, 0.01]}", "{kind: box, size: [0.3, 0.2, 0.25]}"
+
+
+def body(k: int) -> str:
+    return (f"  - {{name: b{k}, joint: free_flyer, mass: {0.5 + 0.3 * k}, inertia: [{1 + k}e-3, 2e-3, 3e-3], "
+            f"shapes: [{BOX if k == 2 else BALL}]}}\n")
+
+
+def crowd(rows: str) -> System:
+    return System(scene_from_text(f"""
+name: crowd
+dimensions: 3
+rate: 1000
+duration: 0.1
+gravity: [0.3, -0.2, -9.81]
+bodies:
+{''.join(body(k) for k in range(6))}
+walls:
+  - {{name: floor, kind: half_space, point: [0, 0, -0.3], normal: [0.1, 0, 1]}}
+contact: {{stiffness: {K}, damping: {B}, friction: {MU}, friction_velocity: {THRESHOLD}, restitution: {E},
+          approach_velocity: {SLOW}, self_collision_rows: {rows}}}
+"""))
+
+
+def thrown(system: System, seed: int, old: bool) -> tuple[Any, Any]:
+    """World and state with bodies thrown together; `old`: some contacts were there in the step before."""
+    rng, m = np.random.default_rng(seed), system.mechanism
+    world, state = system.world_under(ImpulseAugmented()), system.make_state()
+    state.q[:] = m.integrate(m.neutral(), rng.normal(size=m.nv) * np.tile([0.16] * 3 + [1.0] * 3, 6), 1.0)
+    state.v[:] = rng.normal(size=m.nv)
+    if old:
+        q, v = state.q.copy(), state.v.copy()
+        assert advance(world, state, np.zeros(m.nv)) == OK
+        state.q[:], state.v[:] = q, v
+        state.contacts.feature[: state.contact_count[0] : 2] += 1000  # so that every second one is new
+    return world, state
+
+
+class Page:
+    """What the step should do, from (q, v) before it and the touching places that it found."""
+
+    def __init__(self, system: System, state: Any, q: np.ndarray, v: np.ndarray) -> None:
+        self.m, self.q, self.v, self.c = system.mechanism, q, v, state.contacts
+        self.count = int(state.contact_count[0])
+        self.M = self.m.mass_matrix(q)
+        self.jacobians = [self._relative(i) for i in range(self.count)]
+
+    def _relative(self, i: int) -> np.ndarray:
+        x, b = self.c.point[i], int(self.c.body_b[i])
+        J = self.m.point_jacobian(self.q, int(self.c.body_a[i]), x)
+        return J - self.m.point_jacobian(self.q, b, x) if b >= 0 else J
+
+    def groups(self) -> list[int]:
+        """Smallest body that touching connects each body to."""
+        group = list(range(6))
+        for _ in range(6):
+            for a, b in zip(self.c.body_a[: self.count], self.c.body_b[: self.count], strict=True):
+                if b >= 0:
+                    group[a] = group[b] = min(group[a], group[b])
+        return group
+
+    def collide(self, is_new: np.ndarray) -> tuple[list[int], np.ndarray]:
+        """State of each body, and which contacts enter the impact."""
+        group = self.groups()
+        of = [group[a] for a in self.c.body_a[: self.count]]
+        speed = np.array([self.c.normal[i] @ J @ self.v for i, J in enumerate(self.jacobians)])
+        struck = {of[i] for i in range(self.count) if is_new[i] and speed[i] < -SLOW}
+        states = [COLLIDING if group[k] in struck else RESTING if group[k] in of else FREE for k in range(6)]
+        return states, np.array([of[i] in struck and speed[i] < -SLOW for i in range(self.count)], bool)
+
+    def impact(self, collides: np.ndarray, per_body: bool) -> tuple[np.ndarray, np.ndarray, list[int], np.ndarray]:
+        """(19): J, p of least norm, the contact of each row, v⁺; M is block diagonal, so islands need no telling."""
+        rows, owner = [], []
+        for i in np.flatnonzero(collides):
+            owner += [int(i)] * (2 if per_body and self.c.body_b[i] >= 0 else 1)
+            row = self.c.normal[i] @ self.jacobians[i]
+            b = int(self.c.body_b[i])
+            if per_body and b >= 0:
+                of = np.arange(36) // 6
+                rows += [np.where(of == self.c.body_a[i], row, 0.0), np.where(of == b, -row, 0.0)]  # nᵀJ of either
+            else:
+                rows.append(row)
+        J = np.array(rows).reshape(-1, 36)
+        p = -(1.0 + E) * np.linalg.pinv(J @ np.linalg.solve(self.M, J.T), rcond=1e-12) @ J @ self.v
+        return J, p, owner, self.v + np.linalg.solve(self.M, J.T @ p)
+
+    def resting(self, states: list[int], v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(5), (6) of the contacts whose group does not collide, with the velocities before the impact elsewhere."""
+        penalty, drag = np.zeros(36), np.zeros(36)
+        for i, J in enumerate(self.jacobians):
+            if states[int(self.c.body_a[i])] == COLLIDING:
+                continue
+            n, relative = self.c.normal[i], J @ v
+            force = max(0.0, -K * self.c.gap[i] - B * (n @ relative))
+            slip = relative - (n @ relative) * n
+            penalty += J.T @ n * force
+            drag -= J.T @ slip * MU * force / max(float(np.linalg.norm(slip)), THRESHOLD)
+        return penalty, drag
+
+
+def lasting(state: Any) -> list[tuple[int, ...]]:
+    c, count = state.contacts, int(state.contact_count[0])
+    return [tuple(int(getattr(c, name)[i]) for name in ("shape_a", "shape_b", "feature")) for i in range(count)]
+
+
+@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize("rows", ["relative", "per_body"])
+def test_a_step_is_the_page_of_the_paper(rows: str, old: bool) -> None:
+    system, seen = crowd(rows), set()
+    for seed in range(8):
+        world, state = thrown(system, seed, old)
+        q, v, before = state.q.copy(), state.v.copy(), lasting(state)
+        applied = np.random.default_rng(seed).normal(size=36)
+        assert advance(world, state, applied) == OK
+        page = Page(system, state, q, v)
+        is_new = np.array([key not in before for key in lasting(state)], bool)
+        np.testing.assert_array_equal(state.contacts.is_new[: page.count], is_new)
+        states, collides = page.collide(is_new)
+        assert state.state_of_tree.tolist() == states
+        np.testing.assert_array_equal(state.contacts.collides[: page.count], collides)
+        J, p, owner, v_plus = page.impact(collides, rows == "per_body")
+        np.testing.assert_allclose(state.impulse, J.T @ p, atol=1e-9)
+        first = [owner.index(i) if collides[i] else -1 for i in range(page.count)]  # of two rows that on body a
+        expected = [p[row] if row >= 0 else 0.0 for row in first]
+        np.testing.assert_allclose(state.contact_impulse[: page.count], expected, atol=1e-9)
+        penalty, drag = page.resting(states, v_plus)
+        np.testing.assert_allclose(state.penalty_force, penalty, atol=1e-9)
+        np.testing.assert_allclose(state.friction_force, drag, atol=1e-9)
+        force = applied + penalty + drag - page.m.gravity(q, system.gravity) - page.m.bias(q, v_plus)
+        moved = v_plus + system.dt * np.linalg.solve(page.M, force)
+        np.testing.assert_allclose(state.v, moved, atol=1e-9)
+        np.testing.assert_allclose(state.q, page.m.integrate(q, moved, system.dt), atol=1e-11)
+        _check_log(state, page, collides, v_plus, J, p)
+        seen |= set(states)
+    assert seen == {FREE, COLLIDING, RESTING} or (not old and COLLIDING in seen)
+
+
+def _check_log(state: Any, page: Page, collides: np.ndarray, v_plus: np.ndarray, J: np.ndarray, p: np.ndarray) -> None:
+    """One line for each island: bodies that colliding contacts connect, their impulse and the energy they lost."""
+    island = list(range(6))
+    for _ in range(6):
+        for i in np.flatnonzero(collides):
+            a, b = int(page.c.body_a[i]), int(page.c.body_b[i])
+            if b >= 0:
+                island[a] = island[b] = min(island[a], island[b])
+    first = sorted({island[int(page.c.body_a[i])] for i in np.flatnonzero(collides)})
+    log, lines = state.impacts, int(state.impacts.logged[0])
+    assert log.group[:lines].tolist() == first
+    for line, root in enumerate(first):
+        mine = np.repeat(np.array(island) == root, 6)
+        change = np.where(mine, v_plus - page.v, 0.0)
+        np.testing.assert_allclose(log.v_minus[line][mine], page.v[mine], atol=0.0)
+        np.testing.assert_allclose(log.v_plus[line][mine], v_plus[mine], atol=1e-9)
+        np.testing.assert_allclose(log.impulse[line], np.where(mine, J.T @ p, 0.0), atol=1e-9)
+        lost = -(page.v + 0.5 * change) @ page.M @ change
+        assert log.energy_lost[line] == pytest.approx(lost, abs=1e-9)
+        of_island = J[np.any(J[:, mine] != 0.0, axis=1)]
+        assert (log.rows[line], log.rank[line]) == (len(of_island), np.linalg.matrix_rank(of_island, tol=1e-9))
+        assert log.approaching[line] == np.count_nonzero(of_island @ v_plus < -SLOW)
+        assert log.solved[line] and log.scale[line] == log.friction_share[line] == 1.0
+        assert log.clamp[line] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_without_impulses_what_would_collide_rests() -> None:
+    system = crowd("relative")
+    _, state = thrown(system, 3, False)
+    q, v = state.q.copy(), state.v.copy()
+    assert advance(system.world_under(Penalty()), state, np.zeros(36)) == OK
+    page = Page(system, state, q, v)
+    assert page.collide(np.ones(page.count, bool))[1].any()
+    assert not state.impulse.any() and state.impacts.logged[0] == 0
+    touching = {page.groups()[int(a)] for a in page.c.body_a[: page.count]}
+    assert state.state_of_tree.tolist() == [RESTING if g in touching else FREE for g in page.groups()]
+    np.testing.assert_allclose(state.penalty_force, page.resting([RESTING] * 6, v)[0], atol=1e-9)
 
 
 def test_the_forces_noted_at_the_contacts_carry_the_box() -> None:

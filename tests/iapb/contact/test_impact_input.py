@@ -1,11 +1,109 @@
-"""What the resolver refuses: every error names the argument, and no input makes a NaN or an infinity."""
+"""What the resolver takes: units and magnitudes change no bit, wrong arguments are named, no input makes a NaN."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from iapb import ArgumentError, IapbError, RangeError, resolve_impact
+
+
+def impact_of(seed: int, d: int = 5, c: int = 7) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(d, d))
+    rows = rng.normal(size=(c, 3)) @ rng.normal(size=(3, d))
+    return root @ root.T + np.eye(d), rows, rng.normal(size=d)
+
+
+def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> None:
+    mass, rows, v = impact_of(3)
+    skew = 1e-11 * np.triu(mass, 1)
+    given = resolve_impact(mass + skew, rows, v, 0.4)
+    symmetric = resolve_impact(mass + 0.5 * (skew + skew.T), rows, v, 0.4)
+    assert np.allclose(given.velocity, symmetric.velocity, rtol=1e-14, atol=1e-14)
+    assert not np.allclose(given.velocity, resolve_impact(mass, rows, v, 0.4).velocity, rtol=1e-14, atol=1e-14)
+
+
+POWERS = st.lists(st.integers(-60, 60), min_size=7, max_size=7)
+
+
+@given(seed=st.integers(0, 10_000), powers=POWERS)
+def test_row_scale_by_powers_of_two_changes_no_bit(seed: int, powers: list[int]) -> None:
+    mass, rows, v = impact_of(seed)
+    plain = resolve_impact(mass, rows, v, 0.4)
+    scaled = resolve_impact(mass, np.ldexp(rows, np.array(powers)[:, None]), v, 0.4)
+    assert np.array_equal(plain.velocity, scaled.velocity)
+    assert np.array_equal(plain.generalized_impulse, scaled.generalized_impulse)
+    assert plain.rank == scaled.rank
+
+
+@given(seed=st.integers(0, 10_000), powers=POWERS)
+def test_units_of_coordinates_by_powers_of_two_change_no_bit(seed: int, powers: list[int]) -> None:
+    """q' = 2^−s q: M' = S M S, J' = J S, v' = S⁻¹ v."""
+    mass, rows, v = impact_of(seed)
+    s = np.array(powers[:5])
+    plain = resolve_impact(mass, rows, v, 0.4)
+    scaled = resolve_impact(np.ldexp(mass, s[:, None] + s), np.ldexp(rows, s), np.ldexp(v, -s), 0.4)
+    assert np.array_equal(np.ldexp(scaled.velocity, s), plain.velocity)
+    assert np.array_equal(np.ldexp(scaled.generalized_impulse, -s), plain.generalized_impulse)
+    assert scaled.energy_change == plain.energy_change
+
+
+@given(seed=st.integers(0, 10_000), speed=st.integers(-400, 300), mass_power=st.integers(-200, 200))
+def test_unit_of_time_and_of_mass(seed: int, speed: int, mass_power: int) -> None:
+    """Up to energies of 2^1000: above 2^1024 there is no number for them, which is an error by name."""
+    mass, rows, v = impact_of(seed)
+    plain = resolve_impact(mass, rows, v, 0.4)
+    quick = resolve_impact(np.ldexp(mass, 2 * mass_power), rows, np.ldexp(v, speed), 0.4)
+    assert np.array_equal(np.ldexp(plain.velocity, speed), quick.velocity)
+
+
+@pytest.mark.parametrize("method", ["factored", "gram_pinv", "damped", "svd"])
+@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e150])
+def test_huge_and_tiny_speeds(method: str, size: float) -> None:
+    mass, rows, v = impact_of(1)
+    impact = resolve_impact(mass, rows, size * v, 0.4, method=method)
+    np.testing.assert_allclose(rows @ (impact.velocity / size), -0.4 * (rows @ v), atol=1e-5)
+
+
+def test_subnormal_speeds() -> None:
+    """At 5e-324 a velocity has one bit: the result is the nearest that exists, and no energy appears."""
+    least = 5e-324
+    assert resolve_impact([[3.0]], [[1.0]], [-least], 1.0).velocity[0] == least
+    assert resolve_impact([[3.0]], [[1.0]], [-least], 0.0).velocity[0] == 0.0
+    impact = resolve_impact(np.diag([3.0, 1e-300]), [[1.0, 1e-160]], [-1e-310, -1e-310], 0.5)
+    assert impact.velocity[0] == pytest.approx(5e-311, rel=1e-12)
+
+
+@given(
+    exponents=st.tuples(*[st.integers(-1000, 1000)] * 3),
+    seed=st.integers(0, 1000),
+    restitution=st.sampled_from([-1.0, 0.0, 0.5, 1.0]),
+)
+def test_finite_or_a_named_error(exponents: tuple[int, int, int], seed: int, restitution: float) -> None:
+    mass, rows, v = impact_of(seed, d=3, c=4)
+    with np.errstate(over="ignore"):
+        arrays = [np.ldexp(x, k) for x, k in zip((mass, rows, v), exponents, strict=True)]
+    if not all(np.isfinite(x).all() for x in arrays):
+        return
+    try:
+        impact = resolve_impact(*arrays, restitution)
+    except RangeError:
+        return
+    for value in (impact.velocity, impact.generalized_impulse, impact.impulses, impact.energy_change):
+        assert np.isfinite(value).all()
+
+
+def test_mixed_magnitudes_in_one_mass_matrix() -> None:
+    """Coordinates in metres and in micro-radians: the mass matrix spans 1e-24 to 1e24."""
+    mass, rows, v = impact_of(2)
+    s = np.array([1e12, 1e-12, 1.0, 1e6, 1e-6])
+    plain = resolve_impact(mass, rows, v, 0.4)
+    mixed = resolve_impact(s[:, None] * mass * s, rows * s, v / s, 0.4)
+    np.testing.assert_allclose(mixed.velocity * s, plain.velocity, atol=1e-12)
+
 
 GOOD = {
     "mass_matrix": [[2.0, 0.5], [0.5, 1.0]],
