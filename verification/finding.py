@@ -28,7 +28,6 @@ Row = Mapping[str, Any]
 REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
     "reproduced", "reproduced where", "mixed", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
-LIMITED = MIXED
 # What fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
 # Trials that confirm a region, at least: were a quarter of the region wrong, ten in a row would hold in one case of

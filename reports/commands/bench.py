@@ -13,7 +13,7 @@ from reports.commands.progress import stage_progress
 from reports.figures.numbers import format_cell
 from verification.cost.impacts import work_precision
 from verification.cost.study import haptic_study
-from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Table
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Table
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
 
@@ -32,7 +32,7 @@ def bench(
             _print(console, name.capitalize(), numbers)
     if tables:
         _print(console, "What a microsecond buys", methods)
-    words = {REPRODUCED: "as asked for", LIMITED: "not as asked for", NOT_COMPUTED: "not measured"}
+    words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
     for part in topic.parts:
         console.print(f"• {words[part.verdict]}: {part.sentence}", highlight=False, markup=False)
     console.print(_methods(methods), highlight=False, markup=False)

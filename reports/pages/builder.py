@@ -90,9 +90,12 @@ def badge_words(verdict: Verdict, topics: Sequence[Finding]) -> str:
 
 
 def counted(part: Part) -> str:
-    """Return in how many trials a part holds, of those that could tell, and how many could not."""
+    """Return in how many trials a part holds, of those that could tell, how many could not, and a region's share."""
+    if not part.decided and not part.unknown:
+        return ""
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
-    return f"{part.held} of {part.decided}{unknown}" if part.decided or part.unknown else ""
+    share = f", region {part.region.share:.0%} of the range" if part.region else ""
+    return f"{part.held} of {part.decided}{unknown}{share}"
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:

@@ -64,11 +64,11 @@ def test_a_long_table_is_cut_and_says_where_the_rest_is():
 def test_the_first_page_shows_every_part_of_a_claim_with_its_count():
     held = [Part("s.", REPRODUCED, f"part {n}", 5, 5) for n in range(9)]
     worst = Part("s.", REFUTED, "the one that fails", 1, 40, 7)
-    where = Part("s.", WHERE, "part in a region", 30, 40, region=Region((("tilt", "rad", None, 0.015),)))
+    where = Part("s.", WHERE, "part in a region", 30, 40, region=Region((("tilt", "rad", None, 0.015),), share=0.05))
     page = build_page(Evidence(claims=(finding_of("C20", "C20", "s", "a", [*held, where, worst]),)), ())
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held)
-    assert "reproduced where tilt ≤ 0.015 rad" in first
+    assert "reproduced where tilt ≤ 0.015 rad" in first and "30 of 40, region 5% of the range" in first
     line = first.split("the one that fails")[1].split("</li>")[0]
     assert "refuted" in line and "1 of 40, 7 cannot tell" in line
     assert "1 refuted" in first.split("their 11 parts")[1].split("</p>")[0]

@@ -25,7 +25,7 @@ from verification.cost.step_cost import (
     step_rivals,
 )
 from verification.finding import (
-    LIMITED,
+    MIXED,
     NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
@@ -127,7 +127,7 @@ def scenes(study: ComparisonStudy) -> Part | None:
     return Part(
         f"Impacts of the project's scenes: {cases}; {where}. {pulling} pull truly (no p >= 0 gives their motion), "
         f"{artefacts} only in the least-norm p; {study.left_out} are left out (per-body rows or device limits).",
-        REPRODUCED if not apart else LIMITED, "scenes")  # fmt: skip
+        REPRODUCED if not apart else MIXED, "scenes")  # fmt: skip
 
 
 def touching(study: ComparisonStudy) -> Part | None:
@@ -256,7 +256,7 @@ def problems(study: ProblemStudy) -> tuple[Part, ...]:
     if skew:
         found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
     # who is asked at all depends on how long he took before
-    verdict = LIMITED if unsolved or study.unread else REPRODUCED
+    verdict = MIXED if unsolved or study.unread else REPRODUCED
     return tuple(Part(sentence, verdict, "problems", timed=True) for sentence in found)
 
 
@@ -286,7 +286,7 @@ def _all(outcomes: Iterable[bool]) -> str:
 
 
 def _by_share(share: float) -> str:
-    return REPRODUCED if share == 1.0 else LIMITED if share >= 0.5 else REFUTED
+    return REPRODUCED if share == 1.0 else MIXED if share >= 0.5 else REFUTED
 
 
 # In the order of the report.

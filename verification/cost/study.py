@@ -38,7 +38,7 @@ from verification.cost.start_up import start_up
 from verification.cost.step_cost import IAPB, KERNEL, CostRow, Rivals, impact_cost, rivals
 from verification.cost.trajectories import BELOW, trajectory_precision
 from verification.finding import (
-    LIMITED,
+    MIXED,
     NOT_COMPUTED,
     REPRODUCED,
     Column,
@@ -181,7 +181,7 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
 
 
 def _part(sentence: str, met: bool, timed: bool = True) -> Part:
-    return Part(sentence, REPRODUCED if met else LIMITED, timed=timed)
+    return Part(sentence, REPRODUCED if met else MIXED, timed=timed)
 
 
 def _missing(sentence: str) -> Part:

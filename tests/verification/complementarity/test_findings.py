@@ -18,7 +18,7 @@ from verification.complementarity.findings import PARTS, problems
 from verification.complementarity.own_problems import own_problems
 from verification.complementarity.problem_study import study_read
 from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
-from verification.finding import LIMITED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 FOUND = compare_cases(random_cases(3, seed=12))
 CELLS = agreement_map(FOUND)
@@ -52,7 +52,7 @@ def test_exact_statements_hold_and_one_exception_refutes_them() -> None:
     assert verdict("energy", cells=worse(momentum=1e-3)) == REFUTED
 
 
-@pytest.mark.parametrize(("share", "expected"), [(1.0, REPRODUCED), (0.7, LIMITED), (0.2, LIMITED)])
+@pytest.mark.parametrize(("share", "expected"), [(1.0, REPRODUCED), (0.7, MIXED), (0.2, MIXED)])
 def test_shares_of_scene_impacts(share: float, expected: str) -> None:
     assert verdict("scenes", scenes=(replace(CELLS[0], agree=share),)) == expected
 
@@ -62,7 +62,7 @@ def test_costs_are_told_apart_only_where_samples_do_not_overlap() -> None:
             row("fast", 0.1, 0.5), row("wrong", 3.0, 4.0, "failed"), row(LEMKE_KERNEL, 0.5, 0.9))  # fmt: skip
     outcomes = {pair.solver.solver: pair.costs_more for pair in rivals(rows)}
     assert outcomes == {"slow": True, "alike": None, "fast": False, "wrong": None, LEMKE_KERNEL: True}
-    assert verdict("cost", impact_costs=rows) == LIMITED
+    assert verdict("cost", impact_costs=rows) == MIXED
     assert verdict("cost", impact_costs=rows[:2] + rows[3:4]) == NOT_TESTABLE
 
 
@@ -72,7 +72,7 @@ def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_limi
     study = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0)
     assert {dict(line.verdicts)["daqp"] for line in study.lines} == {"failed", "left out"}
     judged = problems(study)
-    assert judged[0].verdict == LIMITED and "left out" in judged[0].sentence
+    assert judged[0].verdict == MIXED and "left out" in judged[0].sentence
 
 
 def test_own_problems_are_named_apart_and_are_of_both_kinds() -> None:

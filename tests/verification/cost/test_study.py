@@ -21,7 +21,7 @@ from verification.cost.step_cost import IAPB, KERNEL, CostRow
 from verification.cost.study import _bodies, _rate, finding, solvers_table
 from verification.cost.trajectories import BELOW
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
-from verification.finding import LIMITED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
 from verification.mechanics.robot_timing import MANY, ONE
 
 Tables = dict[str, Table]
@@ -107,7 +107,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
     ],
 )
 def test_a_miss_is_called_one(tables: Tables, change: Tables, words: str) -> None:
-    missed = [part.sentence for part in _found(tables | change).parts if part.verdict == LIMITED]
+    missed = [part.sentence for part in _found(tables | change).parts if part.verdict == MIXED]
     assert len(missed) == 1 and words in missed[0]
 
 
