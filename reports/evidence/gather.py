@@ -100,7 +100,7 @@ def _with_verdicts(evidence: Evidence) -> Evidence:
 
 
 def _arm_energies() -> Mapping[str, Any]:
-    from reports.figures.fig03_energy_loss import arm_energies
+    from reports.figures.two_link_arm import arm_energies
 
     return arm_energies()
 

@@ -2,29 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.geometry import body_outlines, half_plane, outline
-from reports.figures.style import FORCE, INK, MUTED, PEG, WALL
+from reports.figures.geometry import Placement, body_outlines, half_plane, outline
+from reports.figures.plot import Plot
+from reports.figures.style import FORCE, INK, MUTED, PANEL, PEG, WALL
 
 Floats = NDArray[np.float64]
 TURNED = ("peg_",)  # scenes in the paper's frame, x to the left and y down: drawn turned by 180 degrees
 
 
-def make_canvas(drawing: Any, low: Floats, high: Floats, *, turned: bool) -> Any:
-    """Return axes without a frame that show at least the rectangle from `low` to `high`, at equal scales."""
-    axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
-    low, high = widened(low, high, drawing.get_figwidth() / drawing.get_figheight())
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_axis_off()
-    if turned:
-        axes.xaxis.set_inverted(True)
-        axes.yaxis.set_inverted(True)
-    return axes
+class Canvas(Plot):
+    """A panel without axes that shows at least the rectangle from `low` to `high`, at equal scales.
+
+    Without a `size` the panel has the width of all others, and the proportions of the rectangle.
+    """
+
+    def __init__(self, key: str, low: Floats, high: Floats, size: tuple[float, float] | None = None, *,
+                 turned: bool = False) -> None:  # fmt: skip
+        width, height = np.asarray(high) - np.asarray(low)
+        super().__init__(key, size or (PANEL[0], PANEL[0] * height / width), bare=True)
+        self.low, self.high = widened(low, high, self.size[0] / self.size[1])
+        self.turned = turned
+
+    def __enter__(self) -> Canvas:
+        super().__enter__()
+        self.axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
+        if self.turned:
+            invert(self.axes)
+        return self
+
+
+def invert(axes: Any) -> None:
+    """Turn the picture by 180 degrees: x to the left, y down."""
+    axes.xaxis.set_inverted(True)
+    axes.yaxis.set_inverted(True)
+
+
+def hand(axes: Any, scene: Mapping[str, Any], place: Placement, length: float, offset: tuple[float, float],
+         flat: Callable[[Any], Any] = lambda point: np.asarray(point, dtype=float)[:2]) -> None:  # fmt: skip
+    """Draw the hand's force as an arrow of some length [m] from where it holds its body, which is at `place`."""
+    force = flat(scene["hand"]["force"][:3])
+    if np.hypot(*force) > 0.0:
+        start = flat(place.of(scene["hand"]["point"]))
+        arrow(axes, start, length * force / np.hypot(*force))
+        note(axes, start, "hand", offset, color=FORCE)
 
 
 def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Floats]:

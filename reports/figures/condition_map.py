@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
-from reports.figures.style import BLUE, MUTED, PAPER, VERMILION, styled
-from reports.figures.svg import to_svg
+from reports.figures.plot import Plot
+from reports.figures.style import BLUE, MUTED, PAPER, VERMILION
 
 _SIZE = (4.1, 2.4)  # inches
 _DOT = 46.0  # area of a full dot [points²]
@@ -53,9 +53,8 @@ def _places(x: Sequence[float], y: Sequence[float], holds: Outcomes) -> Places:
 
 
 def _map(key: str, x_label: str, y_label: str, places: Places) -> str:
-    with styled() as new_figure:
-        drawing = new_figure(figsize=_SIZE, layout="constrained")
-        axes = drawing.add_subplot()
+    with Plot(key, _SIZE) as plot:
+        axes = plot.axes
         for (x, y), trials in places.items():
             decided = [held for held in trials if held is not None]
             share = float(np.mean(decided)) if decided else 0.0
@@ -67,7 +66,7 @@ def _map(key: str, x_label: str, y_label: str, places: Places) -> str:
                 axes.scatter(x, y, s=_DOT * share, color=BLUE, edgecolor=PAPER, linewidth=0.5, zorder=3)
         axes.margins(0.08)
         axes.set(xlabel=x_label, ylabel=y_label)
-        return to_svg(drawing, key)
+    return plot.svg
 
 
 def _words(x_label: str, y_label: str, places: Places) -> str:

@@ -1,4 +1,4 @@
-"""Figures 7 to 13 of the paper: the peg in the corner, in four worlds and with a limited or emulated device.
+"""The peg in the corner: the first picture, and Figures 7 to 13, in four worlds and with a limited or emulated device.
 
 Each figure shows trajectories or forces of some runs, on the device side. The paper's frame has x to the left and y
 down (its drawing turned by 180 degrees), so both axes of a path are reversed: the corner is at the lower right, as in
@@ -15,9 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.style import PANEL, STYLES, line_arguments, styled
-from reports.figures.svg import PATH, curve_id, traced_svg
+from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, invert, note, scale_bar
+from reports.figures.figure import Drawn, Panel, Recipe, recipe
+from reports.figures.geometry import body_outlines
+from reports.figures.plot import Plot
+from reports.figures.style import FORCE, MUTED, STYLES, line_arguments
+from reports.figures.svg import PATH, TIME, curve_id
 from verification.finding import Table, titled
 
 Floats = NDArray[np.float64]
@@ -62,15 +65,15 @@ class Shown:
     @property
     def recipe(self) -> Recipe:
         """How the figure is made."""
-        key, number = f"fig{self.number:02d}", f"Figure {self.number}"
+        key = f"fig{self.number:02d}"
 
-        def draw(inputs: Mapping[str, Any]) -> Figure:
-            runs = runs_of(self.runs, inputs)
-            panels, numbers = _force_figure(key, runs) if self.forces else _trajectory_figure(key, runs, self.runs)
-            needs = tuple(self.runs.values())
-            return Figure(key, number, self.title, self.caption, panels, numbers, legend_of(self.runs), needs)
+        def draw(*runs: Run) -> Drawn:
+            named = dict(zip(self.runs, runs, strict=True))
+            panels, numbers = _force_figure(key, named) if self.forces else _trajectory_figure(key, named, self.runs)
+            return Drawn(panels, numbers, legend_of(named))
 
-        return Recipe(key, number, self.title, tuple(self.runs.values()), draw)
+        number = f"Figure {self.number}"
+        return recipe(key, self.title, *self.runs.values(), caption=self.caption, number=number)(draw)
 
 
 FIGURES = (
@@ -101,12 +104,7 @@ FIGURES = (
 )  # fmt: skip
 
 
-def runs_of(names: Mapping[str, str], inputs: Mapping[str, Any]) -> dict[str, Run]:
-    """Return the runs by the name of their curve."""
-    return {curve: inputs[name] for curve, name in names.items()}
-
-
-def legend_of(names: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the legend: each curve under its own style."""
     return tuple((curve, curve) for curve in names)
 
@@ -143,36 +141,31 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run],
 def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
     """Draw y against x of the device, from shortly before the first contact."""
     first = first_shown(runs)
-    with styled() as new_figure:
-        drawing = new_figure(figsize=PANEL, layout="constrained")
-        axes = drawing.add_subplot()
+    with Plot(f"{key}-path", kind=PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             x, y = MILLI * run.device_q[first:, :2].T
-            axes.plot(x, y, **line_arguments(STYLES[curve]), gid=curve_id(curve),
-                      markevery=marks(len(x), number), zorder=3 + number / 10)
-        axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        axes.xaxis.set_inverted(True)
-        axes.yaxis.set_inverted(True)
-        svg = traced_svg(drawing, f"{key}-path", PATH)
+            plot.axes.plot(x, y, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                           markevery=marks(len(x), number), zorder=3 + number / 10)  # fmt: skip
+        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        invert(plot.axes)
     ends = {curve: MILLI * run.device_q[-1, :2] for curve, run in runs.items()}
     words = "; ".join(f"{curve} ends at ({x:.1f}, {y:.1f})" for curve, (x, y) in ends.items()) + "."
-    return Panel(svg, f"Paths of the hand in the plane, in mm: {words}", "path of the hand, from just before contact")
+    return Panel(plot.svg, f"Paths of the hand in the plane, in mm: {words}",
+                 "path of the hand, from just before contact")  # fmt: skip
 
 
 def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Floats], label: str, *,
                shown: float | None = None, **how: Any) -> str:
     """Draw one quantity of each run over time; `shown` cuts the axis to plus and minus that value."""
-    with styled() as new_figure:
-        drawing = new_figure(figsize=PANEL, layout="constrained")
-        axes = drawing.add_subplot()
+    with Plot(key, kind=TIME) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             values = values_of(run)
-            axes.plot(run.time[: len(values)], values, **line_arguments(STYLES[curve]), **how, gid=curve_id(curve),
-                      markevery=marks(len(values), number), zorder=3 + number / 10)
-        axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
+            plot.axes.plot(run.time[: len(values)], values, **line_arguments(STYLES[curve]), **how,
+                           gid=curve_id(curve), markevery=marks(len(values), number), zorder=3 + number / 10)
+        plot.axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
         if shown is not None:
-            axes.set_ylim(-shown, shown)
-        return traced_svg(drawing, key)
+            plot.axes.set_ylim(-shown, shown)
+    return plot.svg
 
 
 def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
@@ -262,3 +255,70 @@ def held_force(run: Run) -> Floats:
 
 
 RECIPES = tuple(figure.recipe for figure in FIGURES)
+
+
+# The first picture
+
+_GHOSTS = 4  # poses of the ideal run between start and end
+_MARGIN = 0.005  # [m] of wall and of air around the motion
+_FORCE_LENGTH = 0.013  # [m] on paper per newton
+_SIZE = (4.5, 3.8)  # inches
+
+
+@recipe(
+    "hero", "Four worlds in one corner", *UNLIMITED.values(), section="hero",
+    caption="A constant force pushes a tilted peg into a corner; first picture: its outlines in the rigid world, from "
+    "start to end. Second picture, magnified: where the hand goes, from shortly before the first contact. The closer a "
+    "curve is to the ideal one, the more the wall feels like a rigid wall. This start, tilted by 0.015 rad, sits at "
+    "the edge: up to there IAPB is the closest in x and y, beyond it often not, and in the angle rarely; claim C10 has "
+    "the map.",
+)  # fmt: skip
+def hero(*given: Run) -> Drawn:
+    """Draw the picture from the runs named in UNLIMITED."""
+    runs = dict(zip(UNLIMITED, given, strict=True))
+    apart = {name: MILLI * np.hypot(*(run.device_q[-1, :2] - runs["ideal"].device_q[-1, :2]))
+             for name, run in runs.items() if name != "ideal"}  # fmt: skip
+    ends = ", ".join(f"{name} {distance:.2f} mm" for name, distance in apart.items())
+    panels = (
+        Panel(_motion(runs["ideal"]), "A tilted peg moves to the lower right and comes to rest in a corner.",
+              "the motion in the rigid world, to scale"),
+        Panel(_paths(runs), "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
+              f"{ends}.", "the path of the hand, magnified, equal scales"),
+    )  # fmt: skip
+    return Drawn(panels, None, legend_of(UNLIMITED))
+
+
+def _motion(run: Run) -> str:
+    scene = run.scene_resolved
+    corners = np.vstack([outline for k in (0, -1) for _, outline in body_outlines(scene, run.q[k])])
+    low, high = np.minimum(corners.min(axis=0), 0.0) - _MARGIN, np.maximum(corners.max(axis=0), 0.0) + _MARGIN
+    with Canvas("hero-scene", low, high, _SIZE, turned=True) as canvas:
+        axes = canvas.axes
+        draw_walls(axes, scene, reach=1.0)
+        draw_bodies(axes, scene, run.q[-1])
+        for k in ghost_steps(run):
+            draw_bodies(axes, scene, run.q[k], color="none", edge=MUTED, width=0.8)
+        axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
+        start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
+        arrow(axes, start, _FORCE_LENGTH * force)
+        note(axes, start, f"hand, {np.hypot(*force):.2f} N", (0, 10), color=FORCE)
+        scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
+    return canvas.svg
+
+
+def _paths(runs: Mapping[str, Run]) -> str:
+    with Plot("hero-paths", _SIZE) as plot:
+        for number, (curve, run) in enumerate(runs.items()):
+            x, y = MILLI * run.device_q[first_shown(runs) :, :2].T
+            plot.axes.plot(x, y, **line_arguments(STYLES[curve]), zorder=4 + number / 10,
+                           markevery=marks(len(x), number))  # fmt: skip
+        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        plot.axes.set_aspect("equal", adjustable="datalim")
+        invert(plot.axes)
+    return plot.svg
+
+
+def ghost_steps(run: Run) -> list[int]:
+    """Return steps that are evenly spaced along the path rather than in time."""
+    moved = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.q[:, :2], axis=0).T))])
+    return [int(np.searchsorted(moved, share * moved[-1])) for share in np.arange(_GHOSTS) / _GHOSTS]

@@ -5,20 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.style import AMBER, BLUE, INK, MUTED, RULE, SKY, VERMILION, LineStyle, styled
-from reports.figures.svg import to_svg
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
+from reports.figures.style import AMBER, BLUE, INK, MUTED, RULE, SKY, VERMILION, LineStyle
 from verification.finding import Table
 
-KEY, TITLE = "engine-errors", "Energy, momentum and overlap, by engine"
-INPUT = "engines/errors"
-CAPTION = (
-    "A row for each engine and choice of settings, a column for each scene. First picture: by how much the energy at "
-    "the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at the end, as "
-    "a share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' size. "
-    "The numbers are powers of ten; ε is rounding or nothing. A cross is a run that failed, hatching an engine that "
-    "is not installed."
-)
 LEVELS = ((1e-6, BLUE, 0.75), (1e-2, SKY, 0.55), (1e-1, AMBER, 0.6), (float("inf"), VERMILION, 0.75))
 NAMES = ("to 10⁻⁶", "to 10⁻²", "to 10⁻¹", "above")
 ROUNDING = 1e-15
@@ -26,13 +17,20 @@ ENGINE, SCENE, CHOICE, LAW = "engine", "scene", "settings", "law"
 PANELS = (("energy error", "energy error"), ("momentum error", "momentum error"), ("overlap / size", "overlap"))
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "engine-errors", "Energy, momentum and overlap, by engine", "engines/errors", section="engines",
+    caption="A row for each engine and choice of settings, a column for each scene. First picture: by how much the "
+    "energy at the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at "
+    "the end, as a share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' "
+    "size. The numbers are powers of ten; ε is rounding or nothing. A cross is a run that failed, hatching an engine "
+    "that is not installed.",
+)  # fmt: skip
+def engine_errors(numbers: Table) -> Drawn:
     """Draw the three tables."""
-    numbers: Table = inputs[INPUT]
     rows = numbers.records()
     panels = tuple(Panel(_cells(rows, column, label), _words(rows, column), label) for column, label in PANELS)
     legend = tuple((name, LineStyle(color, "s", (), 0.0)) for name, (_, color, _) in zip(NAMES, LEVELS, strict=True))
-    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
+    return Drawn(panels, numbers, legend)
 
 
 def value_of(row: Mapping[str, Any], column: str) -> float | None:
@@ -46,20 +44,17 @@ def value_of(row: Mapping[str, Any], column: str) -> float | None:
 def _cells(rows: list[dict[str, Any]], column: str, label: str) -> str:
     lines = list(dict.fromkeys((row[ENGINE], row[CHOICE]) for row in rows))
     scenes = list(dict.fromkeys(row[SCENE] for row in rows))
-    with styled() as new_figure:
-        drawing = new_figure(figsize=(5.4, 0.25 * len(lines) + 1.75), layout="constrained")
-        axes = drawing.add_subplot()
+    with Plot(f"engine-errors-{label.replace(' ', '-')}", (5.4, 0.25 * len(lines) + 1.75)) as plot:
+        axes = plot.axes
         for row in rows:
             _cell(axes, scenes.index(row[SCENE]), lines.index((row[ENGINE], row[CHOICE])), row, column)
         axes.set_xticks(range(len(scenes)), scenes, rotation=40, ha="left", rotation_mode="anchor")
         axes.xaxis.tick_top()
         axes.set_yticks(range(len(lines)), [f"{engine}, {_at(choice)}" for engine, choice in lines])
         axes.set(xlim=(-0.5, len(scenes) - 0.5), ylim=(len(lines) - 0.5, -0.5))
-        axes.grid(False)
         axes.tick_params(length=0)
-        for side in axes.spines.values():
-            side.set_visible(False)
-        return to_svg(drawing, f"{KEY}-{label.replace(' ', '-')}")
+        plot.without_lines()
+    return plot.svg
 
 
 def _cell(axes: Any, x: int, y: int, row: Mapping[str, Any], column: str) -> None:
@@ -101,6 +96,3 @@ def _words(rows: list[dict[str, Any]], column: str) -> str:
         else:
             said.append(f"{engine}: none, {mine[0][LAW]}")
     return f"{column.capitalize()}: " + "; ".join(said) + "."
-
-
-RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="engines")

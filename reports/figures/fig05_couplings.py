@@ -1,42 +1,40 @@
-"""Figure 5 and Table I: how device and tool hold each other. Gains are those of the scene file."""
+"""Figure 5 and Table I: how device and tool hold each other, as block diagrams. Gains are those of the scene file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.figures.blocks import block, make_board, summing_point, wire
-from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.style import BLUE, FORCE, GREEN, styled
-from reports.figures.svg import to_svg
+import numpy as np
+
+from reports.figures.canvas import Canvas
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.style import BLUE, FORCE, GREEN, INK, MUTED, PEG
 from verification.finding import Table, titled
 
-KEY, NUMBER, TITLE = "fig05", "Figure 5", "Two ways to hold the tool, and Table I"
-SCENE = "scene/peg_corner"
-CAPTION = (
-    "The four-channel controller sends both forces straight across (red) and lets a spring and damper keep the two "
-    "positions together (blue). The unilateral coupler is a spring and damper only (green), and only while the tool is "
-    "in contact: the hand feels the wall through it, never the wall itself."
-)
-_WIDTH, _HEIGHT = 8.2, 5.2
-_SIZE = (5.0, 5.0 * _HEIGHT / _WIDTH)  # inches
+_BOARD = np.zeros(2), np.array([8.2, 5.2])  # corners, in arbitrary units
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "fig05", "Two ways to hold the tool, and Table I", "scene/peg_corner", number="Figure 5", section="couplings",
+    caption="The four-channel controller sends both forces straight across (red) and lets a spring and damper keep the "
+    "two positions together (blue). The unilateral coupler is a spring and damper only (green), and only while the "
+    "tool is in contact: the hand feels the wall through it, never the wall itself.",
+)  # fmt: skip
+def couplings(scene: Mapping[str, Any]) -> Drawn:
     """Draw both diagrams; the table repeats the scene's gains."""
     panels = (
         Panel(_unilateral(), "The hand pushes the device only; a spring and damper joins device and tool while the "
               "tool is in contact.", "(a) unilateral coupler: CBuc"),
         Panel(_four_channels(), "The hand pushes device and tool alike; the environment force of the tool goes to the "
               "device; a spring and damper joins device and tool.", "(b) four channels: ideal, IAPB, PB"),
-    )
-    return Figure(KEY, NUMBER, TITLE, CAPTION, panels, _table(inputs[SCENE]), (), (SCENE,))
+    )  # fmt: skip
+    return Drawn(panels, _table(scene))
 
 
 def _four_channels() -> str:
-    with styled() as new_figure:
-        drawing = new_figure(figsize=_SIZE)
-        axes = make_board(drawing, _WIDTH, _HEIGHT)
+    with Canvas("fig05-four", *_BOARD, (5.0, 5.0 * _BOARD[1][1] / _BOARD[1][0])) as canvas:
+        axes = canvas.axes
         _ends(axes, "virtual tool")
         block(axes, (4.5, 2.6), "K coord\nB coord", (1.5, 1.1), filled=False)
         summing_point(axes, (0.6, 2.6))
@@ -46,13 +44,12 @@ def _four_channels() -> str:
         wire(axes, [(7.0, 1.95), (7.0, 0.85), (0.6, 0.85), (0.6, 2.4)], "environment force channel", (4.1, 0.62),
              color=FORCE)
         _spring(axes, BLUE)
-        return to_svg(drawing, f"{KEY}-four")
+    return canvas.svg
 
 
 def _unilateral() -> str:
-    with styled() as new_figure:
-        drawing = new_figure(figsize=_SIZE)
-        axes = make_board(drawing, _WIDTH, _HEIGHT)
+    with Canvas("fig05-unilateral", *_BOARD, (5.0, 5.0 * _BOARD[1][1] / _BOARD[1][0])) as canvas:
+        axes = canvas.axes
         _ends(axes, "virtual tool,\nrigid contacts")
         block(axes, (4.5, 2.6), "K cpl\nB cpl", (1.5, 1.1), filled=False, dashed=True)
         axes.text(4.5, 1.78, "only in contact", ha="center", va="center", fontsize=8.5, color=GREEN)
@@ -60,7 +57,7 @@ def _unilateral() -> str:
         _spring(axes, GREEN)
         wire(axes, [(2.05, 1.95), (2.05, 0.85), (7.0, 0.85), (7.0, 1.95)], "free motion: the tool follows", (4.5, 0.62),
              dash=(4, 2))
-        return to_svg(drawing, f"{KEY}-unilateral")
+    return canvas.svg
 
 
 def _ends(axes: Any, tool: str) -> None:
@@ -86,4 +83,34 @@ def _table(scene: Mapping[str, Any]) -> Table:
     return titled(("Table I", "x", "y", "θ", "unit"), tuple(rows))
 
 
-RECIPE = Recipe(KEY, NUMBER, TITLE, (SCENE,), draw, section="couplings")
+def block(axes: Any, center: tuple[float, float], text: str, size: tuple[float, float] = (2.4, 1.1), *,
+          filled: bool = True, dashed: bool = False) -> None:
+    """Draw a box with text in it."""
+    from matplotlib.patches import FancyBboxPatch
+
+    x, y = center[0] - size[0] / 2, center[1] - size[1] / 2
+    axes.add_patch(FancyBboxPatch((x, y), *size, boxstyle="round,pad=0,rounding_size=0.12", linewidth=1.1,
+                                  facecolor=PEG if filled else "none", edgecolor=MUTED if dashed else INK,
+                                  linestyle=(0, (4, 2)) if dashed else "-", zorder=3))
+    axes.text(*center, text, ha="center", va="center", fontsize=9, zorder=4, linespacing=1.35)
+
+
+def summing_point(axes: Any, center: tuple[float, float]) -> None:
+    """Draw the circle in which signals are added."""
+    from matplotlib.patches import Circle
+
+    axes.add_patch(Circle(center, 0.2, facecolor="none", edgecolor=INK, linewidth=1.1, zorder=3))
+    axes.text(*center, "+", ha="center", va="center", fontsize=9, zorder=4)
+
+
+def wire(axes: Any, corners: Sequence[tuple[float, float]], text: str = "", at: tuple[float, float] | None = None, *,
+         color: str = INK, width: float = 1.2, dash: tuple[float, ...] = (), align: str = "center") -> None:
+    """Draw a signal along `corners`, an arrow head at its end, and its name at `at`."""
+    xs, ys = zip(*corners, strict=True)
+    style: Any = (0, dash) if dash else "-"
+    axes.plot(xs[:-1] + (xs[-1],), ys, color=color, linewidth=width, linestyle=style, solid_capstyle="butt", zorder=2)
+    axes.annotate("", xy=corners[-1], xytext=corners[-2], zorder=2,
+                  arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 0, "mutation_scale": 10,
+                              "shrinkA": 0, "shrinkB": 0, "fill": True})
+    if text and at is not None:
+        axes.text(*at, text, ha=align, va="center", fontsize=8.5, color=color, zorder=4)

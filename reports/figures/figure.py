@@ -13,6 +13,8 @@ from typing import Any
 from reports.figures.style import LineStyle
 from verification.finding import Table
 
+Legend = tuple[tuple[str, str | LineStyle], ...]  # (text, a style or the name of one)
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -26,6 +28,16 @@ class Panel:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """What the function of a recipe returns; `caption` replaces the recipe's."""
+
+    panels: tuple[Panel, ...]
+    numbers: Table | None = None
+    legend: Legend = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True)
 class Figure:
     """A drawn figure. `number` is the paper's ("Figure 7"), empty for a figure that is ours."""
 
@@ -35,8 +47,18 @@ class Figure:
     caption: str
     panels: tuple[Panel, ...]
     numbers: Table | None = None
-    legend: tuple[tuple[str, str | LineStyle], ...] = ()  # (text, a style or the name of one)
+    legend: Legend = ()
     inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
+
+
+@dataclass(frozen=True)
+class NotComputed:
+    """Stands where a figure would be: what it would have shown, and which inputs are missing."""
+
+    key: str
+    number: str
+    title: str
+    missing: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True)
@@ -58,14 +80,20 @@ class Recipe:
         return tuple(name for name in self.needs if inputs.get(name) is None)
 
 
-@dataclass(frozen=True)
-class NotComputed:
-    """Stands where a figure would be: what it would have shown, and which inputs are missing."""
+def recipe(
+    key: str, title: str, *needs: str, caption: str, section: str = "figures", number: str = ""
+) -> Callable[[Callable[..., Drawn]], Recipe]:
+    """Make a recipe from the function below it, which gets one argument per input."""
 
-    key: str
-    number: str
-    title: str
-    missing: tuple[str, ...] = field(default=())
+    def made(function: Callable[..., Drawn]) -> Recipe:
+        def draw(inputs: Mapping[str, Any]) -> Figure:
+            drawn = function(*(inputs[name] for name in needs))
+            told = drawn.caption or caption
+            return Figure(key, number, title, told, drawn.panels, drawn.numbers, drawn.legend, needs)
+
+        return Recipe(key, number, title, needs, draw, section)
+
+    return made
 
 
 def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
 from reports.figures.corner import UNLIMITED
-from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.film import SIZE, Film, film, frames
 from reports.figures.geometry import Floats, is_spatial
 from reports.figures.scenes_space import SIGHTS
@@ -67,16 +68,16 @@ FILMS = {
 def recipe_of(key: str) -> Recipe:
     """Return the recipe of one film."""
     shown = FILMS[key]
-    return Recipe(key, "", shown.title, tuple(shown.runs.values()), lambda inputs: _draw(key, inputs), shown.section)
+    made = recipe(key, shown.title, *shown.runs.values(), caption=f"{shown.see} {MARKS}", section=shown.section)
+    return made(partial(_film, key))
 
 
-def _draw(key: str, inputs: Mapping[str, Any]) -> Figure:
-    shown, names = FILMS[key], FILMS[key].runs
-    runs = [inputs[name] for name in names.values()]
-    films = {label: film(inputs[name], SIGHT.get(name), runs) for label, name in names.items()}
+def _film(key: str, *runs: Run) -> Drawn:
+    films = {label: film(run, SIGHT.get(name), runs)
+             for (label, name), run in zip(FILMS[key].runs.items(), runs, strict=True)}  # fmt: skip
     times = still_times(next(iter(films.values())))
     panels = tuple(_panel(f"{key}-{k}", label, made, times) for k, (label, made) in enumerate(films.items()))
-    return Figure(key, "", shown.title, f"{shown.see} {MARKS}", panels, _numbers(films), (), tuple(names.values()))
+    return Drawn(panels, _numbers(films))
 
 
 def _panel(key: str, label: str, made: Film, times: Sequence[float]) -> Panel:

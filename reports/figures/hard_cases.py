@@ -10,20 +10,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.figures.figure import Figure, Panel, Recipe
-from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, RULE, VERMILION, LineStyle, styled
-from reports.figures.svg import to_svg
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
+from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, RULE, VERMILION, LineStyle
 from verification.finding import Table
 
-KEY, TITLE, INPUT = "hard-cases-matrix", "Who survives what", "hard_cases"
+INPUT = "hard_cases"
 CASE, KIND, METHOD, OUTCOME, GAIN, ERROR = "case", "kind", "method", "outcome", "energy gain", "forward error"
-CAPTION = (
-    "A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, with the "
-    "decade of its error against the truth (−16: the last digit); without a number its error is zero, or energy is the "
-    "only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are wrong, with "
-    "the decade of the error; what a grey square gets wrong is noise, and another BLAS would make other noise. A ring "
-    "refused the input, a diamond was cut at its limit of time."
-)
 STABLE = "stable"
 MARKS: dict[str, LineStyle] = {
     STABLE: LineStyle(BLUE, "o", (), 0.0),
@@ -42,14 +35,19 @@ _COLUMNS = 7  # of either matrix, filled or not: so both are drawn to one scale
 _LONGEST = 58  # characters of a case's name that fit beside the matrix
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "hard-cases-matrix", "Who survives what", INPUT, section="hard-cases",
+    caption="A row is a case, a column a method; where there is no mark the method does not apply. A dot is stable, "
+    "with the decade of its error against the truth (−16: the last digit); without a number its error is zero, or "
+    "energy is the only law. A cross made energy, with the decade of the gain. Squares and triangles made none and are "
+    "wrong, with the decade of the error; what a grey square gets wrong is noise, and another BLAS would make other "
+    "noise. A ring refused the input, a diamond was cut at its limit of time.",
+)  # fmt: skip
+def hard_cases(numbers: Table) -> Drawn:
     """Draw one matrix for the impacts and one for the motions."""
-    numbers: Table = inputs[INPUT]
-    kinds = set(numbers.column(KIND))
-    panels = tuple(_panel(numbers, kind, label) for kind, label in _KINDS if kind in kinds)
+    panels = tuple(_panel(numbers, kind, label) for kind, label in _KINDS if kind in numbers.column(KIND))
     seen = set(numbers.column(OUTCOME))
-    legend = tuple((outcome, style) for outcome, style in MARKS.items() if outcome in seen)
-    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, legend, (INPUT,))
+    return Drawn(panels, numbers, tuple((outcome, style) for outcome, style in MARKS.items() if outcome in seen))
 
 
 def decade(value: float | None) -> str:
@@ -63,27 +61,25 @@ def _panel(numbers: Table, kind: str, label: str) -> Panel:
     rows = numbers.where(kind=kind).records()
     cases = tuple(dict.fromkeys(row[CASE] for row in rows))
     methods = tuple(sorted({row[METHOD] for row in rows}, key=_first))
-    svg = _matrix(f"{KEY}-{kind}", rows, cases, methods)
+    svg = _matrix(f"hard-cases-matrix-{kind}", rows, cases, methods)
     return Panel(svg, _words(rows, methods), label, wide=True)
 
 
 def _matrix(key: str, rows: Sequence[Mapping[str, Any]], cases: tuple[str, ...], methods: tuple[str, ...]) -> str:
     columns = max(_COLUMNS, len(methods))
     size = (_LABELS + _COLUMN * columns, _HEAD + _ROW * len(cases))
-    with styled() as new_figure:
-        drawing = new_figure(figsize=size)
-        axes = drawing.add_axes((_LABELS / size[0], 0.02, 1.0 - _LABELS / size[0], (_ROW * len(cases)) / size[1]))
+    frame = (_LABELS / size[0], 0.02, 1.0 - _LABELS / size[0], (_ROW * len(cases)) / size[1])
+    with Plot(key, size, frame=frame) as plot:
+        axes = plot.axes
         for row in rows:
             _mark(axes, methods.index(row[METHOD]), cases.index(row[CASE]), row)
         axes.set(xlim=(-0.5, columns - 0.5), ylim=(len(cases) - 0.5, -0.5))
         axes.set_yticks(range(len(cases)), [_short(case) for case in cases])
         axes.set_xticks(range(len(methods)), [method.replace(" ", "\n").replace("_", "\n") for method in methods])
         axes.tick_params(length=0, labeltop=True, labelbottom=False, top=False, bottom=False)
-        axes.grid(visible=False)
+        plot.without_lines()
         axes.hlines(range(len(cases)), -0.5, len(methods) - 0.5, color=RULE, linewidth=0.6, zorder=1)
-        for side in axes.spines.values():
-            side.set_visible(False)
-        return to_svg(drawing, key)
+    return plot.svg
 
 
 def _mark(axes: Any, x: int, y: int, row: Mapping[str, Any]) -> None:
@@ -111,6 +107,3 @@ def _words(rows: Sequence[Mapping[str, Any]], methods: tuple[str, ...]) -> str:
         own = [row[OUTCOME] for row in rows if row[METHOD] == method]
         counts.append(f"{method} is stable on {own.count(STABLE)} of {len(own)}")
     return "Verdicts by case: " + ", ".join(counts) + "."
-
-
-RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="hard-cases")

@@ -6,22 +6,16 @@ what the choice of rows decides.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from reports.figures.canvas import arrow, note
-from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
 from reports.figures.style import BLUE, GREEN, INK, MUTED, PAPER, VERMILION, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
 from verification.finding import Table
 
-KEY, TITLE, INPUT = "linked-impacts", "A blow to balls that touch", "mechanics/linked impacts"
-CAPTION = (
-    "Arrows are velocities after an elastic blow of 1 m/s from the left. With relative rows (12), and event by event, "
-    "energy and momentum are kept, and yet the outcomes differ: which contacts are taken to collide decides. With "
-    "per-body rows, (13) and (14), the striker comes back as from a wall and the others never learn of it: the energy "
-    "is right, the momentum is not. The last panel has the cradles of two to seven balls."
-)
 # start of a treatment's name -> its look
 LOOKS = {
     "simultaneous, relative": LineStyle(BLUE, "o"),
@@ -59,9 +53,15 @@ def outcomes(numbers: Table, problem: str) -> list[Outcome]:
                     rows[0]["momentum change"]) for names, rows in found.items()]  # fmt: skip
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "linked-impacts", "A blow to balls that touch", "mechanics/linked impacts", section="mechanics",
+    caption="Arrows are velocities after an elastic blow of 1 m/s from the left. With relative rows (12), and event by "
+    "event, energy and momentum are kept, and yet the outcomes differ: which contacts are taken to collide decides. "
+    "With per-body rows, (13) and (14), the striker comes back as from a wall and the others never learn of it: the "
+    "energy is right, the momentum is not. The last panel has the cradles of two to seven balls.",
+)  # fmt: skip
+def linked_impacts(numbers: Table) -> Drawn:
     """Draw both problems, and what the last ball of a cradle gets."""
-    numbers: Table = inputs[INPUT]
     cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
     panels = (
         Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
@@ -69,7 +69,7 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
         Panel(_last_ball(numbers), "Velocity of the last ball of cradles of 2 to 7 balls, by treatment.",
               "Cradles of two to seven balls: what the last ball gets"),
     )  # fmt: skip
-    return Figure(KEY, "", TITLE, CAPTION, panels, numbers, LEGEND, (INPUT,))
+    return Drawn(panels, numbers, LEGEND)
 
 
 def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
@@ -84,11 +84,9 @@ def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
 
 def _cradle(found: Sequence[Outcome]) -> str:
     pitch, step = 1.02, 1.35
-    with styled() as new_figure:
-        drawing = new_figure(figsize=(8.6, 0.52 * (len(found) + 1) + 0.3))
-        axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
+    with Plot("linked-impacts-cradle", (8.6, 0.52 * (len(found) + 1) + 0.3), bare=True) as plot:
+        axes = plot.axes
         axes.set(xlim=(-8.6, 12.4), ylim=(-step * len(found) + 0.4, 2.5))
-        axes.set_axis_off()
         for x, text in ((-8.4, "rows taken, or order"), (9.0, "energy"), (11.0, "momentum")):
             note(axes, (x, 2.2), text, ha="left" if x < 0 else "center", color=MUTED, fontsize=8.5)
         note(axes, (-8.4, step), "before the blow", ha="left")
@@ -100,7 +98,7 @@ def _cradle(found: Sequence[Outcome]) -> str:
             _balls(axes, [(pitch * k, y) for k in range(len(before))], outcome.velocity, outcome.look.color, 1.7)
             _kept(axes, (9.0, y), outcome.energy)
             _kept(axes, (11.0, y), outcome.momentum)
-        return to_svg(drawing, f"{KEY}-cradle")
+    return plot.svg
 
 
 def _label(outcome: Outcome) -> str:
@@ -143,7 +141,7 @@ def _bernoulli(found: Sequence[Outcome]) -> str:
             kept = abs(outcome.momentum) < ROUNDING
             note(axes, (0.6, -1.6), "all kept" if kept else f"momentum changed ×{outcome.momentum:.2g}",
                  color=INK if kept else VERMILION, fontweight="normal" if kept else "bold", fontsize=8.5)  # fmt: skip
-        return to_svg(drawing, f"{KEY}-bernoulli")
+        return to_svg(drawing, "linked-impacts-bernoulli")
 
 
 def _series(numbers: Table) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
@@ -157,9 +155,8 @@ def _series(numbers: Table) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
 
 
 def _last_ball(numbers: Table) -> str:
-    with styled() as new_figure:
-        drawing = new_figure(figsize=(4.1, 3.0), layout="constrained")
-        axes = drawing.add_subplot()
+    with Plot("linked-impacts-last") as plot:
+        axes = plot.axes
         for (treatment, rows), found in _series(numbers).items():
             if treatment.startswith("simultaneous, per-body") and "all" in rows:
                 continue  # as with the approaching ones
@@ -170,13 +167,10 @@ def _last_ball(numbers: Table) -> str:
             below = (0, -9) if "per-body" in treatment else (0, 8)
             note(axes, (found[-1][0], values[-1]), mine, below, ha="right", color=found[0][1].look.color, fontsize=8)
         axes.set(xlabel="balls in the cradle", ylabel="velocity of the last ball [m/s]", ylim=(-0.18, 1.2))
-        return to_svg(drawing, f"{KEY}-last")
+    return plot.svg
 
 
 def _words(found: Sequence[Outcome]) -> str:
     lost = [outcome for outcome in found if abs(outcome.momentum) > ROUNDING]
     return (f"{len(found)} outcomes of one blow; {len(found) - len(lost)} keep energy and momentum, "
             f"{len(lost)} by per-body rows keep the energy only.")  # fmt: skip
-
-
-RECIPE = Recipe(KEY, "", TITLE, (INPUT,), draw, section="mechanics")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.numbers import format_number
 from reports.figures.style import (
     AMBER,
@@ -27,15 +27,6 @@ from reports.figures.style import (
 from reports.figures.svg import to_svg
 from verification.finding import Table
 
-KEY, TITLE = "every-scene", "Every scene at a glance"
-CONTACTS, OVER_TIME = "scene-ledger/contact and time", "scene-ledger/books over time"
-CAPTION = (
-    "A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by the "
-    "hand and the coupling. Under it lies where that energy is: still in motion, in height and springs, or lost in "
-    "impacts, contact damping and friction. Where the colours do not reach the line the steps in time swallowed "
-    "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap "
-    "and the time of a step, both on logarithmic scales."
-)
 # heading of the table -> (text of the legend, colour), from the bottom of the stack
 LAYERS = (
     (("kinetic",), "in motion", BLUE),
@@ -87,10 +78,18 @@ def _strip(name: str, numbers: Table) -> Strip:
     return Strip(name, column["time"], layers, line, column["impacts"] > 0, bool(at_rest))
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "every-scene", "Every scene at a glance", "scene-ledger/contact and time", "scene-ledger/books over time",
+    section="scene-ledger",
+    caption="A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by "
+    "the hand and the coupling. Under it lies where that energy is: still in motion, in height and springs, or lost in "
+    "impacts, contact damping and friction. Where the colours do not reach the line the steps in time swallowed "
+    "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap "
+    "and the time of a step, both on logarithmic scales.",
+)  # fmt: skip
+def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
     """Draw every row."""
-    shown, contacts = strips(inputs[OVER_TIME]), inputs[CONTACTS]
-    facts = {row["scene"]: row for row in contacts.records()}
+    shown, facts = strips(over_time), {row["scene"]: row for row in contacts.records()}
     with styled() as new_figure:
         height = _HEAD + _ROW * len(shown) + _FOOT
         drawing = new_figure(figsize=(_WIDTH, height))
@@ -98,9 +97,8 @@ def draw(inputs: Mapping[str, Any]) -> Figure:
             bottom = (height - _HEAD - (place + 1) * _ROW) / height
             _row(drawing, bottom, _ROW / height, strip, facts)
         _headings(drawing, 1.0 - 0.55 * _HEAD / height)
-        svg = to_svg(drawing, KEY)
-    return Figure(KEY, "", TITLE, CAPTION, (Panel(svg, _words(shown, facts), wide=True),), contacts, LEGEND,
-                  (CONTACTS, OVER_TIME))  # fmt: skip
+        svg = to_svg(drawing, "every-scene")
+    return Drawn((Panel(svg, _words(shown, facts), wide=True),), contacts, LEGEND)
 
 
 def _row(drawing: Any, bottom: float, height: float, strip: Strip, facts: Mapping[str, Mapping[str, Any]]) -> None:
@@ -168,6 +166,3 @@ def _words(shown: Sequence[Strip], facts: Mapping[str, Mapping[str, Any]]) -> st
         f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
         f"{deepest['scene']}; longest step {longest['time per step']:.2g} µs in {longest['scene']}."
     )
-
-
-RECIPE = Recipe(KEY, "", TITLE, (CONTACTS, OVER_TIME), draw, section="scene-ledger")

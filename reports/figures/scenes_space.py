@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from iapb.run import Run
-from reports.figures.canvas import arrow, note, widened
-from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.canvas import Canvas, hand
+from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import (
     Floats,
     View,
@@ -21,17 +21,8 @@ from reports.figures.geometry import (
     placement,
     view,
 )
-from reports.figures.style import FORCE, INK, LINK, MUTED, PANEL, PEG, RULE, WALL, styled
-from reports.figures.svg import to_svg
+from reports.figures.style import FORCE, INK, LINK, MUTED, PANEL, PEG, RULE, WALL
 
-KEY, TITLE = "scenes-space", "The scenes in space"
-CAPTION = (
-    "Each scene at its start, under way and at its end; bodies and walls are drawn see-through. First a peg with a "
-    "collar goes into a square hole in a plate, and strikes the loose boxes and balls about the mouth. Then a six-axis "
-    "arm, pulled at its tool along the red arrow, meets a post, a knob and a table, and knocks a loose block away (no "
-    "gravity: it flies on). Last a free body spins about its middle axis and turns over again and again; it has no "
-    "shape, so the even box of its mass and inertia is drawn, with the same corner marked in every picture."
-)
 _MARGIN = 0.06
 _LINK_WIDTH = 4.0  # points
 _MARK = 0.04  # radius of the marked corner, as a share of the box's longest side
@@ -68,10 +59,17 @@ class Piece:
     alpha: float = 1.0
 
 
-def draw(inputs: Mapping[str, Any]) -> Figure:
+@recipe(
+    "scenes-space", "The scenes in space", *(sight.run for sight in SIGHTS), section="scene-ledger",
+    caption="Each scene at its start, under way and at its end; bodies and walls are drawn see-through. First a peg "
+    "with a collar goes into a square hole in a plate, and strikes the loose boxes and balls about the mouth. Then a "
+    "six-axis arm, pulled at its tool along the red arrow, meets a post, a knob and a table, and knocks a loose block "
+    "away (no gravity: it flies on). Last a free body spins about its middle axis and turns over again and again; it "
+    "has no shape, so the even box of its mass and inertia is drawn, with the same corner marked in every picture.",
+)  # fmt: skip
+def scenes_space(*runs: Run) -> Drawn:
     """Draw every scene at its moments."""
-    panels = tuple(panel for sight in SIGHTS for panel in panels_of(sight, inputs[sight.run]))
-    return Figure(KEY, "", TITLE, CAPTION, panels, None, (), RECIPE.needs)
+    return Drawn(tuple(panel for sight, run in zip(SIGHTS, runs, strict=True) for panel in panels_of(sight, run)))
 
 
 def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
@@ -83,23 +81,14 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
     margin = _MARGIN * np.ptp(corners, axis=0).max()
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
     for step, each in zip(steps, drawn, strict=True):
-        with styled() as new_figure:
-            drawing = new_figure(figsize=PANEL)
-            axes = _canvas(drawing, low, high)
+        with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
             for order, piece in enumerate(each):
-                _fill(axes, sight.seen, piece, order)
-            _hand(axes, sight.seen, scene, run.q[step], 0.16 * float(max(high - low)))
-            svg = to_svg(drawing, f"{KEY}-{run.scene_name}-{step}")
+                _fill(canvas.axes, sight.seen, piece, order)
+            if scene["hand"]:
+                place = body_placements(scene, run.q[step])[scene["hand"]["body"]]
+                hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), (0, 9), sight.seen.flat)
         moment = f"{run.time[step]:.2f} s"
-        yield Panel(svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
-
-
-def _canvas(drawing: Any, low: Floats, high: Floats) -> Any:
-    axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
-    low, high = widened(low, high, drawing.get_figwidth() / drawing.get_figheight())
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_axis_off()
-    return axes
+        yield Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
 
 
 def _fill(axes: Any, seen: View, piece: Piece, order: int) -> None:
@@ -168,17 +157,3 @@ def _shape(seen: View, frame: Any, shape: Mapping[str, Any], face: str = PEG, ed
     for ring in cuboid_faces(own, shape["size"]):
         if seen.faces_reader(ring):
             yield Piece(ring, face, edge, 0.9, middle, alpha)
-
-
-def _hand(axes: Any, seen: View, scene: Mapping[str, Any], q: Floats, length: float) -> None:
-    hand = scene["hand"]
-    if not hand:
-        return
-    start = seen.flat(body_placements(scene, q)[hand["body"]].of(hand["point"]))
-    force = seen.flat(hand["force"][:3])
-    if np.hypot(*force) > 0.0:
-        arrow(axes, start, length * force / np.hypot(*force))
-        note(axes, start, "hand", (0, 9), color=FORCE)
-
-
-RECIPE = Recipe(KEY, "", TITLE, tuple(sight.run for sight in SIGHTS), draw, section="scene-ledger")

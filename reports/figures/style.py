@@ -90,6 +90,11 @@ def series_legend(names: Sequence[str], *, line: bool = True) -> tuple[tuple[str
     return tuple((name, look if line else replace(look, width=0.0)) for name, look in zip(names, looks, strict=True))
 
 
+def numbered(number: int) -> LineStyle:
+    """Return the style of a numbered series; from the second round on with empty markers."""
+    return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE))
+
+
 @contextmanager
 def styled() -> Iterator[Any]:
     """Give matplotlib's pyplot-free figure module under our parameters, leaving the caller's untouched."""

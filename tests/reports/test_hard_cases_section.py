@@ -9,7 +9,7 @@ import pytest
 from reports.evidence.hard_cases import INPUT, compute, summary
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, draw
-from reports.figures.hard_cases import MARKS, RECIPE, decade
+from reports.figures.hard_cases import MARKS, decade, hard_cases
 from reports.pages.records import HardCase
 from reports.runner import Runner
 from verification.finding import Table
@@ -53,7 +53,7 @@ def test_records_are_read_back_as_they_were(cases: tuple[HardCase, ...], tmp_pat
 
 
 def test_the_matrix_shows_every_case_and_method(cases: tuple[HardCase, ...]) -> None:
-    figure = draw(RECIPE, {INPUT: summary(cases)})
+    figure = draw(hard_cases, {INPUT: summary(cases)})
     assert isinstance(figure, Figure)
     assert [panel.label for panel in figure.panels] == ["Impacts, by method", "Motions, by world"]
     impacts = figure.panels[0].svg
@@ -72,5 +72,5 @@ def test_the_decade_of_a_value(value: float | None, text: str) -> None:
 
 
 def test_without_cases_nothing_is_drawn() -> None:
-    figure = draw(RECIPE, {INPUT: Table(summary(()).columns)})
+    figure = draw(hard_cases, {INPUT: Table(summary(()).columns)})
     assert isinstance(figure, Figure) and figure.panels == ()

@@ -15,7 +15,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reports.evidence.verdicts import verdicts as first_page
-from reports.figures.fig03_energy_loss import arm_energies
+from reports.figures.two_link_arm import arm_energies
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
 from reports.pages.records import (

@@ -72,8 +72,8 @@ def test_strips_show_every_joule(topic: Finding, measures: list[dict[str, Any]])
 
 def test_figures_are_drawn_and_can_stand_in_a_page(topic: Finding, runs: tuple[Run, ...]) -> None:
     inputs = {f"scene-ledger/{name}": table for name, table in topic.tables.items()}
-    inputs |= {name: runs[NAMES.index(FIGURE_RUNS[name][0])] for name in scenes_space.RECIPE.needs}
-    for recipe in (scenes_ledger.RECIPE, scenes_space.RECIPE):
+    inputs |= {name: runs[NAMES.index(FIGURE_RUNS[name][0])] for name in scenes_space.scenes_space.needs}
+    for recipe in (scenes_ledger.scenes_ledger, scenes_space.scenes_space):
         figure = recipe.draw(inputs)
         for panel in figure.panels:
             ElementTree.fromstring(panel.svg)

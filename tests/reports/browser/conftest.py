@@ -18,7 +18,7 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
-from reports.figures.fig03_energy_loss import arm_energies
+from reports.figures.two_link_arm import arm_energies
 from reports.pages.records import Evidence, Verdict
 from reports.report import build_report
 from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from reports.commands import bench as command
-from reports.figures import anytime, effect_costs, impact_scaling, trajectory_precision
+from reports.figures.cost import anytime, effect_costs, impact_scaling, trajectory_precision
 from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
 from verification.cost.effects import summary
@@ -128,7 +128,7 @@ def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     motions = trajectory_precision.draw(inputs)
     assert len(motions.panels) == 3
     assert [name for name, _ in motions.legend] == ["IAPB, midpoint", "PB, midpoint", "MuJoCo"]
-    without = {**inputs, trajectory_precision.INPUT: tables["motions"].where(outcome="ok")}
+    without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
     assert motions.panels[0].svg != trajectory_precision.draw(without).panels[0].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
 
@@ -140,7 +140,7 @@ def test_the_front_of_effects_is_pareto() -> None:
     table = summary({"scene": effects})
     assert {row["effect"]: row["best of its error"] for row in table.records()} == {
         "cheap": "yes", "dear": "yes", "bad": "no"}  # fmt: skip
-    assert len(effect_costs.draw({effect_costs.INPUT: table}).panels) == 1
+    assert len(effect_costs.draw({"effect_costs": table}).panels) == 1
 
 
 def test_bench_ends_with_1_where_a_row_failed(

@@ -1,0 +1,277 @@
+"""IAPB beside complementarity: where both move alike, what an impact and a step cost, and what its solvers solve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot, plain_powers
+from reports.figures.style import (
+    AMBER,
+    BLUE,
+    CYCLE,
+    GREEN,
+    INK,
+    MUTED,
+    PAPER,
+    SKY,
+    STYLES,
+    VERMILION,
+    LineStyle,
+    line_arguments,
+    numbered,
+    series_legend,
+)
+from verification.finding import Table, titled
+
+Rows = list[dict[str, Any]]
+
+_BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
+_SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
+
+
+@recipe(
+    "agreement-map", "Where IAPB and complementarity move alike", "complementarity/map", "complementarity/two contacts",
+    section="complementarity",
+    caption="First picture: a row for each kind of impact and number of redundant rows; the blue bar is the share of "
+    "impacts in which both laws give one motion, the ticks are those of e = 0, 0.5 and 1, which lie on one "
+    "another. Second picture: by how much the others differ, median and largest, for e = 0, 0.5 and 1: the "
+    "distance grows as 1 + e. Third picture: two contacts alone, whose rows have the cosine c in the kinetic "
+    "metric and which close at speeds 1 and r. They agree on and above the line r = c, and nowhere below.",
+)  # fmt: skip
+def agreement_map(numbers: Table, border: Table) -> Drawn:
+    """Draw share and distance of the map, and the border."""
+    rows = [row for row in numbers.records() if not row["impacts"].startswith("scene ")]
+    kinds: dict[str, Rows] = {}
+    for row in rows:
+        kinds.setdefault(f"{row['impacts']}, {row['redundant rows']}", []).append(row)
+    whole = sorted({row["impacts"] for row in rows} - {row["impacts"] for row in rows if row["share that agrees"] < 1})
+    right = sum(predicted == found for predicted, found in border.select(_BORDER[2:]).rows)
+    panels = (
+        Panel(_shares(kinds), f"Shares of impacts with one motion, by kind; all of them for {', '.join(whole)}.",
+              "share of impacts that agree"),
+        Panel(_distances(kinds), "Distances of the motions, by kind.", "distance where they differ"),
+        Panel(_border(border), f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} "
+              "points.", "two contacts"),
+    )  # fmt: skip
+    legend = (("agree", STYLES["holds"]), ("differ", STYLES["fails"]), ("r = c", STYLES["bound"]))
+    return Drawn(panels, numbers, legend)
+
+
+def _shares(kinds: Mapping[str, Rows]) -> str:
+    with Plot("agreement-map-share", (4.6, 0.24 * len(kinds) + 0.7)) as plot:
+        axes = plot.axes
+        _kinds(plot, kinds)
+        for y, rows in enumerate(kinds.values()):
+            shares = [row["share that agrees"] for row in rows]
+            axes.barh(y, 1.0, height=0.62, color=VERMILION, alpha=0.18, linewidth=0)
+            axes.barh(y, sum(shares) / len(shares), height=0.62, color=BLUE, linewidth=0)
+            axes.plot(shares, [y] * len(shares), "|", color=INK, markersize=7)
+        axes.set(xlim=(0.0, 1.005), xlabel="share of impacts with one motion")
+    return plot.svg
+
+
+def _distances(kinds: Mapping[str, Rows]) -> str:
+    with Plot("agreement-map-distance", (4.6, 0.24 * len(kinds) + 0.7)) as plot:
+        axes = plot.axes
+        _kinds(plot, kinds)
+        for y, rows in enumerate(kinds.values()):
+            members = [row for row in rows if row["median distance where they differ"] is not None]
+            if not members:
+                axes.plot(0.0, y, "o", markersize=4, markerfacecolor=PAPER, markeredgecolor=MUTED)
+            for row in members:
+                typical, shift = row["median distance where they differ"], y + 0.22 * (2.0 * row["e"] - 1.0)
+                axes.plot([typical, row["largest distance"]], [shift, shift], "-", color=VERMILION, linewidth=1.1)
+                axes.plot(typical, shift, "X", color=VERMILION, markeredgecolor=PAPER, markeredgewidth=0.4,
+                          markersize=_SIZES.get(row["e"], 4.6))  # fmt: skip
+        axes.set(xlim=(-0.03, 2.05), xlabel="distance of v⁺, of |v⁻| (ring: none differ)")
+    return plot.svg
+
+
+def _kinds(plot: Plot, kinds: Mapping[str, Rows]) -> None:
+    plot.lines_of(list(kinds))
+    plot.axes.grid(False, axis="y")
+
+
+def _border(numbers: Table) -> str:
+    with Plot("agreement-map-border", (4.1, 3.4)) as plot:
+        axes = plot.axes
+        plot.curve([(0.0, 0.0), (1.0, 1.0)], STYLES["bound"], marked=False)
+        for cosine, ratio, predicted, found in numbers.select(_BORDER).rows:
+            axes.plot(cosine, ratio, "o" if found else "x", color=BLUE if found else VERMILION, markersize=6,
+                      markeredgewidth=1.4)  # fmt: skip
+            if predicted != found:
+                axes.plot(cosine, ratio, "s", markersize=12, markerfacecolor="none", markeredgecolor=INK)
+        axes.set(xlim=(-1.02, 1.02), ylim=(0.0, 1.06), xlabel="cosine c of the two rows", ylabel="speed ratio r")
+    return plot.svg
+
+
+# What is compiled is dashed; IAPB is blue, the rest keeps the numbered styles.
+SOLVERS = {
+    "IAPB kernel": LineStyle(BLUE, "o", (4, 1.6), 1.6, False),
+    "Lemke kernel": LineStyle(VERMILION, "s", (4, 1.6), 1.6, False),
+    "IAPB": LineStyle(BLUE, "o", (), 2.2), "IAPB printed formula": LineStyle(SKY, "D", (), 1.2),
+    "lemke": LineStyle(VERMILION, "s", (), 1.4), "daqp": LineStyle(GREEN, "^", (), 1.4),
+    "quadprog": LineStyle(AMBER, "v", (), 1.2), "gauss_seidel": LineStyle(MUTED, "P", (), 1.2),
+    "proxqp": LineStyle(INK, "*", (), 1.0),
+}  # fmt: skip
+
+
+@recipe(
+    "cost-of-contacts", "What an impact costs", "complementarity/time per impact", "complementarity/time per step",
+    section="complementarity",
+    caption="Median time of one impact over its number of contacts; the band reaches from the least to the largest "
+    "sample. Full lines are called from Python, dashed ones from compiled code: compare like with like. A cross: "
+    "the solver answered wrongly. A triangle at the top: it was left out, too slow for fewer contacts. On a patch "
+    "all contacts beyond three are redundant, and IAPB drops them; in a pile none is, and a dense factor costs "
+    "what it costs. Last picture: one step of each world.",
+)  # fmt: skip
+def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
+    """Draw a panel for each family, and the steps."""
+    names = list(dict.fromkeys(numbers.column("solver")))
+    others = [name for name in names if name not in SOLVERS]
+    styles = {name: SOLVERS[name] if name in SOLVERS else CYCLE[(3 + others.index(name)) % len(CYCLE)]
+              for name in names}  # fmt: skip
+    most = max(numbers.column("contacts"))
+    panels = [_family(numbers.where(impacts=family).records(), styles, family, most)
+              for family in dict.fromkeys(numbers.column("impacts"))]  # fmt: skip
+    words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
+    panels.append(Panel(_steps(steps), f"Median times of one step in microseconds: {words}.", "one step of a world"))
+    return Drawn(tuple(panels), numbers, tuple(styles.items()))
+
+
+def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int) -> Panel:
+    from matplotlib.ticker import NullLocator
+
+    top = 3.0 * max(row["largest"] for row in rows if row["largest"] is not None)
+    with Plot(f"cost-of-contacts-{family}", (4.6, 3.9)) as plot:
+        for name, style in styles.items():
+            timed = [row for row in rows if row["solver"] == name and row["median"] is not None]
+            at = [row["contacts"] for row in timed]
+            if len(at) > 1:
+                plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
+                                       color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
+            plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
+            _unsolved(plot.axes, [row for row in rows if row["solver"] == name], style, top)
+        plot.log("contacts", "time of one impact [µs]")
+        contacts = sorted({row["contacts"] for row in rows})
+        plot.axes.set_xticks(contacts, [str(count) for count in contacts])
+        plot.axes.xaxis.set_minor_locator(NullLocator())
+    words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
+                      if row["contacts"] == most and row["median"] is not None)  # fmt: skip
+    return Panel(plot.svg, f"Median times of a {family} of {most} contacts in microseconds: {words}.", family)
+
+
+def _unsolved(axes: Any, rows: Rows, style: LineStyle, top: float) -> None:
+    """Crosses over wrong answers, triangles where nothing was asked."""
+    for row in rows:
+        at, median = row["contacts"], row["median"]
+        if row["outcome"] == "failed" and median is not None:
+            axes.plot(at, median, "x", color=style.color, markersize=10, markeredgewidth=1.8, zorder=5)
+        elif median is None:
+            axes.plot(at, top, "^", color=style.color, markersize=6, zorder=5)
+
+
+def _steps(numbers: Table) -> str:
+    ways, scenes = (list(dict.fromkeys(numbers.column(name))) for name in ("world", "scene"))
+    with Plot("cost-of-contacts-steps", (4.6, 2.4)) as plot:
+        axes = plot.axes
+        for number, scene in enumerate(scenes):
+            style = CYCLE[number % len(CYCLE)]
+            for row in numbers.where(scene=scene).records():
+                y = ways.index(row["world"]) + 0.24 * (number - (len(scenes) - 1) / 2)
+                axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
+                axes.plot(row["median"], y, style.marker, color=style.color, markersize=5)
+            axes.plot([], [], style.marker, color=style.color, label=scene)
+        axes.set(xscale="log", xlabel="time of one step [µs]", ylim=(len(ways) - 0.4, -0.6))
+        plain_powers(axes)
+        axes.set_yticks(range(len(ways)), ways)
+        axes.legend(loc="upper right", fontsize=8)
+    return plot.svg
+
+
+@recipe(
+    "performance-profile", "Which solver solves what, and how fast", "complementarity/profile",
+    section="complementarity",
+    caption="How high a curve starts: the share of problems on which the solver is the fastest. How high it ends: the "
+    "share that it solves at all, by residuals recomputed from the problem; refusals, wrong answers and what was "
+    "left out for time count as unsolved. Times are of the solve alone, each solver warmed before: for Siconos "
+    "its compiled solve, for the others their call from Python.",
+)  # fmt: skip
+def performance_profile(numbers: Table) -> Drawn:
+    """Draw a panel for each collection and kind of problem; the solvers of the two kinds are numbered apart."""
+    panels: list[Panel] = []
+    legend: tuple[tuple[str, LineStyle], ...] = ()
+    for kind in ("frictionless", "friction"):
+        own = numbers.where(kind=kind)
+        looks = series_legend(tuple(dict.fromkeys(own.column("solver"))))
+        legend += looks
+        for collection in dict.fromkeys(own.column("collection")):
+            here = own.where(collection=collection)
+            last = {row["solver"]: row["share solved"] for row in here.records()}
+            words = ", ".join(f"{solver} {share:.0%}" for solver, share in last.items())
+            panels.append(Panel(_profile(here, looks, f"{collection}-{kind}"), f"Shares solved at all: {words}.",
+                                f"{collection}, {kind}"))  # fmt: skip
+    return Drawn(tuple(panels), _ends(numbers), legend)
+
+
+def _profile(numbers: Table, looks: tuple[tuple[str, LineStyle], ...], key: str) -> str:
+    with Plot(f"performance-profile-{key.replace(' ', '-')}", (4.4, 3.2)) as plot:
+        axes = plot.axes
+        for number, (solver, look) in enumerate(looks):
+            curve = numbers.where(solver=solver).select(("factor", "share solved")).rows
+            if curve:
+                how = line_arguments(look) | {"markevery": (number % 5, 9)}
+                axes.step(*zip(*curve, strict=True), where="post", **how)
+        plot.log("factor of the fastest solver's time", "share of problems solved", "x")
+        axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
+        axes.set_ylim(-0.02, 1.03)
+    return plot.svg
+
+
+def _ends(numbers: Table) -> Table:
+    """Where each curve starts and ends."""
+    curves: dict[tuple[str, ...], list[float]] = {}
+    for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
+        curves.setdefault(tuple(name), []).append(share)
+    ends = ("share as the fastest", "share solved at all")
+    return titled(("collection", "kind", "solver", *ends),
+                  tuple((*name, shares[0], shares[-1]) for name, shares in curves.items()), 3, timed=ends)  # fmt: skip
+
+
+_ROUNDING = 1e-12  # errors below are none
+_ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
+
+
+@recipe(
+    "rigid-convergence", "The rigid world converges to event-driven truth", "complementarity/convergence",
+    section="complementarity",
+    caption="The largest error of three steps near each mark, before impacts accumulate. Parallel to the dashed line: "
+    "errors in proportion to the step, which is all that a scheme can do that does not locate impacts. A scene "
+    "whose error is rounding alone has no curve.",
+)  # fmt: skip
+def rigid_convergence(numbers: Table) -> Drawn:
+    """Draw positions and velocities."""
+    looks = {scene: numbered(number) for number, scene in enumerate(dict.fromkeys(numbers.column("scene")))}
+    panels = tuple(Panel(_errors(numbers, looks, column), f"Errors of {label} against the step.", label)
+                   for label, column in _ERRORS.items())  # fmt: skip
+    return Drawn(panels, numbers, (*looks.items(), ("first order", STYLES["bound"])))
+
+
+def _errors(numbers: Table, looks: Mapping[str, LineStyle], column: str) -> str:
+    with Plot(f"rigid-convergence-{column.split()[-1]}", (4.4, 3.4)) as plot:
+        drawn: list[tuple[float, float]] = []
+        for scene, look in looks.items():
+            rows = numbers.where(scene=scene).select(("step", column)).rows
+            curve = sorted((step, error) for step, error in rows if error > _ROUNDING)
+            plot.curve(curve, look)
+            drawn += curve
+        if drawn:  # a line of slope one below all curves
+            lowest = min(error / step for step, error in drawn)
+            ends = (min(step for step, _ in drawn), max(step for step, _ in drawn))
+            plot.curve([(step, 0.5 * lowest * step) for step in ends], STYLES["bound"], marked=False)
+        plot.log("step [ms]", "error")
+        steps = sorted(set(numbers.column("step")))
+        plot.axes.set_xticks(steps, [f"{step:.2g}" for step in steps])
+    return plot.svg

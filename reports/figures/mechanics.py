@@ -1,0 +1,178 @@
+"""The mechanics against truths: other coordinates (C06), a tumbling body, and false collisions in a socket (C18)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from reports.figures.canvas import note
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
+from reports.figures.style import CYCLE, MUTED, STYLES, LineStyle, line_arguments
+from verification.finding import Table
+
+Rows = Sequence[Mapping[str, Any]]
+
+_LOOKS = {"absolute angles": CYCLE[0], "place of the hand": CYCLE[1]}
+_STRAIGHT = 1e-13  # [rad] where the straight arm itself is drawn, on an axis that has no zero
+_SMALLEST = 1e-18  # an error of zero is drawn here
+_SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditioned ones
+
+
+@recipe(
+    "coordinate-invariance", "The same impact in other coordinates", "mechanics/coordinate invariance",
+    section="mechanics",
+    caption="An arm is struck; the outcome in joint angles is compared with the one computed in other coordinates and "
+    "brought back. First panel: the elbow straightens from left to right. At the singular pose the place of the "
+    "hand is no coordinate any more: bound (dashed) and error climb on the way. Absolute angles pass through it "
+    "unharmed; their last mark is the straight arm itself. Second panel: every case, nearly dependent rows among "
+    "them; below the dashed line the bound C ε κ/σ_min is kept.",
+)  # fmt: skip
+def coordinate_invariance(numbers: Table) -> Drawn:
+    """Draw the way through the singular pose, and every case against its bound."""
+    rows = numbers.records()
+    told = [row for row in rows if row["bound"] < 1.0 and row["error"] is not None]
+    share = max(row["error"] / row["bound"] for row in told)
+    words = f"{len(told)} cases with a bound below 1; the largest error is {share:.1e} of its bound."
+    panels = (Panel(_through_the_pose(rows), words, "Towards the straight arm"),
+              Panel(_against_the_bound(rows), words, "Error against bound"))  # fmt: skip
+    angles, hand = _LOOKS.values()
+    legend = (("in absolute angles", angles), ("in the place of the hand", hand), ("bound", STYLES["bound"]))
+    return Drawn(panels, numbers, legend)
+
+
+def _through_the_pose(rows: Rows) -> str:
+    with Plot("coordinate-invariance-pose", (4.3, 3.3)) as plot:
+        axes = plot.axes
+        for name, look in _LOOKS.items():
+            mine = [row for row in rows if row["coordinates"] == name and row["contacts"] in _SHOWN]
+            elbows = sorted({row["elbow"] for row in mine}, reverse=True)
+            bounds = [max(row["bound"] for row in mine if row["elbow"] == elbow) for elbow in elbows]
+            plot.curve(zip([max(e, _STRAIGHT) for e in elbows], bounds, strict=True), _dashed(look, 1.3))
+            plot.marks([(max(row["elbow"], _STRAIGHT), max(row["error"], _SMALLEST)) for row in mine
+                        if row["error"] is not None], look, markersize=5)  # fmt: skip
+        axes.axhline(1.0, color=MUTED, linewidth=0.8)
+        axes.set(xscale="log", yscale="log")
+        axes.xaxis.set_inverted(True)
+        plot.log("angle of the elbow [rad], straight at the right end", "error of v⁺, kinetic metric")
+        note(axes, (1.0, 1.0), "no digit is right above", (0, 7), ha="left", color=MUTED, fontsize=8)
+    return plot.svg
+
+
+def _against_the_bound(rows: Rows) -> str:
+    with Plot("coordinate-invariance-bound", (4.3, 3.3)) as plot:
+        for name, look in _LOOKS.items():
+            plot.marks([(row["bound"], max(row["error"], _SMALLEST)) for row in rows
+                        if row["coordinates"] == name and row["error"] is not None], look, markersize=5)  # fmt: skip
+        low, high = 1e-15, max(row["bound"] for row in rows)
+        plot.curve([(low, low), (high, high)], STYLES["bound"], marked=False)
+        plot.axes.axvline(1.0, color=MUTED, linewidth=0.8)
+        plot.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
+        note(plot.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
+    return plot.svg
+
+
+def _dashed(look: LineStyle, width: float) -> LineStyle:
+    return LineStyle(look.color, "", STYLES["bound"].dash, width)
+
+
+_QUANTITIES = {
+    "energy drift": ("Kinetic energy", "energy drift (relative)"),
+    "momentum drift": ("Angular momentum", "momentum drift (relative)"),
+    "attitude error": ("Attitude", "attitude error [rad]"),
+}
+# (integrator, form) -> (name, look); in the other integrators both forms are the same
+_INTEGRATORS = {
+    ("semi_implicit_euler", "compiled step"): ("semi-implicit Euler", CYCLE[0]),
+    ("midpoint", "compiled step"): ("midpoint", CYCLE[1]),
+    ("runge_kutta_4", "compiled step"): ("Runge-Kutta 4, compiled step", replace(CYCLE[2], filled=False)),
+    ("runge_kutta_4", "Integrator.step"): ("Runge-Kutta 4, Integrator.step", CYCLE[3]),
+}
+
+
+@recipe(
+    "tumbling-drift", "A free body tumbles", "mechanics/tumbling", section="mechanics",
+    caption="A body turns over and over near its middle axis, with no force on it; its motion is known in closed form. "
+    "Each mark is a run of two seconds; the dashed lines have the slope that the integrator declares. Runge-Kutta 4 is "
+    "there twice: the compiled step adds up its stages in one displacement and declares order 2 on rotations for "
+    "that. Its energy needs no attitude, so that it falls as fast as in the other form (the marks coincide).",
+)  # fmt: skip
+def tumbling_drift(numbers: Table) -> Drawn:
+    """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
+    series = [(name, look, numbers.where(integrator=integrator, form=form, motion="turning over").records())
+              for (integrator, form), (name, look) in _INTEGRATORS.items()]  # fmt: skip
+    panels = tuple(_drift(series, column, *names) for column, names in _QUANTITIES.items())
+    legend = (*_INTEGRATORS.values(), ("declared slope", STYLES["bound"]))
+    return Drawn(panels, numbers, legend)
+
+
+def _drift(series: Sequence[tuple[str, LineStyle, Rows]], column: str, name: str, label: str) -> Panel:
+    with Plot(f"tumbling-drift-{name.split()[-1].lower()}") as plot:
+        for _, look, rows in series:
+            steps, values, order = ([row[key] for row in rows] for key in ("step", column, "declared order"))
+            size = 5 if look.filled else 9  # so that marks which coincide are both seen
+            plot.marks(zip(steps, values, strict=True), look, markersize=size)
+            plot.curve([(step, values[0] * (step / steps[0]) ** order[0]) for step in steps], _dashed(look, 1.2))
+        plot.log("step [s]", label)
+    ends = "; ".join(f"{who} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for who, _, rows in series)
+    return Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name)
+
+
+_SETTINGS = ("no filter", "coherence alone", "clustering alone", "both filters")
+_DAMPING = 40.0  # [N s/m] of the panels in time: the scene's own
+_DURATION = 2.0  # [s]
+
+
+@recipe(
+    "socket-collisions", "A ball rolls in a faceted socket", "mechanics/false collisions in time",
+    "mechanics/false collisions", section="mechanics",
+    caption="In the round socket that the facets stand for, the ball touches once and never collides again: every "
+    "further collision is false. Coherence keeps the contact of the next facet from being new; clustering alone leaves "
+    "one contact that jumps, new each time. Last panel: at low damping the ball bounces off the edges, and what comes "
+    "back is new to both filters.",
+)  # fmt: skip
+def socket_collisions(times: Table, counts: Table) -> Drawn:
+    """Draw counts and losses in time, and the counts over damping."""
+    found = ", ".join(f"{row['filters']} {row['false collisions']}"
+                      for row in counts.where(damping=_DAMPING).records())  # fmt: skip
+    words = f"False collisions in two seconds at {_DAMPING:g} N s/m: {found}."
+    panels = (
+        Panel(_in_time(times, "false collisions so far", "false collisions so far"), words,
+              f"False collisions, {_DAMPING:g} N s/m"),
+        Panel(_in_time(times, "lost so far, of the fall", "lost in them, share of the fall"),
+              "Energy lost in false collisions, cumulative.", "Energy that they take"),
+        Panel(_bars(counts), words, "By damping of the contact"),
+    )  # fmt: skip
+    return Drawn(panels, counts, tuple(zip(_SETTINGS, CYCLE, strict=False)))
+
+
+def _in_time(numbers: Table, column: str, label: str) -> str:
+    with Plot(f"socket-collisions-{numbers.keys.index(column)}") as plot:
+        axes, here = plot.axes, numbers.where(damping=_DAMPING)
+        for number, setting in enumerate(_SETTINGS):
+            mine = here.where(filters=setting)
+            time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
+            look = line_arguments(CYCLE[number], marked=bool(mine.rows))
+            axes.step(time, [*value, value[-1]], where="post", **look | {"markevery": 4, "clip_on": False})
+        axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
+        axes.set_ylim(bottom=0.0)
+        none = " and ".join(setting for setting in _SETTINGS if setting not in here.column("filters"))
+        note(axes, (_DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
+    return plot.svg
+
+
+def _bars(numbers: Table) -> str:
+    dampings = sorted(set(numbers.column("damping")))
+    with Plot("socket-collisions-damping") as plot:
+        axes = plot.axes
+        for number, setting in enumerate(_SETTINGS):
+            heights = [numbers.where(filters=setting, damping=b).column("false collisions")[0] for b in dampings]
+            places = [k + 0.2 * (number - 1.5) for k in range(len(dampings))]
+            axes.bar(places, heights, width=0.17, color=CYCLE[number].color)
+            for place, height in zip(places, heights, strict=True):
+                note(axes, (place, height), str(height), (0, 6), fontsize=8)
+        axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
+        axes.grid(visible=False, axis="x")
+        axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
+    return plot.svg

@@ -1,0 +1,97 @@
+"""One panel with axes: what every curve, cloud of marks and map of the report is drawn with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from types import TracebackType
+from typing import Any
+
+from reports.figures.numbers import power_of_ten
+from reports.figures.style import PANEL, LineStyle, line_arguments, styled
+from reports.figures.svg import to_svg, traced_svg
+
+
+class Plot:
+    """Axes under the report's parameters, and their SVG once the `with` block has been left.
+
+    Parameters
+    ----------
+    key : of the panel, unique in the page; makes the identifiers of its SVG
+    size : width and height [inches]
+    kind : TIME or PATH where the page's script reads values off the curves
+    frame : place of the axes in the drawing (left, bottom, width, height); by default the layout decides
+    bare : without axes: a canvas for shapes, by default as large as the drawing
+
+    Attributes
+    ----------
+    axes, drawing : matplotlib's
+    svg : the panel
+    """
+
+    def __init__(self, key: str, size: tuple[float, float] = PANEL, *, kind: str = "", bare: bool = False,
+                 frame: tuple[float, float, float, float] | None = None) -> None:  # fmt: skip
+        self.key, self.size, self.kind, self.bare = key, size, kind, bare
+        self.frame = (0.0, 0.0, 1.0, 1.0) if bare and frame is None else frame
+        self.svg = ""
+        self.drawing: Any
+        self.axes: Any
+
+    def __enter__(self) -> Plot:
+        self._style = styled()
+        new_figure = self._style.__enter__()
+        if self.frame is None:
+            self.drawing = new_figure(figsize=self.size, layout="constrained")
+            self.axes = self.drawing.add_subplot()
+        else:
+            self.drawing = new_figure(figsize=self.size)
+            self.axes = self.drawing.add_axes(self.frame)
+        if self.bare:
+            self.axes.set_axis_off()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:  # fmt: skip
+        if error is None:
+            self.svg = traced_svg(self.drawing, self.key, self.kind) if self.kind else to_svg(self.drawing, self.key)
+        self._style.__exit__(kind, error, trace)
+
+    def curve(self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any) -> None:
+        """Draw a curve through points (x, y); nothing without points."""
+        points = list(points)
+        if points:
+            self.axes.plot(*zip(*points, strict=True), **line_arguments(look, marked=marked) | how)
+
+    def marks(self, points: Iterable[tuple[Any, Any]], look: LineStyle, **how: Any) -> None:
+        """Draw the marks of a style without a line."""
+        self.curve(points, look, **{"linestyle": "none", **how})
+
+    def lost(self, places: Sequence[float], look: LineStyle, height: float) -> None:
+        """Draw crosses at the upper rim: what failed, at its x."""
+        self.axes.plot(places, [height] * len(places), "x", color=look.color, markersize=5,
+                       transform=self.axes.get_xaxis_transform())  # fmt: skip
+
+    def log(self, x: str, y: str, scales: str = "xy", **limits: Any) -> None:
+        """Name the axes and make those in `scales` logarithmic; see `plain_powers`."""
+        self.axes.set(**{f"{axis}scale": "log" for axis in scales}, xlabel=x, ylabel=y, **limits)
+        plain_powers(self.axes)
+
+    def without_lines(self) -> None:
+        """Leave out the grid and the frame: a table of marks."""
+        self.axes.grid(visible=False)
+        for side in self.axes.spines.values():
+            side.set_visible(False)
+
+    def lines_of(self, names: Sequence[str]) -> None:
+        """Make a row for each name, from the top."""
+        self.axes.set_yticks(range(len(names)), names)
+        self.axes.set_ylim(len(names) - 0.5, -0.5)
+
+
+def plain_powers(axes: Any) -> None:
+    """Label logarithmic axes with powers of ten as plain text (mathematical text is no text in an SVG)."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(numticks=7))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+        axis.set_minor_locator(NullLocator())

@@ -1,0 +1,163 @@
+"""Scenes in the plane: Figure 1, the forces on a contact group; Figure 4, the peg; and others at their start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from iapb.run import Run
+from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, hand, is_turned, note, scale_bar
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.geometry import body_outlines, body_placements, bounds
+from reports.figures.numbers import MINUS
+from reports.figures.style import BLUE, INK, MUTED, PANEL
+from verification.finding import Table, titled
+
+_LONGEST = 0.22  # arrow length, as a share of the picture
+
+
+@recipe(
+    "fig01", "What acts on a contact group", "group/IAPB", number="Figure 1", section="idea",
+    caption="An arm pushes a block against a wall: one contact group, two instants of one run. When a contact is new, "
+    "all approaching contacts of the group share one collision (blue: impulses). While contacts last, springs and "
+    "dampers (blue: forces) pass the hand's push (red) on. The longest blue arrow of a picture sets its scale.",
+)  # fmt: skip
+def contact_forces(run: Run) -> Drawn:
+    """Draw the hardest collision and the last resting instant of the run."""
+    instants = (("(a) colliding: impulses", hardest_collision(run), run.contacts.impulse, "N s"),
+                ("(b) resting: forces", last_contact(run), run.contacts.normal_force, "N"))
+    shown = [(title, step, values, unit) for title, step, values, unit in instants if step is not None]
+    panels = tuple(Panel(_group(run, step, values, f"fig01-{number}"), _words(run, step, values, unit), title)
+                   for number, (title, step, values, unit) in enumerate(shown))
+    rows = tuple((title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
+                  unit) for title, step, values, unit in shown for k in contacts_of(run, step))
+    columns = ("instant", "t [s]", "contact x [mm]", "y [mm]", "along the normal", "unit")
+    return Drawn(panels, titled(columns, rows))
+
+
+def contacts_of(run: Run, step: int) -> range:
+    """Return the rows of the contact table that belong to a step."""
+    return range(int(run.contacts.offsets[step]), int(run.contacts.offsets[step + 1]))
+
+
+def hardest_collision(run: Run) -> int | None:
+    """Return the step with the largest contact impulse, if any."""
+    if not len(run.contacts.impulse) or not run.contacts.impulse.any():
+        return None
+    row = int(np.argmax(np.abs(run.contacts.impulse)))
+    return int(np.searchsorted(run.contacts.offsets, row, side="right") - 1)
+
+
+def last_contact(run: Run) -> int | None:
+    """Return the last step in which something touches, if any."""
+    steps = np.flatnonzero(np.diff(run.contacts.offsets))
+    return int(steps[-1]) if len(steps) else None
+
+
+def _group(run: Run, step: int, values: np.ndarray, key: str) -> str:
+    scene, q = run.scene_resolved, run.q[step]
+    low, high = bounds([outline for _, outline in body_outlines(scene, q)], 0.12)
+    longest = _LONGEST * max(high - low)
+    with Canvas(key, low, high, turned=is_turned(scene)) as canvas:
+        draw_walls(canvas.axes, scene, reach=1.0)
+        draw_bodies(canvas.axes, scene, q)
+        _contact_arrows(canvas.axes, run, step, values, longest)
+        hand(canvas.axes, scene, body_placements(scene, q)[scene["hand"]["body"]], 0.8 * longest, (-2, -19))
+    return canvas.svg
+
+
+def _contact_arrows(axes: Any, run: Run, step: int, values: np.ndarray, longest: float) -> None:
+    rows = contacts_of(run, step)
+    largest = max((abs(values[k]) for k in rows), default=0.0)
+    for k in rows:
+        point = run.contacts.point[k, :2]
+        axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
+        if values[k]:
+            arrow(axes, point, longest * values[k] / largest * run.contacts.normal[k, :2], color=BLUE)
+
+
+def _words(run: Run, step: int, values: np.ndarray, unit: str) -> str:
+    parts = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts_of(run, step))
+    return f"The group at t = {run.time[step]:.3f} s with its contacts; along their normals: {parts}."
+
+
+_ARROW = 0.02  # [m] on paper per newton
+_AXIS = 0.006  # [m], length of the drawn axes
+_WALL = 0.008  # [m], thickness of the walls shown
+
+
+@recipe(
+    "fig04", "The peg before the corner", "scene/peg_corner", number="Figure 4", section="idea",
+    caption="Drawn from the scene file, to scale. The paper's frame has x to the left and y down. It gives size, mass "
+    "and force; where the peg starts, and how it is tilted, is ours and is varied in the claims.",
+)  # fmt: skip
+def peg_corner(scene: Mapping[str, Any]) -> Drawn:
+    """Draw the peg at its start, from the resolved scene."""
+    low, high = bounds([*(corners for _, corners in body_outlines(scene)), np.zeros((1, 2))], 0.12)
+    low, high = np.minimum(low, -_WALL), np.maximum(high, _WALL)  # x to the left, y down: show some of both walls
+    with Canvas("fig04", low, high, turned=True) as canvas:
+        axes = canvas.axes
+        draw_walls(axes, scene, reach=1.0)
+        draw_bodies(axes, scene)
+        center, force = (np.asarray(each[:2]) for each in (scene["bodies"][0]["position"], scene["hand"]["force"]))
+        arrow(axes, center, _ARROW * force)
+        note(axes, center + _ARROW * force, "F hand", (6, -8), ha="left")
+        _frame(axes)
+        scale_bar(axes, (high[0] - 0.002, high[1] - 0.003), 0.01, "10 mm", turned=True)
+    panel = Panel(canvas.svg, "A small tilted rectangle above a floor and left of a wall, with the hand's force "
+                  "pointing to the lower right.")  # fmt: skip
+    return Drawn((panel,), _numbers(scene))
+
+
+def _frame(axes: Any) -> None:
+    """Draw the axes of the world at the corner."""
+    for vector, name, offset in (((_AXIS, 0), "x", (0, 7)), ((0, _AXIS), "y", (7, 2))):
+        arrow(axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
+        note(axes, vector, name, offset, color=MUTED)
+
+
+def _numbers(scene: Mapping[str, Any]) -> Table:
+    body, contact = scene["bodies"][0], scene["contact"]
+    x, y, angle = body["position"]
+    rows = (
+        ("peg size [mm]", _list(1e3 * side for side in body["shapes"][0]["size"]), "paper"),
+        ("peg mass [kg], inertia [kg m²]", _list((body["mass"], body["inertia"])), "paper"),
+        ("peg starts at x, y [mm], θ [rad]", _list((1e3 * x, 1e3 * y, angle)), "ours"),
+        ("wall stiffness [N/m], damping [N s/m]", _list((contact["stiffness"], contact["damping"])), "paper"),
+        ("restitution", _list([contact["restitution"]]), "paper"),
+        ("friction, its velocity threshold [m/s]", _list((contact["friction"], contact["friction_velocity"])), "ours"),
+        ("hand force [N, N, N m]", _list(scene["hand"]["force"]), "paper"),
+        ("rate [Hz]", _list([scene["rate"]]), "paper"),
+    )
+    return titled(("quantity", "value", "given by"), rows)
+
+
+def _list(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values).replace("-", MINUS)
+
+
+@recipe(
+    "scenes", "The other scenes", "scene/peg_hole", "scene/wall_1d", section="idea",
+    caption="The tight hole, where the peg meets both sides and the end at once: six collisions, three of them "
+    "redundant. And a mass before a wall, the one-dimensional case on which the stability of haptic walls is usually "
+    "studied.",
+)  # fmt: skip
+def gallery(*scenes: Mapping[str, Any]) -> Drawn:
+    """Draw every scene at its start."""
+    return Drawn(tuple(_start(scene) for scene in scenes))
+
+
+def _start(scene: Mapping[str, Any]) -> Panel:
+    """Draw one scene at its start: walls, bodies and the hand's force."""
+    low, high = bounds([corners for _, corners in body_outlines(scene)], 0.25)
+    reach = max(high - low)
+    with Canvas(f"scenes-{scene['name']}", low - 0.35 * reach, high + 0.35 * reach, PANEL,
+                turned=is_turned(scene)) as canvas:  # fmt: skip
+        draw_walls(canvas.axes, scene, reach=20 * reach)
+        draw_bodies(canvas.axes, scene)
+        if scene["hand"]:
+            hand(canvas.axes, scene, body_placements(scene)[scene["hand"]["body"]], 0.28 * reach, (0, 9))
+    words = f"{scene['title']}: {len(scene['bodies'])} moving bodies, {len(scene['walls'])} walls, at the start."
+    return Panel(canvas.svg, words, scene["title"])

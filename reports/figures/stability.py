@@ -1,0 +1,85 @@
+"""Sampled walls: which ones a hand can lean on, and how hard they feel, by penalties and by impulses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
+from reports.figures.style import BLUE, INK, MUTED, PAPER, STYLES, VERMILION, LineStyle
+from verification.finding import Table
+
+_LEGEND = (
+    ("both laws", LineStyle(MUTED, "o", (), 0.0)),
+    ("only impulses", LineStyle(BLUE, "o", (), 0.0, filled=False)),
+    ("only penalties", LineStyle(VERMILION, "s", (), 0.0)),
+    ("b = KT/2 + B", LineStyle(INK, "", (4, 2), 1.2)),
+)
+_LOOP = ("rate", "sensors", "device damping")
+_SETTLES = "+"
+
+
+@recipe(
+    "stability-map", "Walls that come to rest", "stability/maps", "stability/dampings", section="stability",
+    caption="Each place is a wall, stiffer to the right, more damped upwards; the lowest row has no damping. Look for "
+    "the blue rings: walls that only come to rest with impulses, mostly stiff ones with little damping. No mark: "
+    "neither law holds it. Walls under the dashed line are passive for every hand; a device without damping has none.",
+)  # fmt: skip
+def stability_map(table: Table, dampings: Table) -> Drawn:
+    """One panel per loop."""
+    damping = np.array(dampings.column("damping"))
+    panels = tuple(_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
+                   for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows)))  # fmt: skip
+    return Drawn(panels, table, _LEGEND)
+
+
+def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray) -> Panel:
+    rate, sensors, b = loop
+    stiffness, bound = np.array(walls.column("stiffness")), np.array(walls.column("passive up to"))
+    theirs, ours = (np.array([[mark == _SETTLES for mark in marks] for marks in walls.column(law)])
+                    for law in ("penalties", "impulses"))  # fmt: skip
+    shown = np.where(damping > 0.0, damping, damping[damping > 0.0].min() / 2.0)  # the row without damping
+    K, B = np.meshgrid(stiffness, shown, indexing="ij")
+    with Plot(f"stability-map-{number}", (3.1, 2.5)) as plot:
+        for where, look in ((theirs & ours, {"marker": ".", "color": MUTED, "s": 9}),
+                            (ours & ~theirs, {"marker": "o", "facecolor": PAPER, "edgecolor": BLUE, "s": 17}),
+                            (theirs & ~ours, {"marker": "s", "color": VERMILION, "s": 11})):  # fmt: skip
+            plot.axes.scatter(K[where], B[where], zorder=3, **look)
+        if (bound > 0.0).any():
+            fine = np.geomspace(stiffness[0], 2.0 * b * rate * 0.999, 60)
+            plot.axes.plot(fine, np.maximum(b - 0.5 * fine / rate, shown[0] * 0.7), color=INK, dashes=(4, 2),
+                           linewidth=1.2)  # fmt: skip
+        plot.log("stiffness [N/m]", "damping [N s/m]", xlim=(stiffness[0] / 1.3, stiffness[-1] * 1.3),
+                 ylim=(shown[0] * 0.7, shown[-1] * 1.4))  # fmt: skip
+    alt = f"Of {ours.size} walls {int(theirs.sum())} come to rest with penalties, {int(ours.sum())} with impulses."
+    return Panel(plot.svg, alt, f"{rate:.0f} Hz, {sensors} sensors, b = {b:g} N s/m")
+
+
+_LAWS = {"penalty": STYLES["PB"], "impulses": STYLES["IAPB"]}
+_FELT = ("rate-hardness", "settles after", "penetration")
+
+
+@recipe(
+    "hardness", "How hard a wall feels", "stability/hardness", section="stability",
+    caption="A device without damping at 512 Hz with ideal sensors, walls with the paper's damping of 50 N s/m. The "
+    "first rise of the force is what feels hard: with impulses it does not depend on the wall's stiffness. Where a "
+    "curve ends, the contact never comes to rest.",
+)  # fmt: skip
+def hardness(table: Table) -> Drawn:
+    """Three panels over the stiffness."""
+    labels = {column.key: column.title for column in table.columns}
+    here = table.where(**dict(zip(_LOOP, (512.0, "ideal", 0.0), strict=True)))
+    panels = tuple(Panel(_felt(here, key, labels[key]), f"{labels[key]} against stiffness, penalties and impulses.",
+                         labels[key]) for key in _FELT)  # fmt: skip
+    return Drawn(panels, table, tuple(_LAWS.items()))
+
+
+def _felt(walls: Table, key: str, label: str) -> str:
+    with Plot(f"hardness-{_FELT.index(key) + 5}", (3.3, 2.6)) as plot:
+        for law, look in _LAWS.items():
+            rows = walls.where(law=law).select(("stiffness", key)).rows
+            plot.curve([(stiffness, value) for stiffness, value in rows if value is not None], look)
+        plot.log("stiffness [N/m]", label)
+    return plot.svg

@@ -1,0 +1,141 @@
+"""Figures 2 and 3: the two-link arm, and its kinetic energy before and after one frictionless collision, over e.
+
+The arm is straight, q = (π/2, 0), q̇₀ = (1, 1) rad/s, and is struck perpendicular to the second link at A (0.7 m) or
+B (0.5 m). Which mass distribution the authors used is not printed, so both are drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb import resolve_impact
+from reports.figures.canvas import Canvas, arrow, note
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.geometry import Placement, body_placements
+from reports.figures.plot import Plot
+from reports.figures.style import BLUE, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
+from verification.finding import titled
+
+LENGTH, MASS = 1.0, 1.0  # of both links [m], [kg]
+CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]
+VELOCITY = np.array([1.0, 1.0])  # [rad/s]
+READINGS = ("uniform rods", "point masses")
+RESTITUTIONS = np.linspace(0.0, 1.0, 41)
+
+Floats = NDArray[np.float64]
+
+
+def mass_matrix(reading: str) -> Floats:
+    """Return M of the straight arm (q2 = 0) [kg m²]: slender uniform rods, or all mass at the far ends."""
+    centre, inertia = (LENGTH / 2, MASS * LENGTH**2 / 12) if reading == "uniform rods" else (LENGTH, 0.0)
+    about_joint = MASS * centre**2 + inertia
+    coupling = MASS * LENGTH * centre
+    first = about_joint + (about_joint + MASS * LENGTH**2 + 2 * coupling)  # its own link, and the other carried along
+    return np.array([[first, about_joint + coupling], [about_joint + coupling, about_joint]])
+
+
+def contact_row(distance: float) -> Floats:
+    """Return nᵀJ at `distance` along the second link, n against the motion of the straight arm."""
+    return -np.array([[LENGTH + distance, distance]])
+
+
+def energy_after(reading: str, distance: float, restitution: float) -> float:
+    """Return KE after the collision [J]."""
+    mass = mass_matrix(reading)
+    impact = resolve_impact(mass, contact_row(distance), VELOCITY, restitution)
+    return float(0.5 * VELOCITY @ mass @ VELOCITY + impact.energy_change)
+
+
+def arm_energies() -> dict[str, Floats]:
+    """Return the table behind the figure: ``restitution`` and, by reading and contact, KE and KE₀ [J]."""
+    table: dict[str, Floats] = {"restitution": RESTITUTIONS}
+    for reading in READINGS:
+        mass = mass_matrix(reading)
+        table[f"{reading}, KE0"] = np.full(len(RESTITUTIONS), 0.5 * VELOCITY @ mass @ VELOCITY)
+        for name, distance in CONTACTS.items():
+            table[f"{reading}, {name}"] = np.array([energy_after(reading, distance, e) for e in RESTITUTIONS])
+    return table
+
+
+@recipe(
+    "fig02", "The two-link arm", "scene/two_link_arm_a", "scene/two_link_arm_b", number="Figure 2", section="idea",
+    caption="Drawn from the scene files: two uniform links of 1 m and 1 kg, straight, both joints turning at 1 rad/s. "
+    "The blow comes at A or at B, perpendicular to the second link and without friction.",
+)  # fmt: skip
+def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
+    """Draw the arm from the resolved scene; the two differ in where it is struck."""
+    poses = list(body_placements(scene).values())[:2]
+    ends = [frame.of((LENGTH, 0.0)) for frame in poses]
+    pivot = poses[0].origin[:2]
+    points = np.vstack([pivot, *ends])
+    low, high = points.min(axis=0) - (1.25, 0.22), points.max(axis=0) + (1.25, 0.12)
+    with Canvas("fig02", low, high, (3.6, 3.3)) as canvas:
+        _ground(canvas.axes, pivot)
+        for number, (frame, end) in enumerate(zip(poses, ends, strict=True), start=1):
+            _link(canvas.axes, frame, end, number)
+        for name, distance in CONTACTS.items():
+            _blow(canvas.axes, poses[1], name, distance)
+    words = ", ".join(f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items())
+    return Drawn((Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}."),))
+
+
+def _ground(axes: Any, point: Any) -> None:
+    axes.fill(point[0] + np.array([-0.14, 0.14, 0.14, -0.14]), point[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
+              facecolor=MUTED, edgecolor="none", alpha=0.6)
+    axes.plot([point[0], point[0]], [point[1] - 0.08, point[1]], color=INK, linewidth=2)
+
+
+def _link(axes: Any, frame: Placement, end: Any, number: int) -> None:
+    """Draw a link as a rounded bar with its joint, its name and its joint velocity."""
+    start = frame.origin[:2]
+    line = np.vstack([start, end])
+    axes.plot(*line.T, color=LINK, linewidth=10, solid_capstyle="round", zorder=2)
+    axes.plot(*line.T, color=PEG, linewidth=8, solid_capstyle="round", zorder=2)
+    axes.plot(*start, "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
+    note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
+    note(axes, start, f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
+
+
+def _blow(axes: Any, frame: Placement, name: str, distance: float) -> None:
+    """Draw the blow at `distance` along the link, against the motion."""
+    color = BLUE if name == "A" else VERMILION
+    point, normal = frame.of((distance, 0.0)), -frame.rotation[:2, 1]
+    arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
+    note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
+
+
+@recipe(
+    "fig03", "What one collision takes from the two-link arm", "arm_energies", number="Figure 3",
+    caption="The same blow takes part of the energy at A and, for uniform rods, all of it at B: there the contact "
+    "point is the centre of percussion of the motion. Towards e = 1 every curve returns to its KE₀. The paper "
+    "prints neither the mass distribution nor values; its axis (0 to 6) leaves both readings open.",
+)  # fmt: skip
+def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
+    """Draw the figure from the table of `arm_energies`."""
+    shown = [int(np.argmin(abs(energies["restitution"] - e))) for e in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    series = [f"{reading}, {contact}" for reading in READINGS for contact in CONTACTS]
+    rows = tuple((float(energies["restitution"][k]), *(float(energies[name][k]) for name in series)) for k in shown)
+    note = "KE₀ is 7/3 J for uniform rods and 5 J for point masses at the far ends of the links."
+    numbers = titled(("e", *(f"{name} [J]" for name in series)), rows, digits=6, note=note)
+    legend = (*((reading, reading) for reading in READINGS), ("before the collision, KE₀", "KE₀"))
+    return Drawn(tuple(_collision(energies, contact) for contact in CONTACTS), numbers, legend)
+
+
+def _collision(energies: Mapping[str, Floats], contact: str) -> Panel:
+    e = energies["restitution"]
+    with Plot(f"fig03-{contact}") as plot:
+        for reading, kinetic in zip(READINGS, ("7/3", "5"), strict=True):
+            before = energies[f"{reading}, KE0"]
+            plot.axes.plot(e, before, **line_arguments(STYLES["KE₀"]))
+            plot.axes.plot(e, energies[f"{reading}, {contact}"], **line_arguments(STYLES[reading]), markevery=5)
+            plot.axes.annotate(f"KE₀ = {kinetic} J", (0.0, before[0]), xytext=(2, 4), textcoords="offset points",
+                               fontsize=8.5)  # fmt: skip
+        plot.axes.set(xlim=(0, 1), ylim=(0, 6), xlabel="coefficient of restitution e", ylabel="KE [J]")
+    rods, masses = (energies[f"{reading}, {contact}"][0] for reading in READINGS)
+    alt = (f"Kinetic energy after a collision at {contact} over the coefficient of restitution. At e = 0 uniform rods "
+           f"keep {rods:.4f} J of 2.3333 J, point masses {masses:.4f} J of 5 J; at e = 1 all of it is kept.")
+    return Panel(plot.svg, alt, f"({'a' if contact == 'A' else 'b'}) Collision at {contact}, {CONTACTS[contact]} m")
