@@ -1,0 +1,128 @@
+"""Kernels that kernels call leave bitcode only, and the caller has all that it needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+import pytest
+from numba.core import config
+
+from iapb.inlining import compile_as_whole
+
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+
+
+# as the engine's, but not cached: from the cache nothing would be compiled
+kernel = compile_as_whole
+
+
+@kernel
+def _square(x: float) -> float:
+    return x * x
+
+
+@kernel
+def _never_squared(x: float) -> float:
+    if len((x, x)) > 2:  # the optimiser sees that this is never so, the lowering does not
+        return _square(x)
+    return x
+
+
+@kernel
+def _squared_if(wanted: bool, x: float) -> float:
+    return _square(x) if wanted else x
+
+
+@kernel
+def _entry(values: Any, k: int) -> Any:
+    return values[k]
+
+
+@kernel
+def _sum(values: Any) -> Any:
+    total = _never_squared(0.0) + _squared_if(False, 0.0)
+    for k in range(values.shape[0]):
+        total += _squared_if(True, _entry(values, k))
+    return total - _entry(values, 0) * _entry(values, 0)
+
+
+def test_the_bitcode_is_compiled_with_the_options_of_the_kernel() -> None:
+    """Asked of the options: once numba has refused to allocate, it refuses everywhere in the process."""
+    compiled = compile_as_whole(_square.py_func, _nrt=False)
+    assert compiled.targetoptions["_nrt"] is False
+    assert compiled.get_overload.__self__.targetoptions["_nrt"] is False
+
+
+def bitcode_versions(compiled: Any) -> int:
+    return len(compiled.get_overload.__self__.overloads)
+
+
+def test_the_caller_has_all_that_it_calls_and_only_it_becomes_machine_code() -> None:
+    assert _sum(np.array([1.0, 2.0, 3.0])) == 4.0 + 9.0
+    assert len(_sum.overloads) == 1
+    assert not _square.overloads and not _squared_if.overloads and not _entry.overloads
+
+
+def test_a_constant_argument_makes_no_version_of_its_own() -> None:
+    _sum(np.ones(2))
+    assert bitcode_versions(_entry) == 1
+    assert bitcode_versions(_squared_if) == 1
+
+
+def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loader would take it for its own of that name, though LLVM may have changed how it is called."""
+    monkeypatch.setattr("iapb.inlining._INLINE_UP_TO", -10_000)
+    caller = compile_as_whole(_sum.py_func)
+    assert caller(np.array([1.0, 2.0])) == 4.0
+    (version,) = caller.overloads.values()
+    parts = [part for part in version.library._final_module.functions if not part.is_declaration]
+    kept = [part for part in parts if "_sum" not in part.name]
+    assert kept and all(part.linkage == llvm.Linkage.private for part in kept)
+
+
+def test_python_can_call_the_inner_kernel_too() -> None:
+    assert _entry(np.array([3, 4]), 1) == 4
+    assert len(_entry.overloads) == 1
+
+
+def _has(owner: Any, *names: str) -> list[str]:
+    return [f"{getattr(owner, '__name__', owner)}.{name}" for name in names if not hasattr(owner, name)]
+
+
+def test_what_is_used_of_numbas_internals_is_still_there() -> None:
+    """A canary: after an update of numba it names what is gone, before kernels fail in ways that are hard to read."""
+    from numba.core import cgutils, codegen, compiler, imputils, typed_passes
+    from numba.core.dispatcher import Dispatcher
+
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    dispatcher = kernel(lambda x: x)
+    gone = [
+        *_has(codegen.JITCodeLibrary, "_optimize_functions", "_optimize_final_module", "finalize",
+              "enable_object_caching"),
+        *_has(codegen.CPUCodegen, "_create_empty_module"),
+        *_has(typed_passes.NativeLowering, "run_pass"),
+        *_has(compiler.DefaultPassBuilder, "define_nopython_pipeline"),
+        *_has(Dispatcher, "get_call_template", "get_overload", "compile", "enable_caching", "add_overload"),
+        *_has(dispatcher, "overloads", "_cache"),
+        *_has(options, "loop_vectorization", "inlining_threshold"),
+        *_has(llvm, "create_pass_builder", "Linkage"),
+        *_has(cgutils, "is_not_null"),
+        *_has(imputils, "impl_ret_borrowed"),
+    ]
+    assert not gone, f"numba {numba.__version__} lacks {', '.join(gone)}: see iapb/compiled.py and iapb/inlining.py"
+    library = dispatcher.targetctx.codegen().create_library("canary")
+    assert not _has(library, "_codegen", "_final_module", "_linking_libraries", "_finalized")
+    dispatcher.enable_caching()
+    assert not _has(dispatcher._cache._cache_file, "_source_stamp")
+
+
+def test_an_array_is_handed_over_as_numba_lays_it_out() -> None:
+    """A block writes arrays as words: meminfo, parent, item count, item size, address, shape, strides."""
+    from numba.core import types
+    from numba.core.datamodel import default_manager
+
+    model = default_manager.lookup(types.Array(types.float64, 2, "C"))
+    assert list(model._fields) == ["meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides"]
