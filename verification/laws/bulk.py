@@ -9,13 +9,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
+from verification.impacts import ImpactCase
+from verification.laws.impact_laws import restitution_residual
 
 Floats = NDArray[Any]
 
@@ -116,17 +118,12 @@ class BulkRow:
     worst_residual: float
 
 
-@dataclass(frozen=True)
-class _Batch:
-    """Impacts of one d: M (n, d, d), v (n, d), and per impact J, e, families."""
+class _Batch(NamedTuple):
+    """Impacts of one d, and per impact the indices of its families."""
 
-    masses: Floats
-    velocities: Floats
-    jacobians: list[Floats]
-    restitutions: Floats
+    cases: list[ImpactCase]
     velocity_family: Floats
     row_family: Floats
-    lower: Floats
 
 
 def bulk_impacts(
@@ -170,41 +167,26 @@ def _resolve(batch: _Batch, method: str, clamp: bool | None) -> tuple[Floats, Fl
     """v⁺ (n, d) and rank (n,)."""
     from iapb import resolve_impact
 
-    v_plus, rank = np.empty_like(batch.velocities), np.empty(len(batch.velocities))
-    for k, (mass, rows, v, e) in enumerate(
-        zip(batch.masses, batch.jacobians, batch.velocities, batch.restitutions, strict=True)
-    ):
-        impact = resolve_impact(mass, rows, v, float(e), method=method, clamp=clamp)
-        v_plus[k], rank[k] = impact.velocity, impact.rank
-    return v_plus, rank
+    found = [resolve_impact(*case.arrays, case.restitution, method=method, clamp=clamp) for case in batch.cases]
+    return np.array([impact.velocity for impact in found]), np.array([float(impact.rank) for impact in found])
 
 
 def _measure(batch: _Batch, v_plus: Floats, rank: Floats) -> dict[str, Floats]:
-    n, d = batch.velocities.shape
-    gain, error = bulk_energy_gain(batch.masses, batch.velocities, v_plus)
-    eigenvalues = np.linalg.eigvalsh(batch.masses)
+    masses = np.array([case.mass_matrix for case in batch.cases])
+    gain, error = bulk_energy_gain(masses, np.array([case.velocity for case in batch.cases]), v_plus)
+    eigenvalues = np.linalg.eigvalsh(masses)
     return {
-        "coordinates": np.full(n, d),
-        "contacts": np.array([len(J) for J in batch.jacobians]),
+        "coordinates": np.full(len(masses), masses.shape[1]),
+        "contacts": np.array([case.contacts for case in batch.cases]),
         "rank": rank,
         "condition": eigenvalues[:, -1] / eigenvalues[:, 0],
-        "restitution": batch.restitutions,
+        "restitution": np.array([case.restitution for case in batch.cases]),
         "velocity_family": batch.velocity_family,
         "row_family": batch.row_family,
         "gain": gain,
         "gain_error": error,
-        "residual": np.array([_residual(batch, k, v_plus[k]) for k in range(n)]),
+        "residual": np.array([restitution_residual(*pair) for pair in zip(batch.cases, v_plus, strict=True)]),
     }
-
-
-def _residual(batch: _Batch, k: int, v_plus: Floats) -> float:
-    J, v = batch.jacobians[k], batch.velocities[k]
-    if not len(J):
-        return 0.0
-    length = np.linalg.norm(np.linalg.solve(batch.lower[k], J.T), axis=0)
-    scale = length * np.linalg.norm(batch.lower[k].T @ v)
-    unmet = np.abs(J @ v_plus + batch.restitutions[k] * (J @ v))
-    return float(np.max(np.divide(unmet, scale, out=np.zeros(len(J)), where=scale > 0.0)))
 
 
 def _batches(rng: np.random.Generator, impacts: int, largest_condition: float) -> Iterator[_Batch]:
@@ -225,7 +207,8 @@ def _draw(rng: np.random.Generator, n: int, d: int, largest_condition: float) ->
     jacobians = [_rows(rng, d) @ (lower[k].T if row_family[k] else np.eye(d)) for k in range(n)]
     e = np.where(rng.random(n) < 0.3, rng.choice([-1.0, 0.0, 1.0], size=n), rng.uniform(-1.0, 1.0, size=n))
     velocities = np.where(velocity_family[:, None] == 1, whitened, v)
-    return _Batch(masses, velocities, jacobians, e, velocity_family, row_family, lower)
+    cases = [ImpactCase(*impact) for impact in zip(masses, jacobians, velocities, e.tolist(), strict=True)]
+    return _Batch(cases, velocity_family, row_family)
 
 
 def _masses(rng: np.random.Generator, n: int, d: int, largest_condition: float) -> Floats:
