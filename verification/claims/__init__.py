@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from verification.claims.claim import Claim
-from verification.claims.study import Study, check_claims, conditions
+from verification.claims.study import Study, check_claims
 from verification.finding import VERDICTS, Column, Finding, Table
 
 _FILES = (
@@ -39,4 +39,4 @@ CLAIMS: dict[str, Claim] = {
     claim.id: claim for claim in (import_module(f"{__name__}.{file}").CLAIM for file in _FILES)
 }
 
-__all__ = ["CLAIMS", "VERDICTS", "Claim", "Column", "Finding", "Study", "Table", "check_claims", "conditions"]
+__all__ = ["CLAIMS", "VERDICTS", "Claim", "Column", "Finding", "Study", "Table", "check_claims"]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.claim import Claim
-from verification.claims.closeness import FEW, count
+from verification.claims.closeness import FEW, peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, momentum_distance, peak_force, resting_force
@@ -67,14 +66,10 @@ def finding(table: Table) -> str:
     for coordinate, unit in (("x", "N"), ("y", "N"), ("theta", "N m")):
         trials = table.where(part=LARGE, coordinate=coordinate)
         texts.append(f"{coordinate} {max(trials.column('IAPB')):.3g} {unit} (PB {max(trials.column('PB')):.3g})")
-    closest = "; ".join(f"{name}: {count(table.where(part=CLOSEST, coordinate=name))}" for name in COORDINATES)
-    return (
-        f"Largest forces: {', '.join(texts)}; above PB's in {count(table.where(part=LARGE))}. After settling they "
-        f"balance the hand in {count(table.where(part=BALANCE))}. The momentum given is closest to ideal in {closest}."
-    )
+    return f"Largest forces: {', '.join(texts)}."
 
 
-CLAIM = Claim(
+CLAIM = peg_claim(
     id="C11",
     statement="Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
     place="Section VI, Fig. 8",
@@ -83,10 +78,9 @@ CLAIM = Claim(
     tolerance="Peak above PB's. Balance within 0.05 N, the damper's force at the speed that counts as settled. "
     "Distance strictly the smallest; below 1e-9 everywhere the trial cannot tell.",
     columns=COLUMNS,
-    cases=lambda study: study.starts(),
     trials=trials,
     holds=holds,
     finding=finding,
-    draw=lambda study, region: study.fresh(study.starts(), region, FEW),
+    fresh=FEW,
     axes=("tilt", "clearance", "part"),
 )

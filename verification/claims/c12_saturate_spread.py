@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.claim import Claim
-from verification.claims.closeness import INDISTINGUISHABLE, MANY, count
+from verification.claims.closeness import INDISTINGUISHABLE, MANY, peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, root_mean_square, share_limited
@@ -56,14 +55,13 @@ def finding(table: Table) -> str:
     """One sentence."""
     texts = []
     for coordinate, unit, factor in (("x", "µm", 1e6), ("y", "µm", 1e6), ("theta", "mrad", 1e3)):
-        trials, other = (table.where(part=f"{coordinate}: {claimed}") for claimed in (MOST, LEAST))
+        trials = table.where(part=f"{coordinate}: {MOST}")
         medians = " / ".join(f"{factor * float(np.median(trials.column(name))):.3g}" for name in RENDERINGS)
-        counts = f"saturating worst in {count(trials)}, spreading best in {count(other)}"
-        texts.append(f"{coordinate}: {medians} {unit}, {counts}")
+        texts.append(f"{coordinate}: {medians} {unit}")
     return f"Median distance to the unlimited device (saturated / scaled / spread) in {'; '.join(texts)}."
 
 
-CLAIM = Claim(
+CLAIM = peg_claim(
     id="C12",
     statement="Saturating the impulses at the device loses most performance, spreading them over steps loses least.",
     place="Section VI, Fig. 9",
@@ -71,10 +69,10 @@ CLAIM = Claim(
     tolerance="Strictly the largest, strictly the smallest of the three. Trials in which no impulse reached the limit, "
     "or all are within 1e-7 of the unlimited device, cannot tell.",
     columns=COLUMNS,
-    cases=lambda study: study.limited(),
     trials=trials,
     holds=holds,
     finding=finding,
-    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    fresh=MANY,
+    limited=True,
     axes=("tilt", "clearance", "part"),
 )

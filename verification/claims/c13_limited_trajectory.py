@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.claim import Claim
 from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
-from verification.claims.closeness import FEW, by_coordinate, closest, count, distances
+from verification.claims.closeness import FEW, closest, distances, median_ratio, peg_claim
 from verification.claims.conditions import Condition, columns
 from verification.finding import Row, Table
 from verification.scenes.measures import deepest_penetration
+from verification.scenes.trace import COORDINATES
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -41,14 +41,15 @@ def holds(row: Row) -> bool | None:
 def finding(table: Table) -> str:
     """One sentence."""
     depths = table.where(coordinate=PENETRATION)
+    ratios = ", ".join(f"{median_ratio(table, name, 'PB'):.2f} in {name}" for name in COORDINATES)
     medians = [1e3 * float(np.median(depths.column(world))) for world in ("IAPB", "PB")]
     return (
-        f"With limits IAPB is the closest in {by_coordinate(table)}. It penetrates less than PB in {count(depths)}: "
-        f"{medians[0]:.2f} mm against {medians[1]:.2f} mm in the median."
+        f"With limits the distance of IAPB to ideal is, in the median, this multiple of PB's: {ratios}. It penetrates "
+        f"by {medians[0]:.2f} mm, PB by {medians[1]:.2f} mm in the median."
     )
 
 
-CLAIM = Claim(
+CLAIM = peg_claim(
     id="C13",
     statement="With device limits, IAPB stays closest to ideal and penetrates less than PB.",
     place="Section VI, Fig. 10",
@@ -56,10 +57,10 @@ CLAIM = Claim(
     "tool and walls.",
     tolerance="Strictly the smallest. Where all three are within 1e-7 of ideal the trial cannot tell.",
     columns=COLUMNS,
-    cases=lambda study: study.limited(),
     trials=trials,
     holds=holds,
     finding=finding,
-    draw=lambda study, region: study.fresh(study.limited(), region, FEW),
+    fresh=FEW,
+    limited=True,
     axes=("tilt", "clearance", "coordinate"),
 )

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.claim import Claim
-from verification.claims.closeness import MANY, count
+from verification.claims.closeness import MANY, peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import peak_force
@@ -50,21 +49,21 @@ def finding(table: Table) -> str:
         trials = table.where(coordinate=coordinate)
         felt = [row for row, held in zip(trials.records(), trials.holds, strict=True) if held is not None]
         ratios = [row["IAPB"] / row["PB"] for row in felt if row["PB"] > 0.0]
-        texts.append(f"{coordinate} {np.median(ratios):.2g} times, least {min(ratios):.2g}, above in {count(trials)}")
+        texts.append(f"{coordinate} {np.median(ratios):.2g} times, least {min(ratios):.2g}")
     return f"Limited peak force as a multiple of PB's: {'; '.join(texts)}."
 
 
-CLAIM = Claim(
+CLAIM = peg_claim(
     id="C14",
     statement="Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
     place="Section VI, Fig. 11",
     quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
     tolerance="Strictly larger. Coordinates in which neither reaches a hundredth of what can be felt do not count.",
     columns=COLUMNS,
-    cases=lambda study: study.limited(),
     trials=trials,
     holds=holds,
     finding=finding,
-    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    fresh=MANY,
+    limited=True,
     axes=("tilt", "force_limit", "coordinate"),
 )

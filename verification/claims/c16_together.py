@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.claim import Claim
-from verification.claims.closeness import MANY, count
+from verification.claims.closeness import MANY, peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import largest_separation, share_limited
@@ -52,21 +51,21 @@ def finding(table: Table) -> str:
     for rendering in RENDERINGS:
         trials = table.where(rendering=rendering)
         distance, angle = max(trials.column("distance")), max(trials.column("angle"))
-        texts.append(f"{rendering} up to {distance:.1e} m and {angle:.1e} rad (as claimed in {count(trials)})")
+        texts.append(f"{rendering} up to {distance:.1e} m and {angle:.1e} rad")
     return f"Largest separation of tool and device: {'; '.join(texts)}."
 
 
-CLAIM = Claim(
+CLAIM = peg_claim(
     id="C16",
     statement="Scaling and spreading keep tool and device together on impact; saturating does not.",
     place="Section VI",
     quantity="Largest difference of tool and device over the run, in position and angle.",
     tolerance="Together: 1e-9 m and rad, rounding over 1536 steps. Apart: more than 1e-6.",
     columns=COLUMNS,
-    cases=lambda study: study.limited(),
     trials=trials,
     holds=holds,
     finding=finding,
-    draw=lambda study, region: study.fresh(study.limited(), region, MANY),
+    fresh=MANY,
+    limited=True,
     axes=("tilt", "force_limit", "rendering"),
 )

@@ -1,4 +1,4 @@
-"""How close the worlds' device trajectories come to "ideal": shared by C10 and C13."""
+"""Claims on the peg in the corner, and how close the worlds' device trajectories come to "ideal" (C10, C13)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from verification.claims.claim import Claim
 from verification.claims.conditions import START_COLUMNS, Condition
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, largest_distance, root_mean_square
@@ -26,11 +27,23 @@ COLUMNS = (
     Column("CBuc, largest"),
 )
 
-# Fresh starts that confirm a region where the rigid worlds, a second each, are asked; else.
+# Fresh starts that confirm a region: where the rigid worlds, a second each, are asked, and elsewhere.
 FEW, MANY = 12, 30
 # Distances below this [m, rad] are nothing that a hand or a figure could tell apart (a tenth of a micrometre): a
 # coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat, cannot tell.
 INDISTINGUISHABLE = 1e-7
+
+
+def peg_claim(*, fresh: int, limited: bool = False, **words: Any) -> Claim:
+    """Return a claim on every start of the peg, with device limits or without; `words` are the other fields of Claim.
+
+    fresh : starts between those, drawn to confirm a region
+    """
+
+    def cases(study: Study) -> tuple[Condition, ...]:
+        return study.limited() if limited else study.starts()
+
+    return Claim(**{"cases": cases, "draw": lambda study, region: study.fresh(cases(study), region, fresh)} | words)
 
 
 def distances(study: Study, condition: Condition, rendering: str) -> Iterator[dict[str, Any]]:
@@ -54,40 +67,6 @@ def closest(row: Row) -> bool | None:
     if max(row["IAPB"], row["PB"], row["CBuc"]) < INDISTINGUISHABLE:
         return None
     return bool(row["IAPB"] < min(row["PB"], row["CBuc"]))
-
-
-def count(table: Table) -> str:
-    """`held of decided`."""
-    decided = [held for held in table.holds if held is not None]
-    return f"{sum(decided)} of {len(decided)}"
-
-
-def by_coordinate(table: Table) -> str:
-    """Return in how many trials the claim holds, per coordinate, and the tilts up to which it always does."""
-    parts = []
-    for coordinate in COORDINATES:
-        trials = table.where(coordinate=coordinate)
-        parts.append(f"{coordinate}: {count(trials)}{_reach(trials)}")
-    return "; ".join(parts)
-
-
-def by_approach_velocity(table: Table) -> str:
-    """Return in how many trials the claim holds, per approach velocity and coordinate."""
-    parts = []
-    for speed in sorted(set(table.column("approach_velocity"))):
-        trials = table.where(approach_velocity=speed)
-        counts = ", ".join(f"{name} {count(trials.where(coordinate=name))}" for name in COORDINATES)
-        parts.append(f"from {speed:g} m/s on: {counts}")
-    return "; ".join(parts)
-
-
-def _reach(trials: Table) -> str:
-    """The largest tilt below which no trial fails, in words."""
-    failed, held = trials.that(False).column("tilt"), trials.that(True).column("tilt")
-    if not failed or not held:
-        return ""
-    below = [tilt for tilt in held if abs(tilt) < min(map(abs, failed))]
-    return f" (all up to a tilt of {max(below):g} rad)" if below else ""
 
 
 def median_ratio(table: Table, coordinate: str, other: str) -> float:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -145,8 +144,3 @@ def columns(*names: str) -> tuple[Column, ...]:
 
 
 START_COLUMNS = columns("tilt", "clearance", "travel", "friction", "approach_velocity")
-
-
-def describe(condition: Condition) -> dict[str, Any]:
-    """The condition with units, for a report."""
-    return {column.title: condition.record()[column.key] for column in columns(*UNITS)}

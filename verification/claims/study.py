@@ -17,14 +17,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
-from verification.claims.conditions import (
-    Condition,
-    describe,
-    drawn,
-    limited_conditions,
-    start_conditions,
-    wall_conditions,
-)
+from verification.claims.conditions import Condition, drawn, limited_conditions, start_conditions
 from verification.finding import Failure, Finding, Region, attempt, check_depth, of_each, with_failures
 from verification.scenes.trace import Trace, trace_of
 
@@ -158,9 +151,3 @@ def check_claims(
     if progress is not None:
         progress(len(chosen), len(chosen), "")
     return tuple(results)
-
-
-def conditions(depth: str = "quick") -> tuple[dict[str, Any], ...]:
-    """Every variation of the peg scene that the claims of this depth compute, for a report."""
-    every = start_conditions(depth) + limited_conditions(depth) + wall_conditions()
-    return tuple(describe(condition) for condition in dict.fromkeys(every))

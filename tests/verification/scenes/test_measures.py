@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from verification.claims.conditions import TIGHT, Condition, limited_conditions, start_conditions
-from verification.claims.study import conditions
+from verification.claims.conditions import TIGHT, Condition, drawn, limited_conditions, start_conditions
+from verification.finding import Region
 from verification.scenes.measures import (
     bounces,
     comparison_window,
@@ -109,8 +109,16 @@ def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
 
 
 def test_conditions_cover_what_the_paper_leaves_open():
-    listed = conditions("quick")
-    for name in ("tilt [rad]", "clearance [m]", "travel [m]", "friction", "force_limit [F_limit]"):
-        assert len({condition[name] for condition in listed}) > 1
+    for name in ("tilt", "clearance", "travel", "friction", "approach_velocity"):
+        assert len({getattr(start, name) for start in start_conditions("quick")}) > 1
     assert {one.force_limit for one in limited_conditions("quick")} == {1.0, TIGHT}
-    assert len({one.approach_velocity for one in start_conditions("quick")}) > 1
+
+
+def test_fresh_conditions_lie_inside_the_region_and_between_the_tested_ends():
+    tested, region = start_conditions("quick"), Region((("tilt", "rad", None, 0.015), ("friction", "", 0.1, None)))
+    fresh = drawn(tested, region, seed=1, count=50)
+    assert fresh == drawn(tested, region, seed=1, count=50) and len(set(fresh)) == 50
+    assert all(region.contains(one.record()) for one in fresh)
+    for name in ("tilt", "clearance", "travel", "friction", "approach_velocity"):
+        seen = [getattr(start, name) for start in tested]
+        assert all(min(seen) <= getattr(one, name) <= max(seen) for one in fresh)
