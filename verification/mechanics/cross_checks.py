@@ -52,8 +52,9 @@ def finding(checks: list[dict[str, Any]], failures: list[Failure]) -> Finding:
     """Return one part per comparison."""
     table = table_of(COLUMNS, checks, digits=2).judged(_agrees)
     parts = [
-        Part(f"{row['quantity']}: at most {row['largest difference']:.1e} from {row['against']} in {row['cases']} "
-             f"cases (tolerance {row['tolerance']:.0e}).", REPRODUCED if _agrees(row) else REFUTED)
+        Part(f"{row['against']}, {row['quantity']}: the largest difference in {row['cases']} cases is "
+             f"{row['largest difference']:.2g} (tolerance {row['tolerance']:g}).",
+             REPRODUCED if _agrees(row) else REFUTED)
         for row in checks
     ]  # fmt: skip
     answer = (f"{sum(map(_agrees, checks))} of {len(checks)} comparisons with Pinocchio and with complementarity "
