@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -130,6 +131,21 @@ def linear_algebra() -> str:
         if pool["user_api"] == "blas"
     }
     return "; ".join(sorted(found)) or UNKNOWN
+
+
+def machine_of(facts: Mapping[str, str]) -> str:
+    """Return what in a result's provenance can change last bits beside the code: processor and BLAS kernel.
+
+    The number of threads is left out: it is that of the moment.
+    """
+    kernels = sorted(set(re.findall(r"(\S+) x\d+", facts.get("blas", ""))))
+    return ", ".join(text for text in (facts.get("cpu", ""), " and ".join(kernels)) if text)
+
+
+@cache
+def this_machine() -> str:
+    """Return the same of this process: it is part of the keys of computed stages."""
+    return machine_of({"cpu": processor(), "blas": linear_algebra()})
 
 
 def _dirty() -> str:

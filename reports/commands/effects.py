@@ -8,25 +8,26 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from iapb import decide_effects, find_scene, load_scene
+from iapb import decide_effects
 from iapb.errors import ArgumentError
 from reference.worlds import find_world
 from reports.commands.progress import stage_progress
+from reports.commands.run import Rendering, SceneName, scene_given
 from verification.cost.effects import effects_of, summary
 
 
 def effects(
-    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    scene: SceneName,
     world: Annotated[str | None, typer.Option(
         help="Decide for one world (ideal, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an effect is on if some "
              "world needs it.")] = None,
-    rendering: Annotated[str, typer.Option(help="full, saturate, scale or spread.")] = "full",
+    rendering: Rendering = "full",
     measure: Annotated[bool, typer.Option(
         "--measure", help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "
         "and what changes without it. Takes seconds.")] = False,
 ) -> None:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
-    source = load_scene(find_scene(scene))
+    source = scene_given(scene, None)
     if measure:
         _measure(source, world or "IAPB")
         return

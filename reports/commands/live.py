@@ -8,38 +8,34 @@ from typing import Annotated
 
 import typer
 
-from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
 from iapb.simulation import INTERRUPTED, Simulation
 from reference.worlds import find_world
 from reports.commands.progress import to_log
-from reports.commands.run import counted, duration
+from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
 from reports.compiling import compiling_told
 from reports.live.budget import calibrated
 from reports.live.loop import LiveRun, Loop
 from reports.live.measure import Pace, live_simulation, summary
 from reports.live.replay import write_live
 from reports.live.viewer import Viewer
-from reports.uses import parsed
 
 LONGEST = 1e8  # ticks: what is recorded is held in memory until the end
 
 
 def live(
-    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    scene: SceneName,
     rate: Annotated[float, typer.Option(help="Steps per second; replaces the scene's own.")] = 1000.0,
     seconds: Annotated[float, typer.Option(help="How long, of real time; Ctrl-C ends it before.")] = 60.0,
     world: Annotated[str, typer.Option(help="Contact law and coupling, as in `iapb run`.")] = "IAPB",
-    rendering: Annotated[str, typer.Option(
-        help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")] = "full",
+    rendering: Rendering = "full",
     device: Annotated[str, typer.Option(
         help="module:factory of a device of your own (factory(scene) -> iapb.haptics.device.Device), or: simulated. "
              "Default: the device compiled into the loop.")] = "",
     view: Annotated[bool, typer.Option("--view", help="Show it in a browser, with the mouse as the hand.")] = False,
     port: Annotated[int, typer.Option(min=1, max=65535, help="Of the viewer's web page, on this machine only.")] = 8080,
     budget: Annotated[bool, typer.Option(help="Give impacts the rows that the time left allows, or all.")] = True,
-    set_: Annotated[list[str] | None, typer.Option(
-        "--set", help="Change a value, as in `iapb run`. Repeatable.")] = None,
+    set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
 ) -> None:
     """Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable."""
@@ -47,8 +43,7 @@ def live(
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:
         raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
-    source = load_scene(find_scene(scene))
-    source = source.with_values(parsed(set_)) if set_ else source
+    source = scene_given(scene, set_)
     out.mkdir(parents=True, exist_ok=True)  # where it cannot be, that is said before and not after the run
     with compiling_told(to_log):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)

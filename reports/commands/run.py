@@ -8,27 +8,36 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from iapb import find_scene, load_scene
 from iapb.run import Run
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED
 from reports.commands.progress import step_progress
 from reports.runner import Runner
 from reports.uses import parsed
 
+SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")]
+Rendering = Annotated[str, typer.Option(
+    help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")]  # fmt: skip
+Values = Annotated[list[str] | None, typer.Option(
+    "--set", help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.")]  # fmt: skip
+
+
+def scene_given(name: str, values: list[str] | None) -> Scene:
+    """Return the scene of that name or file, with the values of ``--set``."""
+    scene = load_scene(find_scene(name))
+    return scene.with_values(parsed(values)) if values else scene
+
 
 def run(
-    scene: Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")],
+    scene: SceneName,
     world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); IAPB-friction: with "
                                             "Coulomb friction in impacts; IAPB-push: contacts only push.")] = "IAPB",
-    rendering: Annotated[str, typer.Option(
-        help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")] = "full",
-    set_: Annotated[list[str] | None, typer.Option(
-        "--set", help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.")] = None,
+    rendering: Rendering = "full",
+    set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
 ) -> None:
     """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again."""
-    source = load_scene(find_scene(scene)).with_values(parsed(set_)) if set_ else load_scene(find_scene(scene))
-    runner = Runner(out)
+    source, runner = scene_given(scene, set_), Runner(out)
     with step_progress(f"{source.name} in {world}") as runner.progress:
         fetched = runner.fetch(source, world, rendering)
     result = fetched.run

@@ -2,8 +2,9 @@
 
 A record's tables are typed columns of that file, its words a JSON text without their rows. The file's name carries a
 hash of what determines the records: the stage's inputs, the sources of the engine, the references and the verification,
-the scenes, and what else the stage says that it depends on. So a changed line of theirs makes the stage run again, a
-change of the report not. Beside the records stand the runs they were made from.
+the scenes, the processor and BLAS kernel, and what else the stage says that it depends on. So a changed line of theirs
+makes the stage run again, a change of the report not, and no number wears another machine's name. Beside the records
+stand the runs they were made from.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.provenance import collect_provenance
+from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
@@ -59,7 +60,7 @@ class Stage:
         self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any], depends: Mapping[str, str] | None = None
     ) -> None:
         given = {"stage": name, "layout": _LAYOUT, "inputs": inputs, "code": evidence_version(),
-                 "depends": depends or {}}  # fmt: skip
+                 "depends": depends or {}, "machine": this_machine()}  # fmt: skip
         self.key = hash_of(given)
         self.name = name
         self.path = folder / f"{name}-{self.key[:16]}.h5"

@@ -86,6 +86,7 @@ class StoredFile:
 
     used_by : the claims, figures' inputs and topics made from a run; nobody for a table
     status : "complete", "partial" where a simulation gave up, "absent" where the file is gone since
+    made_on : processor and BLAS kernel that computed it, where its file says so
     """
 
     name: str
@@ -96,6 +97,7 @@ class StoredFile:
     size: int | None = None  # bytes
     used_by: tuple[str, ...] = ()
     status: str = "complete"
+    made_on: str = ""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ from iapb.scene import find_scene, load_scene
 from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records
+from reports.provenance import linear_algebra
 from reports.runner import Runner
 from reports.store import keys
 from reports.store.tables import columns_of, finding_table, read_table, read_tables, write_table
@@ -108,7 +113,23 @@ def test_another_depth_name_or_source_is_another_file(tmp_path, monkeypatch):
             Stage(tmp_path, "b", int, {"depth": "quick"})]  # fmt: skip
     monkeypatch.setattr(stages, "evidence_version", lambda: "another line of code")
     made.append(Stage(tmp_path, "a", int, {"depth": "quick"}))
-    assert len({stage.path for stage in made}) == 4
+    monkeypatch.setattr(stages, "this_machine", lambda: "another processor")
+    made.append(Stage(tmp_path, "a", int, {"depth": "quick"}))
+    assert len({stage.path for stage in made}) == 5
+
+
+def test_another_blas_kernel_is_another_machine_and_another_number_of_threads_is_not():
+    """Asked of OpenBLAS itself, as a user would choose another kernel."""
+    if "openblas" not in linear_algebra():
+        pytest.skip("numpy has another BLAS than OpenBLAS, whose kernels this asks for")
+    program = "from reports.provenance import this_machine; print(this_machine())"
+    said = []
+    for chosen in ({"OPENBLAS_CORETYPE": "Prescott"}, {"OPENBLAS_CORETYPE": "Haswell"},
+                   {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"}):  # fmt: skip
+        done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
+                              capture_output=True, env={**os.environ, **chosen})  # fmt: skip
+        said.append(done.stdout.strip())
+    assert said[0] != said[1] == said[2]
 
 
 def test_a_stage_that_fails_or_is_interrupted_leaves_nothing(tmp_path):

@@ -105,6 +105,15 @@ def page(request: pytest.FixtureRequest, full: Evidence) -> str:
     return build_report(full if request.param == "full" else Evidence())
 
 
+def test_the_page_says_where_its_files_are_of_several_machines(full: Evidence) -> None:
+    other = [replace(full.manifest[0], file=f"runs/{kernel}.h5", made_on=f"a processor, {kernel}")
+             for kernel in ("Haswell", "Haswell2", "SkylakeX")]  # fmt: skip
+    page = " ".join(build_report(replace(full, manifest=tuple(other))).split())
+    assert "Mixed provenance." in page and "1 on a processor, SkylakeX" in page and "on 3 combinations" in page
+    alike = tuple(replace(one, made_on="a processor, Haswell") for one in other)
+    assert "Mixed provenance." not in build_report(replace(full, manifest=alike))
+
+
 def test_the_page_is_well_formed(page: str) -> None:
     outline = Outline(page)
     assert outline.wrong == []
