@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import Entry, block, columns
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
+from iapb.contact.kernels.coulomb import make_step_friction
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import make_friction_work
 from iapb.contact.kernels.narrow_phase import detect
@@ -184,7 +185,8 @@ def make_world(system: System, law: Any) -> World:
         tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
         switches=switches, dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
-        friction=float(contact.friction), friction_velocity=float(contact.friction_velocity),
+        friction=float(contact.friction), coulomb="friction" in on and contact.friction_law == "coulomb",
+        friction_velocity=float(contact.friction_velocity),
         restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
         own_restitution=restitution_by_shape(scene), approach_velocity=float(contact.approach_velocity),
         cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
@@ -210,6 +212,7 @@ def make_state(system: System) -> State:
     if cholesky(mass, lower):
         raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
     sliding, tangents = slides_in_impacts(system.scene), 2 if isinstance(system.scene, SpatialScene) else 1
+    rubbing = system.scene.contact.friction > 0.0 and system.scene.contact.friction_law == "coulomb"
     vectors = {name: np.zeros(d) for name in (
         "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
         "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
@@ -224,9 +227,14 @@ def make_state(system: System) -> State:
         contact_impulse=np.zeros(rows), rows=np.zeros(rows, np.int64), dofs=np.zeros(d, np.int64),
         row_impulse=np.zeros(rows), row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
         push_work=make_push_work(d, rows),
-        friction_work=make_friction_work(d * sliding, rows * sliding, tangents), impacts=_make_log(trees, d),
-        **vectors, **squares,
+        friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
+        step_friction=make_step_friction(d, capacity * rubbing, tangents, _largest_tree(mechanism)),
+        impacts=_make_log(trees, d), **vectors, **squares,
     ))
+
+
+def _largest_tree(mechanism: Mechanism) -> int:
+    return max((stop - start for start, stop in mechanism.tree_dofs), default=0)
 
 
 def _make_log(trees: int, d: int) -> Any:

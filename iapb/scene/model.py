@@ -48,9 +48,14 @@ class Contact(Part):
     penalty: Literal["clamped", "printed"] = Field(
         "clamped", description="clamped (default): never pulls; printed: (5) to the letter, may pull"
     )
-    friction: NonNegative = Field(0.0, description="coefficient mu of (6) [1]; default 0 = no friction")
+    friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
+    friction_law: Literal["coulomb", "regularised"] = Field(
+        "coulomb",
+        description="coulomb (default): sticks and slides, implicit in the step; regularised: the paper's explicit (6)",
+    )
     friction_velocity: Positive = Field(
-        1e-3, description="v_threshold of (6) [m/s]: below it friction grows linearly; default 1e-3, ours"
+        1e-3,
+        description="v_threshold of (6) [m/s]: below it regularised friction grows linearly; default 1e-3, ours",
     )
     restitution: Fraction = Field(
         0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0"

@@ -141,6 +141,17 @@ def unclamped_friction(case: SceneCase) -> Run | None:
     return replace(run, contacts=replace(run.contacts, friction_force=1.5 * run.contacts.friction_force))
 
 
+def explicit_friction(case: SceneCase) -> Run | None:
+    """The scene says Coulomb's law; the simulation does (6), too sharp for its step, and drives bodies."""
+    contact = case.values["contact"]
+    if not contact.get("friction") or contact.get("friction_law") == "regularised":
+        return None
+    sharp = contact | {"friction_law": "regularised", "friction_velocity": 1e-6}
+    run = replace(case, values=case.values | {"contact": sharp}).simulate()
+    drives = bool(np.any(np.diff(run.energy["friction_work"]) > 0.0))
+    return replace(run, scene_resolved=case.scene().resolved()) if drives else None
+
+
 def device_beyond_its_limits(case: SceneCase) -> Run | None:
     """The device gets what is asked for; the record says that it was cut to the limits."""
     limit = (case.values.get("device") or {}).get("force_limit")
@@ -161,6 +172,7 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Fault] = {
     "ledger": missing_half,
     "penalty": unclamped_penalty,
     "friction": unclamped_friction,
+    "friction_work": explicit_friction,
     "device_limits": device_beyond_its_limits,
 }
 

@@ -121,7 +121,9 @@ def draw_contact(rng: np.random.Generator, least_mass: float, dt: float) -> Valu
         "restitution": float(rng.choice([0.0, 0.5, 1.0, round(rng.uniform(), 3)])),
     }  # fmt: skip
     if rng.random() < 0.4:
-        contact |= {"friction": round(rng.uniform(0.05, 1.0), 3), "friction_velocity": 1e-2}
+        friction = round(rng.uniform(0.05, 1.0), 3)
+        law = "regularised" if round(1e3 * friction) % 3 == 0 else "coulomb"  # no draw: all else stays as it was
+        contact |= {"friction": friction, "friction_velocity": 1e-2, "friction_law": law}
     if rng.random() < 0.5:
         contact["coherence_distance"] = 1e-2
     if rng.random() < 0.3:

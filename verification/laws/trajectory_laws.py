@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.laws import ENGINE_LAWS
 from iapb.errors import ArgumentError
 from iapb.run import Run
 from reference.exact import bulk_energy_gain, relative_energy_gain
@@ -86,6 +87,12 @@ class Trajectory:
         """All generalized forces (n, d) that the record knows of."""
         run = self.run
         return run.hand_force + run.coupling_force + run.penalty_force + run.friction_force
+
+    @property
+    def turns_over(self) -> bool:
+        """Whether a body in space may turn by half a turn in a step: its displacement is not the motion then."""
+        run, mechanism = self.run, self.system.mechanism
+        return bool(mechanism.nq != mechanism.nv and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN)
 
     @cached_property
     def displacements(self) -> Floats:
@@ -255,8 +262,7 @@ def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
     then no longer the motion that was integrated.
     """
     run, mechanism = trajectory.run, trajectory.system.mechanism
-    turns = mechanism.nq != mechanism.nv and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN
-    if turns or not mechanism.has_constant_mass_matrix:
+    if trajectory.turns_over or not mechanism.has_constant_mass_matrix:
         return np.zeros(1), np.zeros(1)
     dv = run.v[1:] - trajectory.v_struck
     lost = 0.5 * np.einsum("ni,nij,nj->n", dv, trajectory.masses, dv)
@@ -287,7 +293,7 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> LawResidual | None:
     return LawResidual("penalty", float(np.max(apart)), 16.0 * EPS)
 
 
-# (6): friction is at most μ F_n, lies in the plane of contact, and is not there where nothing pushes.
+# (6) and Coulomb's law: friction is at most μ F_n, lies in the plane of contact, and is not there where nothing pushes.
 def friction_stays_in_its_cone(trajectory: Trajectory) -> LawResidual | None:
     """Largest of |F_f| − μ F_n and |F_f · n|, over μ F_n; infinite where there is friction and no push.
 
@@ -304,6 +310,27 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> LawResidual | None:
     rounding = 1.0 + np.abs(contacts.normal_velocity) / constants["friction_velocity"]
     relative = np.divide(excess, most * rounding, out=np.where(excess > 0.0, np.inf, 0.0), where=most > 0.0)
     return LawResidual("friction", float(np.max(relative)), 16.0 * EPS)
+
+
+# Friction by Coulomb's law takes energy in every step: its work is never positive.
+def friction_takes_energy(trajectory: Trajectory) -> LawResidual | None:
+    """Largest F_f · Δq of a step, over the rounding of that sum; the paper's explicit (6) is not judged.
+
+    A contact that sticks does no work but rounding: each entry of Δq is the difference of two coordinates, each of F_f
+    a sum over the contacts, which may cancel.
+    """
+    run, contacts = trajectory.run, trajectory.run.contacts
+    constants = run.scene_resolved["contact"]
+    explicit = constants.get("friction_law", "regularised") != "coulomb"
+    if explicit or run.law not in ENGINE_LAWS or not np.any(run.friction_force) or trajectory.turns_over:
+        return None
+    moved = trajectory.displacements
+    work = np.einsum("nd,nd->n", run.friction_force, moved)
+    step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))
+    summed = np.bincount(step, np.linalg.norm(contacts.friction_force, axis=1), minlength=run.steps)
+    size = (summed + norm(run.friction_force)) * (norm(run.q[:-1]) + norm(run.q[1:]) + norm(moved))
+    relative = np.divide(work, size, out=np.where(work > 0.0, np.inf, 0.0), where=size > 0.0)
+    return LawResidual("friction_work", float(np.max(relative)), 16.0 * moved.shape[1] * EPS)
 
 
 # The device applies no more force than it can, whatever contact, coupling and rendering ask for.
@@ -331,7 +358,8 @@ TRAJECTORY_LAWS: dict[str, TrajectoryLaw] = {
     "kinematics": TrajectoryLaw("q moves by the new velocity", velocity_moves_configuration),
     "ledger": TrajectoryLaw("the energy ledger closes", ledger_closes),
     "penalty": TrajectoryLaw("resting contacts push by (5)", contacts_push_by_the_penalty),
-    "friction": TrajectoryLaw("friction stays in its cone (6)", friction_stays_in_its_cone),
+    "friction": TrajectoryLaw("friction stays in its cone", friction_stays_in_its_cone),
+    "friction_work": TrajectoryLaw("friction does no positive work in any step", friction_takes_energy),
     "device_limits": TrajectoryLaw("the device keeps its force limits", device_keeps_its_limits),
 }
 

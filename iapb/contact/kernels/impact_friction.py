@@ -181,7 +181,7 @@ def settle_friction(count, rank, work, push, f, d, scale):
     scale : speed [m/s] to which STILL and MET are relative.
     """
     for i in range(count):
-        f.inertia[i] = _inertia(f.free[:, :d], i * f.velocity.shape[0], f.velocity.shape[0])
+        f.inertia[i] = tangent_inertia(f.free[:, :d], i * f.velocity.shape[0], f.velocity.shape[0])
     f.p[: count * f.velocity.shape[0]] = 0.0
     pushes = _start(count, rank, work, push, f, d)
     if pushes and _settle(count, rank, work, push, f, d, scale, True):
@@ -202,7 +202,7 @@ def settle_friction(count, rank, work, push, f, d, scale):
 
 
 @kernel
-def _inertia(free, first, size):
+def tangent_inertia(free, first, size):
     """Largest eigenvalue of B_i B_iᵀ, one or two rows."""
     x = free[first]
     xx = along(x, x)
@@ -385,7 +385,7 @@ def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, sti
         fastest = 0.0
         for i in range(count):
             if inertia[i] > 0.0:
-                fastest = max(fastest, _slide(free, slip, radius[i], inertia[i], p, moved, velocity, i * size))
+                fastest = max(fastest, slide(free, slip, radius[i], inertia[i], p, moved, velocity, i * size))
         if fastest <= still:
             break
     return fastest
@@ -411,7 +411,7 @@ def along(row, vector):
 
 
 @kernel
-def _slide(free, slip, radius, inertia, p, moved, velocity, first):
+def slide(free, slip, radius, inertia, p, moved, velocity, first):
     """Move one contact's impulse to where it stops the slip, or towards its limit; return the velocity this made."""
     size = velocity.shape[0]
     for a in range(size):

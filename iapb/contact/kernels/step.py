@@ -10,6 +10,7 @@ from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
+from iapb.contact.kernels.coulomb import add_step_friction, remember_friction
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
@@ -81,6 +82,8 @@ def locate(world, state):
 def find_contacts(world, state):
     """Section III: touching contacts, filtered, new or old, each group in one of three states."""
     remember(state)
+    if world.coulomb:
+        remember_friction(state)
     count = touching(world, state, state.contacts)
     if count < 0:
         return count
@@ -143,13 +146,27 @@ def move(world, state, applied):
             state.mean_acceleration[k] += weight * state.acceleration[k]
             state.penalty_force[k] += weight * state.stage_penalty[k]
             state.friction_force[k] += weight * state.stage_friction[k]
-    finite = True
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
+    if world.switches.contacts and world.coulomb and not rub(world, state):
+        return NOT_POSITIVE_DEFINITE
+    finite = True
+    for k in range(state.v.shape[0]):
         finite = finite and abs(state.v[k]) < LARGEST_SPEED  # False for NaN too
     velocity = state.v if world.semi_implicit else state.mean_v
     integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
     return OK if finite else NOT_FINITE
+
+
+@kernel
+def rub(world, state):
+    """Coulomb friction of the step, from places and normal forces at its start. False: M is not definite."""
+    if world.stage_weight.shape[0] > 1:
+        copy_into(state.q, state.start_q)
+        if not locate(world, state):
+            return False
+    add_step_friction(world, state)
+    return True
 
 
 @kernel
@@ -187,6 +204,7 @@ def rest(world, state, stage):
         state.stage_friction[k] = 0.0
     if not world.switches.contacts:
         return
+    friction = 0.0 if world.coulomb else world.friction
     contacts, count = state.contacts, state.contact_count[0]
     if stage > 0:
         contacts = state.stage_contacts
@@ -202,4 +220,4 @@ def rest(world, state, stage):
                                  state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:
             resting_force(world.mechanism, state.body, contacts, i, world.stiffness, world.damping, world.clamped,
-                          world.friction, world.friction_velocity, state.stage_penalty, state.stage_friction)
+                          friction, world.friction_velocity, state.stage_penalty, state.stage_friction)

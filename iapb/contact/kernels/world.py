@@ -8,6 +8,7 @@ import numpy as np
 
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.broadphase import BroadPhase
+from iapb.contact.kernels.coulomb import StepFriction
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.unilateral import PushWork
@@ -48,6 +49,7 @@ class World(NamedTuple):
     damping: float  # B [N s/m] (5)
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction: float  # μ (6)
+    coulomb: bool  # resting friction by Coulomb's law, implicit in the step; False: the paper's explicit (6)
     friction_velocity: float  # v_threshold [m/s] (6)
     restitution: float  # e of all contacts, or of those whose shapes give none
     own_restitution: np.ndarray  # (shapes,) e that a shape's body or wall gives, above 1 = none
@@ -106,4 +108,5 @@ class State(NamedTuple):
     work: ImpactWork
     push_work: PushWork
     friction_work: FrictionWork
+    step_friction: StepFriction
     impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

@@ -11,13 +11,13 @@ from iapb import resolve_frictional_impact, resolve_impact
 from iapb.compiled import block
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import (
-    _inertia,
     combine,
     friction_sweeps,
     make_friction_work,
     passive_share,
     share_within_cone,
     split_tangents,
+    tangent_inertia,
 )
 
 TANGENTS = pytest.mark.parametrize("size", [1, 2])
@@ -113,7 +113,7 @@ def test_the_unit_of_mass_changes_no_bit_of_a_sweep(size: int, factor: float) ->
 def test_inertia_is_the_largest_eigenvalue_of_its_rows(size: int) -> None:
     rng = np.random.default_rng(3)
     rows, _, inertia = problem(rng, size, count=8)
-    found = [_inertia(rows, i * size, size) for i in range(8)]
+    found = [tangent_inertia(rows, i * size, size) for i in range(8)]
     assert found == pytest.approx(inertia, rel=1e-12)
     out = np.full(7, np.nan)
     combine(rows, weight := rng.normal(size=8 * size), out)

@@ -1,0 +1,225 @@
+"""Coulomb friction of a step, implicit in the velocity: it takes energy in every step and drives nothing backwards.
+
+The other forces of the step lead to v. Friction adds Δv = M⁻¹ Jᵀ p with the tangential impulses p that minimize
+½ Δvᵀ M Δv + p · J v in the discs |p_i| ≤ μ F_n,i Δt, where F_n are the normal forces (5) of the step: each contact
+stops, or slides on against p_i at the limit. The sweeps start where this function is not above zero and each lowers it,
+so friction takes kinetic energy wherever they end; `passive_factor` makes its work over the step negative as well.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.contact_set import moving_tree
+from iapb.contact.kernels.impact_friction import along, slide, tangent_inertia
+from iapb.contact.kernels.rows import add_body_row, tangent_of
+from iapb.mechanics.kernels.cholesky import solve_tree_blocks
+from iapb.mechanics.kernels.kinematics import add_point_force
+from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
+
+SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
+STILL = 1e-6  # of the fastest slip: a sweep that moves less is the last one; sticking contacts creep no faster
+
+
+class StepFriction(NamedTuple):
+    """Scratch of the friction of one step: c contacts, m tangents each (1 planar, 2 spatial), d coordinates."""
+
+    contact: np.ndarray  # (c,) int64: contacts that carry friction in this step
+    tree: np.ndarray  # (c, 2) int64: their two trees, −1 = none or the same
+    rows: np.ndarray  # (c m, 2 w) tangents' rows of J L⁻ᵀ, w entries for each tree: the others are zero
+    slip: np.ndarray  # (c m,) tangential velocity without friction [m/s]
+    p: np.ndarray  # (c m,) tangential impulses [N s]
+    radius: np.ndarray  # (c,) limit μ F_n Δt [N s]
+    inertia: np.ndarray  # (c,) largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
+    moved: np.ndarray  # (d,) Lᵀ Δv
+    local: np.ndarray  # (2 w,) the part of it that one contact touches
+    velocity: np.ndarray  # (m,)
+
+
+def make_step_friction(coordinates: int, contacts: int, tangents: int, tree_size: int) -> StepFriction:
+    """Allocate the scratch; `tree_size`: coordinates of the largest tree."""
+    c, m, width = contacts, tangents, 2 * tree_size
+    return StepFriction(
+        contact=np.zeros(c, np.int64), tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * m, width)),
+        slip=np.zeros(c * m), p=np.zeros(c * m), radius=np.zeros(c), inertia=np.zeros(c),
+        moved=np.zeros(coordinates), local=np.zeros(width), velocity=np.zeros(m),
+    )  # fmt: skip
+
+
+@kernel
+def remember_friction(state):
+    """The friction forces of this step become those of the step before, where the sweeps start."""
+    for i in range(state.contact_count[0]):
+        store(state.previous.friction_force, i, load(state.contacts.friction_force, i))
+
+
+@kernel
+def add_step_friction(world, state):
+    """Add the friction of the step to v; write friction_force (d,) and that of each contact.
+
+    Places and factor of M are those at the start of the step, v is what the other forces make of it. Trees that rub
+    move with the new velocity, whatever the integrator: then friction does the work p · J v⁺.
+    """
+    f, dt, size = state.step_friction, world.dt, state.step_friction.velocity.shape[0]
+    count = _gather(world, state)
+    if count == 0:
+        return
+    _start(world, state, count)
+    _sweep(world, state, count)
+    factor = passive_factor(f.p[: count * size], f.slip, f.moved)
+    for r in range(count):
+        i, force = f.contact[r], (0.0, 0.0, 0.0)
+        n, x = load(state.contacts.normal, i), load(state.contacts.point, i)
+        for a in range(size):
+            force = add(force, scale(factor * f.p[r * size + a] / dt, tangent_of(n, a, size)))
+        store(state.contacts.friction_force, i, force)
+        add_point_force(world.mechanism, state.body, state.contacts.body_a[i], x, force, state.friction_force)
+        add_point_force(world.mechanism, state.body, state.contacts.body_b[i], x, scale(-1.0, force),
+                        state.friction_force)
+    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.friction_force, f.moved)
+    for k in range(state.v.shape[0]):
+        state.v[k] += dt * f.moved[k]
+    for r in range(count):
+        for side in range(2):
+            tree = f.tree[r, side]
+            if tree >= 0:
+                for k in range(world.tree_start[tree], world.tree_stop[tree]):
+                    state.mean_v[k] = state.v[k]
+
+
+@kernel
+def passive_factor(p, slip, moved):
+    """Largest α ≤ 1 with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0."""
+    given, square = along(p, slip[: p.shape[0]]), along(moved, moved)
+    if given >= 0.0:
+        return 0.0
+    return 1.0 if square <= -given else -given / square
+
+
+@kernel
+def _gather(world, state):
+    """Rows, slips, limits and first impulses of the contacts that push in this step; return their number."""
+    f, contacts, size = state.step_friction, state.contacts, state.step_friction.velocity.shape[0]
+    count = begin = 0
+    for i in range(state.contact_count[0]):
+        if not contacts.normal_force[i] > 0.0:
+            continue
+        f.contact[count] = i
+        f.radius[count] = world.friction * contacts.normal_force[i] * world.dt
+        first = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        other = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        f.tree[count, 0], f.tree[count, 1] = first, -1 if other == first else other
+        before = _before(state, i, begin)
+        n, held, square = load(contacts.normal, i), (0.0, 0.0, 0.0), 0.0
+        if before >= 0:
+            begin, held = before + 1, scale(world.dt, load(state.previous.friction_force, before))
+        for a in range(size):
+            j, tangent = count * size + a, tangent_of(n, a, size)
+            _gather_row(world, state, j, count, i, tangent)
+            f.p[j] = dot(held, tangent)
+            square += f.p[j] * f.p[j]
+        if square > f.radius[count] * f.radius[count]:
+            for j in range(count * size, (count + 1) * size):
+                f.p[j] *= f.radius[count] / math.sqrt(square)
+        f.inertia[count] = tangent_inertia(f.rows, count * size, size)
+        count += 1
+    return count
+
+
+@kernel
+def _before(state, i, begin):
+    """The contact of the step before with the shapes and feature of contact i, −1 = none. Order mostly lasts."""
+    now, before, total = state.contacts, state.previous, state.contact_count[1]
+    for k in range(total):
+        j = begin + k if begin + k < total else begin + k - total
+        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
+                and now.feature[i] == before.feature[j]):
+            return j
+    return -1
+
+
+@kernel
+def _gather_row(world, state, j, r, i, tangent):
+    """Row j of J L⁻ᵀ and the slip along it: contact i, number r of those that rub, along one of its tangents."""
+    f, lower, row, x = state.step_friction, state.lower, state.row, load(state.contacts.point, i)
+    width = f.rows.shape[1] // 2
+    f.rows[j] = 0.0
+    f.slip[j] = 0.0
+    for side in range(2):
+        if f.tree[r, side] >= 0:
+            row[world.tree_start[f.tree[r, side]] : world.tree_stop[f.tree[r, side]]] = 0.0
+    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, tangent, 1.0, row)
+    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, tangent, -1.0, row)
+    for side in range(2):
+        tree = f.tree[r, side]
+        if tree < 0:
+            continue
+        start = world.tree_start[tree]
+        for k in range(start, world.tree_stop[tree]):
+            f.slip[j] += row[k] * state.v[k]
+            entry = row[k]
+            for h in range(start, k):
+                entry -= lower[k, h] * f.rows[j, side * width + h - start]
+            f.rows[j, side * width + k - start] = entry / lower[k, k]
+
+
+@kernel
+def _start(world, state, count):
+    """Start from the impulses of the step before where they take energy, else from none; `moved` goes with p."""
+    f, size = state.step_friction, state.step_friction.velocity.shape[0]
+    f.moved[:] = 0.0
+    for r in range(count):
+        _fetch(world, f, r)
+        for j in range(r * size, (r + 1) * size):
+            for k in range(f.local.shape[0]):
+                f.local[k] += f.p[j] * f.rows[j, k]
+        _give_back(world, f, r)
+    if along(f.p[: count * size], f.slip) + 0.5 * along(f.moved, f.moved) > 0.0:
+        f.p[: count * size] = 0.0
+        f.moved[:] = 0.0
+
+
+@kernel
+def _fetch(world, f, r):
+    """local ← what contact r touches of `moved`."""
+    width = f.local.shape[0] // 2
+    f.local[:] = 0.0
+    for side in range(2):
+        tree = f.tree[r, side]
+        if tree >= 0:
+            for k in range(world.tree_start[tree], world.tree_stop[tree]):
+                f.local[side * width + k - world.tree_start[tree]] = f.moved[k]
+
+
+@kernel
+def _give_back(world, f, r):
+    """`moved` ← local."""
+    width = f.local.shape[0] // 2
+    for side in range(2):
+        tree = f.tree[r, side]
+        if tree >= 0:
+            for k in range(world.tree_start[tree], world.tree_stop[tree]):
+                f.moved[k] = f.local[side * width + k - world.tree_start[tree]]
+
+
+@kernel
+def _sweep(world, state, count):
+    """Sweep p, contact by contact, until a sweep moves nothing; `moved` follows."""
+    f, size, fastest = state.step_friction, state.step_friction.velocity.shape[0], 0.0
+    for j in range(count * size):
+        fastest = max(fastest, abs(f.slip[j]))
+    still = STILL * fastest
+    for _ in range(SWEEPS):
+        fastest = 0.0
+        for r in range(count):
+            if f.inertia[r] > 0.0:
+                _fetch(world, f, r)
+                moves = slide(f.rows, f.slip, f.radius[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
+                _give_back(world, f, r)
+                fastest = max(fastest, moves)
+        if fastest <= still:
+            break
