@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from verification.hard_cases import bodies, friction, mechanical, motions, numerical, shared_problems
+from verification.hard_cases import (
+    bodies,
+    friction,
+    mechanical,
+    motions,
+    numerical,
+    shared_problems,
+    sticking,
+)
 from verification.hard_cases.case import AnyCase
 
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
@@ -51,6 +59,9 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         friction.sliding_threshold,
         friction.creep_of_the_regularised_law,
         friction.painleve_rod,
+        sticking.nudged_box,
+        sticking.box_on_a_slope,
+        sticking.stack_on_a_slope,
         motions.chatter,
         shared_problems.two_balls_and_a_wall,
     )

@@ -45,12 +45,10 @@ def case_of() -> Callable[[str], AnyCase]:
     return make
 
 
-# Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain, and (6) creeps.
+# Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain.
 BEYOND_US = {
     "wall_far_beyond_the_bound": "gains energy",
     "touching_cradle": "gains energy",
-    "sticking_threshold": "wrong motion",
-    "sliding_threshold": "wrong motion",
 }
 LARGEST_FAULT = 0.1
 

@@ -1,0 +1,113 @@
+"""What friction must hold: a nudged box that stops, a box and a stack of boxes that stick on a slope.
+
+A friction force held over a step drives what it should stop: (6) of the paper is an explicit damper μ N / v_threshold,
+unstable from μ N Δt = 2 m v_threshold on. Here μ N Δt / (m v_threshold) is 4.9 for one box at the default threshold.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from iapb.run import Run
+from iapb.scene import Scene, scene_from_text
+from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain
+
+_G, _MU, _RATE = 9.81, 0.5, 1000.0
+_ENGINE = ("IAPB", "PB", "IAPB-friction")
+# Width and height [m], stiffness [N/m]. A stack of slabs swings on its springs without slipping.
+_BOX, _SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
+_LONG = 10.0  # [s]
+_SECOND_ORDER = 0.02  # of the lean, for each box: a contact is midway in the overlap, a hundredth of its lever off
+
+_HEAD = """
+name: {name}
+title: {title}
+source: textbook
+rate: {rate}
+duration: {duration}
+gravity: [{along!r}, {down!r}]
+bodies:
+{bodies}
+walls:
+  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+contact: {{stiffness: {stiffness}, damping: 50, friction: {mu}, coherence_distance: 2e-3}}
+"""
+_BODY = """  - {{name: box_{k}, joint: planar, mass: 1.0, inertia: {inertia!r}, position: [0, {y!r}, 0],
+     velocity: [{v}, 0, 0], shapes: [{{kind: box, size: [{w}, {h}]}}]}}"""
+
+
+def _boxes(
+    name: str, title: str, count: int, sort: tuple[float, float, float], slope: float, speed: float
+) -> Scene:
+    """Boxes of 1 kg on one another on a slope [rad], each sunk in by the weight that it carries."""
+    (width, height, stiffness), level, boxes = sort, 0.0, []
+    for k in range(count):
+        level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
+        boxes.append(_BODY.format(k=k, inertia=(width**2 + height**2) / 12.0, y=level - 0.5 * height, v=speed,
+                                 w=width, h=height))  # fmt: skip
+    return scene_from_text(_HEAD.format(
+        name=name, title=title, rate=_RATE, duration=_LONG, along=_G * math.sin(slope), down=-_G * math.cos(slope),
+        bodies="\n".join(boxes), stiffness=stiffness, mu=_MU))  # fmt: skip
+
+
+def nudged_box() -> TrajectoryCase:
+    """A box nudged at 0.2 m/s along a flat floor."""
+    speed = 0.2
+    way, stopped = speed**2 / (2.0 * _MU * _G), speed / (_MU * _G)
+
+    def measure(run: Run) -> Measured:
+        """Largest distance from the place where it must stop, from a tenth of a second after that on.
+
+        A first-order step is ahead or behind by at most the way of one step.
+        """
+        x = run.q[run.time > stopped + 0.1, 0]
+        return Measured(largest_gain(run), NO_GAIN, float(np.abs(x - way).max()) / way, speed * run.dt / way)
+
+    return TrajectoryCase(
+        "Nudged box", "Coulomb's law; the box of a first scene of one's own",
+        "a friction force that is held over a step turns the motion round, and drives the box across the floor",
+        "it stops where Coulomb's law says, and stays there",
+        f"Coulomb's law in closed form: v²/(2 μ g) = {1e3 * way:.4g} mm",
+        _boxes("nudged_box", "A nudged box", 1, _BOX, 0.0, speed), measure, _ENGINE,
+    )  # fmt: skip
+
+
+def box_on_a_slope() -> TrajectoryCase:
+    """One box on 20 degrees, for ten seconds."""
+    return _sticking("Box that sticks on a slope", "box_on_a_slope", 1, _BOX)
+
+
+def stack_on_a_slope() -> TrajectoryCase:
+    """Three slabs on one another on 20 degrees, for ten seconds."""
+    return _sticking("Stack that sticks on a slope", "stack_on_a_slope", 3, _SLAB)
+
+
+def _sticking(title: str, name: str, count: int, sort: tuple[float, float, float]) -> TrajectoryCase:
+    slope = math.radians(20.0)
+    leans = _lean(count, sort, slope)
+
+    def measure(run: Run) -> Measured:
+        """Distance of the upper box from where its springs let it lean, at the end, as a share of the lean."""
+        off = abs(float(run.q[-1, 3 * (count - 1)]) - leans)
+        return Measured(largest_gain(run), NO_GAIN, off / leans, _SECOND_ORDER * count)
+
+    return TrajectoryCase(
+        title, "Coulomb's law; springs of (5)",
+        "a contact that sticks must not creep; normal and friction forces are coupled by levers",
+        f"it leans on its springs by {1e6 * leans:.3g} μm, and stays",
+        "no contact slips: tan 20° < μ; the springs of each pair of faces turn by the moment that they carry",
+        _boxes(name, title, count, sort, slope, 0.0), measure, _ENGINE,
+    )  # fmt: skip
+
+
+def _lean(count: int, sort: tuple[float, float, float], slope: float) -> float:
+    """How far the centre of the upper box moves down the slope where nothing slips [m], to first order.
+
+    Faces k carry the moment g sin(slope) h (n − k)² / 2 of the boxes above and turn by it over K w² / 2; the centre of
+    the upper box is (n − 1 − k) h + h / 2 above them.
+    """
+    width, height, stiffness = sort
+    turns = [_G * math.sin(slope) * height * (count - k) ** 2 / (stiffness * width**2) for k in range(count)]
+    return sum(turn * height * (count - k - 0.5) for k, turn in enumerate(turns))
