@@ -265,7 +265,7 @@ def contact_damping(question: Question) -> Effect:
 
 
 def friction(question: Question) -> Effect:
-    """Modified Coulomb friction (6)."""
+    """Friction at resting contacts: Coulomb's law, or (6)."""
     value = question.scene.contact.friction
     active, reason = _valued(question, FRICTION, "friction", value, "")
     return Effect("friction", active, reason, "bodies would slide along each other without loss")
