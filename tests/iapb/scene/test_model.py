@@ -96,6 +96,7 @@ REFUSED: list[tuple[str, list[Any]]] = [
     ("contact.damping", NEGATIVE),
     ("contact.penalty", ["soft", None, True]),
     ("contact.friction", NEGATIVE),
+    ("contact.friction_law", ["dry", "Coulomb", None, True]),
     ("contact.friction_velocity", NOT_POSITIVE),
     ("contact.restitution", [*NEGATIVE, 1.001, -1.0]),
     ("contact.approach_velocity", NEGATIVE),

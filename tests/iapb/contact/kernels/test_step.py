@@ -34,7 +34,8 @@ bodies:
 {''.join(body(k) for k in range(6))}
 walls:
   - {{name: floor, kind: half_space, point: [0, 0, -0.3], normal: [0.1, 0, 1]}}
-contact: {{stiffness: {K}, damping: {B}, friction: {MU}, friction_velocity: {THRESHOLD}, restitution: {E},
+contact: {{stiffness: {K}, damping: {B}, friction: {MU}, friction_law: regularised,
+          friction_velocity: {THRESHOLD}, restitution: {E},
           approach_velocity: {SLOW}, self_collision_rows: {rows}}}
 """))
 
