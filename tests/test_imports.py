@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("iapb", "reference", "verification", "reports")
 # Groups of modules that import each other, and imports of our own modules inside functions. Both may only fall: to 0,
 # and below 40 that keep heavy libraries out of commands that need none of them.
-CYCLES, LATE_IMPORTS = 1, 71
+CYCLES, LATE_IMPORTS = 0, 71
 HEAVY = ("pinocchio", "coal", "cvxpy", "sympy", "flint", "matplotlib", "h5py", "numba", "scipy", "viser", "quantecon")
 
 

@@ -5,11 +5,15 @@ One file per claim. `check_claims` runs them; `CLAIMS` has them by id.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 
+from iapb.errors import ArgumentError
+from iapb.names import one_of
 from verification.claims.claim import Claim
-from verification.claims.study import Study, check_claims
-from verification.finding import VERDICTS, Column, Finding, Table
+from verification.claims.study import Asked, Runner, Study, run_directly
+from verification.finding import VERDICTS, Column, Failure, Finding, Table, attempt, with_failures
 
 _FILES = (
     "c01_one_collision",
@@ -40,3 +44,42 @@ CLAIMS: dict[str, Claim] = {
 }
 
 __all__ = ["CLAIMS", "VERDICTS", "Claim", "Column", "Finding", "Study", "Table", "check_claims"]
+
+
+def check_claims(
+    run: Runner = run_directly,
+    depth: str = "quick",
+    ids: Sequence[str] | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+    asked: Asked | None = None,
+) -> tuple[Finding, ...]:
+    """Check the paper's claims and return one finding each; what raises is among the failures of its claim.
+
+    Parameters
+    ----------
+    run : (scene, world, rendering) -> Run, called once per different simulation
+    depth : "quick" (about a minute) or "full"
+    ids : the claims to check; default all
+    progress : called as progress(claims done, claims in all, id of the next)
+    asked : called as asked(scene, world, rendering) whenever a claim uses a run, also one made for an earlier claim
+
+    Raises
+    ------
+    ArgumentError
+        An unknown depth or claim.
+    """
+    unknown = [name for name in ids or () if name not in CLAIMS]
+    if unknown:
+        raise ArgumentError("ids", unknown, one_of(unknown[0], CLAIMS, "some of "))
+    chosen = tuple(CLAIMS) if ids is None else tuple(ids)
+    study, results = Study(run, depth, asked=asked), []
+    for done, name in enumerate(chosen):
+        if progress is not None:
+            progress(done, len(chosen), name)
+        failures: list[Failure] = []
+        study.failures = failures
+        result = attempt(name, partial(CLAIMS[name].check, study), failures) or CLAIMS[name].not_computed()
+        results.append(with_failures(result, failures))
+    if progress is not None:
+        progress(len(chosen), len(chosen), "")
+    return tuple(results)

@@ -10,15 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, TypeVar, cast
 
-from iapb.errors import ArgumentError
-from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.claims.conditions import Condition, drawn, limited_conditions, start_conditions
-from verification.finding import Failure, Finding, Region, attempt, check_depth, of_each, with_failures
+from verification.finding import Failure, Region, check_depth, of_each
 from verification.scenes.trace import Trace, trace_of
 
 Case = TypeVar("Case")
@@ -110,44 +107,3 @@ class Study:
     def each(self, cases: Iterable[Case], trials: Callable[[Case], Iterable[Result]]) -> Iterator[Result]:
         """Yield the trials of each case; a case that raises is among the `failures`, where there is such a list."""
         return of_each(cases, trials, self.failures)
-
-
-def check_claims(
-    run: Runner = run_directly,
-    depth: str = "quick",
-    ids: Sequence[str] | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
-    asked: Asked | None = None,
-) -> tuple[Finding, ...]:
-    """Check the paper's claims and return one finding each; what raises is among the failures of its claim.
-
-    Parameters
-    ----------
-    run : (scene, world, rendering) -> Run, called once per different simulation
-    depth : "quick" (about a minute) or "full"
-    ids : the claims to check; default all
-    progress : called as progress(claims done, claims in all, id of the next)
-    asked : called as asked(scene, world, rendering) whenever a claim uses a run, also one made for an earlier claim
-
-    Raises
-    ------
-    ArgumentError
-        An unknown depth or claim.
-    """
-    from verification.claims import CLAIMS
-
-    unknown = [name for name in ids or () if name not in CLAIMS]
-    if unknown:
-        raise ArgumentError("ids", unknown, one_of(unknown[0], CLAIMS, "some of "))
-    chosen = tuple(CLAIMS) if ids is None else tuple(ids)
-    study, results = Study(run, depth, asked=asked), []
-    for done, name in enumerate(chosen):
-        if progress is not None:
-            progress(done, len(chosen), name)
-        failures: list[Failure] = []
-        study.failures = failures
-        result = attempt(name, partial(CLAIMS[name].check, study), failures) or CLAIMS[name].not_computed()
-        results.append(with_failures(result, failures))
-    if progress is not None:
-        progress(len(chosen), len(chosen), "")
-    return tuple(results)
