@@ -17,8 +17,7 @@ from reference.fclib import write_fclib
 from reports.commands.progress import stage_progress
 from verification.complementarity.findings import parts_of
 from verification.complementarity.findings import problems as problem_parts
-from verification.complementarity.own_problems import own_problems
-from verification.complementarity.problem_study import FACTORS, ProblemStudy, study_problems
+from verification.complementarity.problems import FACTORS, ProblemStudy, own_problems, study_problems
 from verification.complementarity.study import ComparisonStudy
 from verification.complementarity.study import compare as study_all
 from verification.cost.step_cost import CostRow

@@ -14,7 +14,7 @@ TOPICS: dict[str, str] = {
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
     "stability": "verification.stability.contact_stability:contact_stability",
-    "complementarity": "reports.evidence.complementarity:compute",
+    "complementarity": "verification.complementarity.complementarity:complementarity",
     "engines": "verification.engines.verdict:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",

@@ -11,17 +11,16 @@ import pytest
 
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
-from reports.evidence import complementarity, complementarity_tables
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
 from reports.figures.style import VARIABLES
 from reports.runner import Runner
-from verification.complementarity.agreement import compare_cases
-from verification.complementarity.agreement_map import agreement_map, two_contact_map
+from verification.complementarity import complementarity, tables
+from verification.complementarity.agreement import agreement_map, compare_cases, two_contact_map
 from verification.complementarity.cases import random_cases
 from verification.complementarity.convergence import ConvergenceRow
 from verification.complementarity.extensions import compare_friction, compare_unequal, struck_bar
-from verification.complementarity.problem_study import study_read
+from verification.complementarity.problems import study_read
 from verification.complementarity.study import OWN, ComparisonStudy
 from verification.cost.step_cost import LEMKE_KERNEL, WAYS, CostRow, StepCostRow, impact_cost
 from verification.finding import VERDICTS, Table, titled
@@ -49,7 +48,7 @@ def study() -> ComparisonStudy:
 
 @pytest.fixture(scope="module")
 def figures(study: ComparisonStudy) -> dict[str, Figure]:
-    inputs = {f"{complementarity.ID}/{name}": table for name, table in complementarity_tables.all_tables(study).items()}
+    inputs = {f"{complementarity.ID}/{name}": table for name, table in tables.all_tables(study).items()}
     drawn = {recipe.key: draw(recipe, inputs) for recipe in RECIPES if recipe.section == complementarity.ID}
     assert all(isinstance(figure, Figure) for figure in drawn.values())
     return drawn  # type: ignore[return-value]
@@ -73,7 +72,7 @@ def test_what_was_not_solved_is_in_the_table_and_in_the_legend(figures: dict[str
 
 
 def test_rows_have_as_many_cells_as_columns_and_no_number_is_missing(study: ComparisonStudy) -> None:
-    for name, table in complementarity_tables.all_tables(study).items():
+    for name, table in tables.all_tables(study).items():
         assert all(len(row) == len(table.columns) for row in table.rows), name
         assert not any(isinstance(cell, float) and np.isnan(cell) for row in table.rows for cell in row), name
 
@@ -87,7 +86,7 @@ def test_a_profile_ends_at_the_share_that_was_solved(study: ComparisonStudy, fig
 
 
 def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
-    table: Table = complementarity_tables.worlds(Runner(tmp_path), {"duration": 0.05})
+    table: Table = tables.worlds(Runner(tmp_path), {"duration": 0.05})
     laws = {row[0]: row[1] for row in table.rows}
     assert set(laws) >= {"ideal", "IAPB", "PB", "CBuc"} and all(laws.values())
     assert laws["IAPB"] != laws["PB"] != laws["ideal"]
@@ -96,8 +95,8 @@ def test_a_run_of_any_world_states_its_contact_law(tmp_path: Path) -> None:
 
 def test_the_topic_is_made_of_judged_sentences(study: ComparisonStudy, monkeypatch: pytest.MonkeyPatch,
                                                tmp_path: Path) -> None:  # fmt: skip
-    monkeypatch.setattr("verification.complementarity.study.compare", lambda *arguments, **options: study)
-    monkeypatch.setattr(complementarity_tables, "worlds", lambda runner, failures: titled(("world",), ()))
-    topic = complementarity.compute(Runner(tmp_path), "quick", lambda done, total: None)
+    monkeypatch.setattr(complementarity, "compare", lambda *arguments, **options: study)
+    monkeypatch.setattr(tables, "worlds", lambda runner, failures: titled(("world",), ()))
+    topic = complementarity.complementarity(Runner(tmp_path), "quick", lambda done, total: None)
     assert len(topic.parts) >= 10 and {part.verdict for part in topic.parts} <= set(VERDICTS)
     assert topic.answer and "profile" in topic.tables and str(Path.home()) not in repr(topic)

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Family:
+class Geometry:
     """A geometry: draw(rng, redundancy) -> (M, J, v), and the redundancies that it can have."""
 
     name: str
@@ -155,16 +155,16 @@ def _rows_that_touch(rng: np.random.Generator, redundancy: int) -> tuple[Floats,
     return mass, np.vstack([rows, row]), velocity
 
 
-FAMILIES: dict[str, Family] = {
+FAMILIES: dict[str, Geometry] = {
     family.name: family
     for family in (
-        Family("one contact", "a single contact, also given several times", _one_contact, (0, 1, 4)),
-        Family("cradle", "balls in a row, neighbours close", _cradle, (0,)),
-        Family("obtuse normals", "rows with cosines <= 0 in the kinetic metric", _obtuse, (0,)),
-        Family("face on floor", "a box lands on points of one face", _face_on_floor, (0, 1, 2, 6)),
-        Family("corner", "a box strikes floor and wall at once", _corner, (0, 1, 2, 6)),
-        Family("tight hole", "a peg strikes end and sides of a hole", _hole, (1, 3, 7)),
-        Family("random rows", "normals in all directions", _random_rows, (0, 1, 4)),
-        Family("with a neighbour", "random rows beside a contact that touches", _rows_that_touch, (0, 4)),
+        Geometry("one contact", "a single contact, also given several times", _one_contact, (0, 1, 4)),
+        Geometry("cradle", "balls in a row, neighbours close", _cradle, (0,)),
+        Geometry("obtuse normals", "rows with cosines <= 0 in the kinetic metric", _obtuse, (0,)),
+        Geometry("face on floor", "a box lands on points of one face", _face_on_floor, (0, 1, 2, 6)),
+        Geometry("corner", "a box strikes floor and wall at once", _corner, (0, 1, 2, 6)),
+        Geometry("tight hole", "a peg strikes end and sides of a hole", _hole, (1, 3, 7)),
+        Geometry("random rows", "normals in all directions", _random_rows, (0, 1, 4)),
+        Geometry("with a neighbour", "random rows beside a contact that touches", _rows_that_touch, (0, 4)),
     )
 }

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
 from verification.complementarity.agreement import REPRODUCED as CONE_TOLERANCE
-from verification.complementarity.agreement import SAME
-from verification.complementarity.agreement_map import MapCell
+from verification.complementarity.agreement import SAME, MapCell
 from verification.complementarity.convergence import CASES, WITHOUT_TRUTH
 from verification.complementarity.extensions import GAIN
-from verification.complementarity.problem_study import ProblemStudy
+from verification.complementarity.problems import ProblemStudy
 from verification.complementarity.study import ComparisonStudy
 from verification.cost.step_cost import (
     IAPB,
@@ -38,6 +38,8 @@ from verification.finding import (
 C05_TOLERANCE = 1e-12
 # Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9
+# Engine and references: sums of some dozens of products, of entries of size one.
+SAME_MECHANICS = 1e-12
 # Two solvers' outcomes of one law: ten times the residual that `reference.complementarity.laws` accepts.
 SAME_LAW = 1e-8
 
@@ -142,6 +144,44 @@ def touching(study: ComparisonStudy) -> Part | None:
         f"impacts by IAPB and "
         f"in {theirs:.0f} % by the LCP on the same rows.",
         _by_share(1.0 - float(np.mean([c.left_approaching for c in cells]))), "touching")  # fmt: skip
+
+
+def piles(study: ComparisonStudy) -> Part | None:
+    """Where assumption (i) fails."""
+    if not study.piles:
+        return None
+    agree = [row for row in study.piles if row.agrees]
+    limit = max((row.contacts for row in agree), default=0)
+    beyond = [row for row in study.piles if row.contacts > limit] or list(study.piles)
+    against = sum(row.asked is not None and row.asked != row.agrees for row in study.piles)
+    own = [row for row in study.piles if not row.name.startswith("recorded")]
+    return Part(
+        f"Dense piles, every colliding row an equality: some p >= 0 gives the motion of (21) in {len(agree)} of "
+        f"{len(study.piles)} impacts, none of them with more than {limit} contacts: stop using (19) where more collide "
+        f"at once. There {100 * np.mean([row.pulling for row in beyond]):.0f} % of the impulses pull, and the motion "
+        f"is {np.median([row.distance for row in beyond]):.2g} |v⁻| (median) from the LCP's. Non-negative least "
+        f"squares contradicts this in {against} impacts. Impulses that only push (method \"poisson\", world IAPB-push) "
+        f"are the LCP's to {max(row.lcp for row in own):.0e} on our own piles, to "
+        f"{max(row.lcp for row in study.piles):.0e} on all, and change the energy by at most "
+        f"{max(row.gain for row in study.piles):.0e} KE⁻.",
+        verdict_of_trials([row.agrees for row in study.piles]), "piles")  # fmt: skip
+
+
+def references(study: ComparisonStudy) -> Part | None:
+    """The references on their own feet."""
+    rows = study.differences
+    if not rows:
+        return None
+    mass, inner, gap = (max(rows, key=attrgetter(name)) for name in ("mass_matrix", "inner_forces", "gap"))
+    apart = sum(row.apart for row in rows)
+    return Part(
+        f"The references compute M and B + G by Pinocchio and contacts in closed form. On {len(rows)} scenes the "
+        f"engine's differ by at most {mass.mass_matrix:.0e} ({mass.scene}) and {inner.inner_forces:.0e} "
+        f"({inner.scene}) of the largest "
+        f"entry, gaps by {gap.gap:.0e} m ({gap.scene}); {apart} of {sum(row.configurations for row in rows)} "
+        "configurations have other contacts, as where two faces tie.",
+        _all(max(row.mass_matrix, row.inner_forces, row.gap) <= SAME_MECHANICS for row in rows),
+        "references")  # fmt: skip
 
 
 def friction(study: ComparisonStudy) -> Part | None:
@@ -253,6 +293,12 @@ def problems(study: ProblemStudy) -> tuple[Part, ...]:
         f"contact velocities to {smooth:.0e} (impulses are not unique and not compared)"
         + (f"; with friction, where Coulomb's law leaves even velocities open, to {rough:.0e}." if rough else "."),
     ]
+    alone = [f"{line.problem} ({solved[0]})" for line in study.lines
+             if len(solved := [name for name, verdict in line.verdicts if verdict == "solved"]) == 1]  # fmt: skip
+    if alone:
+        found.append(f"Solved by one solver only: {', '.join(alone)}.")
+    if study.unread:
+        found.append(f"Not read: {'; '.join(file.reason for file in study.unread)}.")
     if skew:
         found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
     # who is asked at all depends on how long he took before
@@ -292,6 +338,6 @@ def _by_share(share: float) -> str:
 # In the order of the report.
 PARTS: dict[str, Callable[[ComparisonStudy], Part | None]] = {
     make.__name__: make
-    for make in (single_contact, wider_class, two_contacts, difference, energy, scenes, touching, friction, unequal,
-                 ideal_world, cost, steps)
+    for make in (single_contact, wider_class, two_contacts, difference, energy, scenes, touching, piles, friction,
+                 unequal, ideal_world, references, cost, steps)
 }  # fmt: skip

@@ -10,9 +10,15 @@ from pathlib import Path
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import Run
-from iapb.scene import Scene, scene_names
-from verification.complementarity.agreement import Comparison, compare_cases
-from verification.complementarity.agreement_map import MapCell, TwoContactCell, agreement_map, two_contact_map
+from iapb.scene import Scene, find_scene, load_scene, scene_names
+from verification.complementarity.agreement import (
+    Comparison,
+    MapCell,
+    TwoContactCell,
+    agreement_map,
+    compare_cases,
+    two_contact_map,
+)
 from verification.complementarity.cases import random_cases
 from verification.complementarity.convergence import CASES, ConvergenceRow, converge
 from verification.complementarity.extensions import (
@@ -22,11 +28,12 @@ from verification.complementarity.extensions import (
     compare_unequal,
     struck_bar,
 )
-from verification.complementarity.own_problems import own_problems
-from verification.complementarity.problem_study import ProblemStudy, study_problems, study_read
+from verification.complementarity.piles import PileRow, compare_piles
+from verification.complementarity.problems import ProblemStudy, own_problems, study_problems, study_read
 from verification.complementarity.scene_cases import impacts_of_run, scene_impacts
 from verification.cost.step_cost import CONTACTS, CostRow, StepCostRow, impact_cost, world_cost
-from verification.finding import Failure, attempt
+from verification.finding import Failure, attempt, of_each
+from verification.mechanics.engine_differences import SceneDifference, scene_difference
 
 Progress = Callable[[str, int, int], None]
 
@@ -57,6 +64,7 @@ DEPTHS = {
     "quick": Depth(25, 40, 100, CONTACTS, 3, 0.4, QUICK_TRUTHS),
     "full": Depth(250, 300, 1000, CONTACTS, 7, 60.0, None),
 }
+CONFIGURATIONS = 20  # of each scene, at which the engine and the references are compared
 OWN = "own problems"  # name of the collection that is always there
 
 
@@ -70,6 +78,7 @@ class ComparisonStudy:
     friction, unequal, bar : the engine's extensions beside their complementarity counterparts
     convergence : of the rigid world to event-driven truth, scene by scene
     impact_costs, step_costs : C22; problems : our own collection, and folders of problem files
+    piles : dense piles, (21) beside impulses that only push; differences : the engine beside the references
     failures : the cases that raised, which are in nothing else
     """
 
@@ -86,6 +95,8 @@ class ComparisonStudy:
     impact_costs: tuple[CostRow, ...]
     step_costs: tuple[StepCostRow, ...]
     problems: tuple[ProblemStudy, ...] = ()
+    piles: tuple[PileRow, ...] = ()
+    differences: tuple[SceneDifference, ...] = ()
     failures: tuple[Failure, ...] = ()
 
 
@@ -113,7 +124,7 @@ def compare(
     """
     if depth not in DEPTHS:
         raise ArgumentError("depth", depth, one_of(depth, DEPTHS))
-    size, say = DEPTHS[depth], progress or (lambda stage, done, total: None)
+    size, say, folders = DEPTHS[depth], progress or (lambda stage, done, total: None), tuple(folders)
     failures: list[Failure] = []
     comparisons = _random_comparisons(size.cases, say, failures)
     scene_cells, left_out = compare_scenes(scenes, say, failures)
@@ -131,8 +142,14 @@ def compare(
         problems=(study_read(OWN, own_problems(failures), longest=size.longest, progress=say, failures=failures),
                   *(study_problems(folder, longest=size.longest, progress=say, failures=failures)
                     for folder in folders)),
+        piles=compare_piles(depth, folders, failures=failures),
+        differences=tuple(of_each(scene_names() if scenes is None else scenes, _difference, failures)),
     )  # fmt: skip
     return replace(found, failures=tuple(failures))
+
+
+def _difference(scene: str) -> tuple[SceneDifference]:
+    return (scene_difference(load_scene(find_scene(scene)), CONFIGURATIONS),)
 
 
 def _convergence(size: Depth, say: Progress, failures: list[Failure]) -> tuple[ConvergenceRow, ...]:

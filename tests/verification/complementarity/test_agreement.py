@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError
-from verification.complementarity.agreement import SAME, compare_case, compare_cases, iapb
-from verification.complementarity.agreement_map import agreement_map, contradicts, two_contact_map
+from reference.complementarity.problem import ImpactProblem
+from reference.fclib import write_fclib
+from verification.complementarity.agreement import (
+    SAME,
+    agreement_map,
+    compare_case,
+    compare_cases,
+    contradicts,
+    iapb,
+    two_contact_map,
+)
 from verification.complementarity.cases import FAMILIES, random_cases, two_contacts
+from verification.complementarity.piles import compare_piles, recorded_piles
 from verification.impacts import ImpactCase
 
 CASES = list(random_cases(6, seed=11))
@@ -72,3 +84,24 @@ def test_a_resolver_that_clips_its_impulses_is_found_out() -> None:
 def test_unknown_families_are_refused() -> None:
     with pytest.raises(ArgumentError, match="families"):
         list(random_cases(1, families=("spheres",)))
+
+
+def test_piles_agree_only_where_they_are_small_and_pushing_is_the_lcp() -> None:
+    rows = compare_piles(spheres=(4, 16))
+    small, large = ([row for row in rows if row.name.startswith(f"{n} spheres")] for n in (4, 16))
+    assert any(row.agrees for row in small) and not any(row.agrees for row in large)
+    assert all(row.asked == row.agrees for row in rows)
+    assert max(row.lcp for row in rows) <= 1e-12 and max(row.gain for row in rows) <= 0.0
+    assert all(row.pulling > 0.0 for row in large) and any(row.redundant > 0 for row in large)
+
+
+def test_recorded_piles_are_their_normal_rows(tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).normal(size=(60, 12))
+    write_fclib(tmp_path / "pile.hdf5", ImpactProblem.from_delassus(rows @ rows.T, rows @ np.ones(12), 0.0, 0.4))
+    (tmp_path / "broken.lcp").write_text("3 1 2")
+    (case,) = recorded_piles(tmp_path, 100)
+    assert case.contacts == 20 and case.family == "recorded: pile.hdf5"
+    normals = case.contact_jacobian
+    assert normals @ normals.T == pytest.approx((rows @ rows.T)[::3, ::3])
+    assert normals @ case.velocity == pytest.approx((rows @ np.ones(12))[::3])
+    assert not list(recorded_piles(tmp_path, 19))

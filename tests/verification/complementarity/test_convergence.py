@@ -14,8 +14,14 @@ from iapb.system import System
 from reference.scene_events import COMPUTATIONS, scene_truth
 from reference.time_stepping import RigidConstraints
 from verification.complementarity import convergence
-from verification.complementarity.convergence import CASES, WITHOUT_TRUTH, TruthCase, converge, scene_of
-from verification.complementarity.truth_scenes import TRUTH_SCENES
+from verification.complementarity.convergence import (
+    CASES,
+    TRUTH_SCENES,
+    WITHOUT_TRUTH,
+    TruthCase,
+    converge,
+    scene_of,
+)
 
 BY_SCENE = {case.scene: case for case in CASES}
 EVENTS = {

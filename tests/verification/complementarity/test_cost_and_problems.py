@@ -11,7 +11,7 @@ from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.fclib import write_fclib
 from verification.complementarity.findings import problems
-from verification.complementarity.problem_study import FACTORS, study_problems
+from verification.complementarity.problems import FACTORS, study_problems
 from verification.cost import step_cost
 from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
 
@@ -54,7 +54,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     assert study.lines[1].asymmetry > 0.1 and dict(study.lines[1].verdicts)["daqp"] == "refused"
     assert dict(study.lines[1].verdicts)["lemke"] == "solved"
     text = " ".join(part.sentence for part in problems(study))
-    assert "1 files not" in text and "skew.lcp" in text
+    assert "1 files not" in text and "skew.lcp" in text and "Not read: damaged.lcp: 3 numbers, expected 13" in text
     assert all(share.shape == FACTORS.shape and (np.diff(share) >= 0.0).all() for _, _, share in study.profile)
     with pytest.raises(ArgumentError, match="folder"):
         study_problems(tmp_path / "nowhere")

@@ -12,10 +12,9 @@ import pytest
 from reference.complementarity import benchmark
 from verification.complementarity import (
     agreement,
-    agreement_map,
     extensions,
     findings,
-    own_problems,
+    problems,
     study,
 )
 from verification.cost import step_cost
@@ -40,10 +39,9 @@ def found() -> Iterator[study.ComparisonStudy]:
     depth = study.Depth(1, 2, 3, (1, 2), 1, 9.0, ("two_discs", "bernoulli_balls"))
     monkeypatch.setitem(study.DEPTHS, "quick", depth)
     case_breaks = breaks(agreement.compare_case, lambda case, *_: case.family == "cradle" and case.restitution == 0.5)
-    monkeypatch.setattr(agreement, "compare_case", case_breaks)
-    border_breaks = breaks(agreement.compare_case, lambda case, *_: case.contact_jacobian.tolist() == border)
-    border = agreement_map.two_contacts(-0.9, 0.05, np.random.default_rng(2)).contact_jacobian.tolist()
-    monkeypatch.setattr(agreement_map, "compare_case", border_breaks)
+    border = agreement.two_contacts(-0.9, 0.05, np.random.default_rng(2)).contact_jacobian.tolist()
+    border_breaks = breaks(case_breaks, lambda case, *_: case.contact_jacobian.tolist() == border)
+    monkeypatch.setattr(agreement, "compare_case", border_breaks)
     monkeypatch.setattr(study, "scene_impacts", breaks(study.scene_impacts, lambda name: name == "two_discs"))
     rough = breaks(extensions._friction_cell, lambda _, e, mu: (e, mu) == (0.5, 0.1))
     monkeypatch.setattr(extensions, "_friction_cell", rough)
@@ -55,10 +53,11 @@ def found() -> Iterator[study.ComparisonStudy]:
                         (step_cost.CONTACTS, ("daqp", "lemke"), *step_cost.impact_cost.__defaults__[2:]))
     monkeypatch.setattr(step_cost, "_seconds_per_step",
                         breaks(lambda *_: 1.0, lambda scene, way, _: (scene, way) == ("peg_hole", step_cost.IDEAL)))
-    monkeypatch.setattr(own_problems, "SCENES", ())
-    monkeypatch.setattr(own_problems, "HARD", ("grazing", "mass_ratio"))
-    monkeypatch.setattr(own_problems, "_hyperstatic", lambda: ())
-    monkeypatch.setattr(own_problems, "_with_friction", lambda: ())
+    monkeypatch.setattr(study, "compare_piles", lambda *_, **__: ())
+    monkeypatch.setattr(problems, "SCENES", ())
+    monkeypatch.setattr(problems, "HARD", ("grazing", "mass_ratio"))
+    monkeypatch.setattr(problems, "_hyperstatic", lambda: ())
+    monkeypatch.setattr(problems, "_with_friction", lambda: ())
     monkeypatch.setattr(benchmark, "solver_names",
                         breaks(lambda _: ("daqp",), lambda problem: problem.name == "hard case grazing"))
     yield study.compare(scenes=("two_discs", "newton_cradle"))

@@ -11,14 +11,14 @@ import pytest
 
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem
-from verification.complementarity.agreement import compare_cases
-from verification.complementarity.agreement_map import agreement_map, two_contact_map
+from verification.complementarity.agreement import agreement_map, compare_cases, two_contact_map
 from verification.complementarity.cases import random_cases
 from verification.complementarity.findings import PARTS, problems
-from verification.complementarity.own_problems import own_problems
-from verification.complementarity.problem_study import study_read
+from verification.complementarity.piles import PileRow
+from verification.complementarity.problems import own_problems, study_read
 from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
 from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.mechanics.engine_differences import SceneDifference
 
 FOUND = compare_cases(random_cases(3, seed=12))
 CELLS = agreement_map(FOUND)
@@ -55,6 +55,18 @@ def test_exact_statements_hold_and_one_exception_refutes_them() -> None:
 @pytest.mark.parametrize(("share", "expected"), [(1.0, REPRODUCED), (0.7, MIXED), (0.2, MIXED)])
 def test_shares_of_scene_impacts(share: float, expected: str) -> None:
     assert verdict("scenes", scenes=(replace(CELLS[0], agree=share),)) == expected
+
+
+def test_piles_say_where_to_stop_and_references_where_the_engine_differs() -> None:
+    row = PileRow("4 spheres", "approaching", 5, 0, 0.0, 0.0, 0.0, True, 1e-16, -0.5, 1e-4, 1e-4)
+    pulls = replace(row, contacts=30, distance=0.2, pulling=0.25, asked=False)
+    part = PARTS["piles"](SimpleNamespace(piles=(row, pulls, pulls)))  # type: ignore[arg-type]
+    assert part is not None and part.verdict == REFUTED
+    assert "in 1 of 3 impacts, none of them with more than 5 contacts: stop using (19)" in part.sentence
+    assert "25 % of the impulses pull" in part.sentence and "contradicts this in 0 impacts" in part.sentence
+    same = SceneDifference("peg_corner", 20, 0, 1e-15, 1e-15, 0.0, 0.0, 8, 0.0, 0.0, 1e-16, 0.0)
+    assert verdict("references", differences=(same,)) == REPRODUCED
+    assert verdict("references", differences=(same, replace(same, gap=1e-9))) == REFUTED
 
 
 def test_costs_are_told_apart_only_where_samples_do_not_overlap() -> None:

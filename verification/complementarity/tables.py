@@ -6,15 +6,20 @@ import json
 import math
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from reports.evidence.runs import shipped_scene
-from reports.runner import Runner
+import numpy as np
+
+from iapb.run import Run
+from iapb.scene import find_scene, load_scene
+from reference.complementarity.laws import LAWS
+from reference.complementarity.solvers import SOLVERS
+from reference.worlds import WORLDS
+from verification.complementarity.convergence import COARSE, FINE
+from verification.complementarity.piles import PileRow
+from verification.complementarity.problems import FACTORS, ProblemStudy
+from verification.complementarity.study import ComparisonStudy
 from verification.finding import Failure, Table, attempt, titled
-
-if TYPE_CHECKING:
-    from verification.complementarity.problem_study import ProblemStudy
-    from verification.complementarity.study import ComparisonStudy
 
 WORLD_SCENE = "peg_corner"
 SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
@@ -27,7 +32,8 @@ def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) ->
         "time per impact": partial(impact_costs, study), "time per step": partial(step_costs, study),
         "profile": partial(profile, study.problems), "convergence": partial(convergence, study),
         "friction": partial(friction, study), "unequal restitution": partial(unequal, study),
-        "struck bar": partial(bar, study), "laws": laws, "solvers": solvers,
+        "struck bar": partial(bar, study), "piles": partial(piles, study), "references": partial(references, study),
+        "laws": laws, "solvers": solvers,
     }  # fmt: skip
     makers |= {each.folder: partial(problems, each) for each in study.problems}
     made = {name: attempt(f"table {name}", make, failures) for name, make in makers.items()}
@@ -80,8 +86,6 @@ def step_costs(study: ComparisonStudy) -> Table:
 
 def profile(studies: Iterable[ProblemStudy]) -> Table:
     """Dolan and Moré's profile, in long form."""
-    from verification.complementarity.problem_study import FACTORS
-
     rows = tuple(
         (each.folder, kind, solver, float(factor), float(share))
         for each in studies for kind, solver, shares in each.profile
@@ -97,18 +101,18 @@ def problems(study: ProblemStudy) -> Table:
     for line in study.lines:
         by = dict(line.verdicts)
         rows.append((line.problem, line.unknowns, line.rank, line.asymmetry or None,
-                     *(by.get(name) for name in names), _known(line.spread), _known(line.stored)))  # fmt: skip
-    rows += [(file.file, None, None, None, *("not read" for _ in names), None, None) for file in study.unread]
+                     *(by.get(name) for name in names), _known(line.spread), _known(line.stored), None))  # fmt: skip
+    rows += [(file.file, None, None, None, *("not read" for _ in names), None, None, file.reason)
+             for file in study.unread]  # fmt: skip
     return titled(
-        ("problem", "unknowns", "rank", "asymmetry of W", *names, "spread of velocities", "residual as stored"),
+        ("problem", "unknowns", "rank", "asymmetry of W", *names, "spread of velocities", "residual as stored",
+         "why not read"),
         tuple(rows), 2, "Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. "
         "Spread: of contact velocities among those who solved it.", timed=("spread of velocities",))  # fmt: skip
 
 
 def convergence(study: ComparisonStudy) -> Table:
     """Errors of the rigid world, a row per scene and step."""
-    from verification.complementarity.convergence import COARSE, FINE
-
     rows = []
     for r in study.convergence:
         for rates, position, velocity in ((COARSE, r.position_coarse, r.velocity_coarse),
@@ -149,18 +153,46 @@ def bar(study: ComparisonStudy) -> Table:
                    "A bar struck at 0.5 and 0.4 of its length with e = 1 and e = 0.")  # fmt: skip
 
 
+def piles(study: ComparisonStudy) -> Table:
+    """Dense piles, a row per kind and choice of rows."""
+    groups: dict[tuple[str, str], list[PileRow]] = {}
+    for row in study.piles:
+        groups.setdefault((row.name, row.rows), []).append(row)
+    rows = tuple(
+        (name, given, len(found), float(np.mean([row.contacts for row in found])),
+         float(np.mean([row.redundant for row in found])), float(np.mean([row.agrees for row in found])),
+         float(np.mean([row.pulling for row in found])), float(np.mean([row.pulling_share for row in found])),
+         float(np.median([row.distance for row in found])), max(row.lcp for row in found),
+         1e6 * float(np.median([row.equality for row in found])),
+         1e6 * float(np.median([row.pushing for row in found])))
+        for (name, given), found in groups.items()
+    )  # fmt: skip
+    times = ("time of (21) [µs]", "time of pushing [µs]")
+    return titled(
+        ("pile", "rows", "piles", "contacts", "redundant", "share that agrees", "share of impulses that pull",
+         "negative share of p", "median distance from the LCP", "pushing from the LCP", *times), rows, 3,
+        "(21) on every row given, and impulses that only push (method \"poisson\"); e = 0; distances in the kinetic "
+        "metric, of |v⁻|. Agrees: some p >= 0 gives the motion of (21). Times from Python, checks included.",
+        timed=times)  # fmt: skip
+
+
+def references(study: ComparisonStudy) -> Table:
+    """The engine's mechanics and contacts beside the references'."""
+    rows = tuple((d.scene, d.configurations, d.apart, d.mass_matrix, d.inner_forces, d.frame_jacobian, d.contacts,
+                  d.gap, d.normal, d.row) for d in study.differences)  # fmt: skip
+    return titled(("scene", "configurations", "with other contacts", "M", "B + G", "frame Jacobians", "contacts",
+                   "gap [m]", "normal", "contact row"), rows, 2, "Largest differences: of M, B + G and Jacobians "
+                  "relative to the largest entry, of contacts as they are.")  # fmt: skip
+
+
 def laws() -> Table:
     """Impact laws by name."""
-    from reference.complementarity.laws import LAWS
-
     rows = tuple((law.name, law.statement, law.source, law.hypotheses, law.never_gains_energy) for law in LAWS.values())
     return titled(("law", "statement", "source", "hypotheses", "never gains energy under them"), rows)
 
 
 def solvers() -> Table:
     """Solvers by name."""
-    from reference.complementarity.solvers import SOLVERS
-
     takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
     rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
     note = ("Siconos is a package of the machine, asked through the system's Python; its time is that of its compiled "
@@ -169,17 +201,16 @@ def solvers() -> Table:
 
 
 def worlds(
-    runner: Runner, values: dict[str, Any] | None = None, failures: list[Failure] | None = None
+    run: Callable[..., Run], values: dict[str, Any] | None = None, failures: list[Failure] | None = None
 ) -> Table:
     """A run of every world, as its own file states its contact law and coupling; `values` change the scene."""
-    from reference.worlds import WORLDS
-
+    scene = load_scene(find_scene(WORLD_SCENE)).with_values(values or {})
     rows = []
     for world in WORLDS:
-        run = attempt(f"world {world}", lambda world=world: runner(  # type: ignore[misc]
-            shipped_scene(WORLD_SCENE, values), world, keep=False), failures)
-        if run is not None:
-            rows.append((world, run.law, _settings(run.law_settings), run.coupling, _settings(run.coupling_settings)))
+        done = attempt(f"world {world}", partial(run, scene, world, keep=False), failures)
+        if done is not None:
+            rows.append((world, done.law, _settings(done.law_settings), done.coupling,
+                         _settings(done.coupling_settings)))  # fmt: skip
     return titled(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
                    f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip
 

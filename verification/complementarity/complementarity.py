@@ -1,18 +1,16 @@
-"""Topic: what the three assumptions of IAPB buy against complementarity, and what they cost."""
+"""What the three assumptions of IAPB buy against complementarity, and what they cost."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from reports.evidence import complementarity_tables as tables
-from reports.runner import Runner
+from iapb.run import Run
+from verification.complementarity import tables
+from verification.complementarity.findings import parts_of
+from verification.complementarity.study import ComparisonStudy, compare
 from verification.finding import REPRODUCED, Finding, Part, finding_of
-
-if TYPE_CHECKING:
-    from verification.complementarity.study import ComparisonStudy
 
 ID, TITLE = "complementarity", "Against complementarity"
 LEAD = (
@@ -26,11 +24,8 @@ FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
 FOLDER_NAME = "problems of others"
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Compare, judge each sentence from the records, and keep what is behind it."""
-    from verification.complementarity.findings import parts_of
-    from verification.complementarity.study import compare
-
+def complementarity(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Compare, judge each sentence from the records, and keep what is behind it; `run` makes a run of a world."""
     stages: list[str] = []
 
     def say(stage: str, done: int, total: int) -> None:
@@ -41,7 +36,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
     failures = list(study.failures)
     parts = tuple(parts_of(study, failures))
-    made = tables.all_tables(study, failures) | {"worlds": tables.worlds(runner, failures=failures)}
+    made = tables.all_tables(study, failures) | {"worlds": tables.worlds(run, failures=failures)}
     progress(STAGES, STAGES)
     return finding_of(ID, TITLE, LEAD, answer(study, parts), parts, made, failures)
 
