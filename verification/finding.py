@@ -223,6 +223,8 @@ class Part:
     held, decided : trials in which it held, of those that could tell; unknown : trials that could not
     region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
+    optional : about what does not come with the project, such as another engine; where it is absent, "not testable
+        here" is said and leaves the verdict of the whole to the other parts
     """
 
     sentence: str
@@ -234,6 +236,7 @@ class Part:
     region: Region | None = None
     fails: str = ""
     timed: bool = False
+    optional: bool = False
 
     @property
     def outcome(self) -> str:
@@ -339,8 +342,13 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
-    """Return the verdict of a finding: that of its worst part. What failed never counts as holding."""
-    return worst([part.verdict for part in parts] + [NOT_COMPUTED] * bool(failures))
+    """Return the verdict of a finding: that of its worst part. What failed never counts as holding.
+
+    An optional part that is absent counts only where it is all there is.
+    """
+    given = list(parts)
+    counted = [part for part in given if not (part.optional and part.verdict == NOT_TESTABLE)] or given
+    return worst([part.verdict for part in counted] + [NOT_COMPUTED] * bool(failures))
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:

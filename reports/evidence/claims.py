@@ -8,6 +8,7 @@ from dataclasses import replace
 from iapb.run import Run
 from iapb.scene import Scene
 from reports.runner import Runner
+from verification.claims import check_claims
 from verification.finding import Failure, Finding
 
 
@@ -15,8 +16,6 @@ def compute(
     runner: Runner, depth: str, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[Finding, ...]:
     """Check every claim with runs from the store; each run is listed under every claim that uses it."""
-    from verification.claims import check_claims
-
     files: dict[tuple[int, str, str], tuple[str, Scene]] = {}  # holds the scenes, so that their ids stay theirs
 
     def run(scene: Scene, world: str, rendering: str) -> Run:

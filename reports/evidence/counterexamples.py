@@ -8,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from iapb import resolve_impact
 from iapb.errors import IapbError
+from reference.exact import exact_impact, relative_energy_gain
 from reports.pages.records import Counterexample
 from verification.finding import Failure, attempt
+from verification.laws import check_passivity
+from verification.laws.engine_laws import device_limits as law
+from verification.laws.impact_laws import relative_gain
+from verification.laws.planted import each_contact_its_own_restitution as resolver
 
 IMPACTS, SEARCH = 500, 300
 
@@ -28,10 +34,6 @@ def compute(progress: Callable[[int, int], None], failures: list[Failure]) -> tu
 
 def printed_formula() -> Counterexample:
     """Equations (20)-(21) to the letter, `gram_pinv`: what the kit finds by itself, judged in exact rationals."""
-    from iapb import resolve_impact
-    from reference.exact import exact_impact, relative_energy_gain
-    from verification.laws import check_passivity
-
     resolver = partial(resolve_impact, method="gram_pinv")
     report = check_passivity(resolver, impacts=IMPACTS, search=SEARCH)
     verdict, case = report.verdict("kinetic_energy"), report.counterexample
@@ -51,10 +53,6 @@ def printed_formula() -> Counterexample:
 
 def restitution_per_contact() -> Counterexample:
     """Newton's law as equalities with a restitution per row: erratum of whoever extends (15) in the obvious way."""
-    from verification.laws import check_passivity
-    from verification.laws.impact_laws import relative_gain
-    from verification.laws.planted import each_contact_its_own_restitution as resolver
-
     report = check_passivity(resolver, impacts=IMPACTS // 2, search=SEARCH, unequal_restitution=True)
     verdict, case = report.verdict("unequal_kinetic_energy"), report.counterexample
     if case is None:
@@ -71,8 +69,6 @@ def restitution_per_contact() -> Counterexample:
 
 def saturation() -> Counterexample:
     """Section VI: clipping an impulse component by component."""
-    from verification.laws.engine_laws import device_limits as law
-
     case = law.saturation_counterexample()
     clipped = law.limited_impulses_are_passive(case, law.saturated)
     scaled = law.limited_impulses_are_passive(case, law.ours)

@@ -20,6 +20,7 @@ from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.evidence.verdicts import verdicts
+from reports.figures.two_link_arm import arm_energies
 from reports.pages.records import (
     Counterexample,
     Evidence,
@@ -32,6 +33,7 @@ from reports.runner import Runner
 from verification.cost import effects
 from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, Table, attempt
+from verification.proofs.statement import ProofRecord
 
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
@@ -54,7 +56,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs: dict[str, Any] = kept.attempt("runs of the figures", partial(runs.figure_runs, runner), {})
     inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
     inputs["arm_energies"] = _arm_energies()
-    from verification.proofs.statement import ProofRecord
 
     ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
@@ -100,8 +101,6 @@ def _with_verdicts(evidence: Evidence) -> Evidence:
 
 
 def _arm_energies() -> Mapping[str, Any]:
-    from reports.figures.two_link_arm import arm_energies
-
     return arm_energies()
 
 

@@ -11,6 +11,7 @@ from reports.figures.hard_cases import CASE, INPUT, KIND
 from reports.pages.records import HardCase
 from reports.runner import Runner
 from verification.finding import Failure, Table, attempt, titled
+from verification.hard_cases import HARD_CASES, CaseAbsent, TrajectoryCase, judge_hard_cases
 
 __all__ = ["INPUT", "compute", "summary"]
 
@@ -35,8 +36,6 @@ def compute(
     runner: Runner, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[HardCase, ...]:
     """Judge all methods and worlds on all cases of the catalogue; a case without its files is a record that says so."""
-    from verification.hard_cases import HARD_CASES
-
     records = []
     for done, name in enumerate(HARD_CASES):
         progress(done, len(HARD_CASES))
@@ -53,8 +52,6 @@ def summary(cases: Sequence[HardCase]) -> Table:
 
 
 def _record(name: str, runner: Runner, failures: list[Failure]) -> HardCase:
-    from verification.hard_cases import HARD_CASES, CaseAbsent, TrajectoryCase, judge_hard_cases
-
     try:
         case = HARD_CASES[name]()
     except CaseAbsent as absent:

@@ -7,12 +7,11 @@ from functools import partial
 from typing import Any
 
 from verification.finding import Failure, attempt
+from verification.proofs import all_proofs, check
 
 
 def compute(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[Any, ...]:
     """Check all statements; one ProofRecord each, none for one that raises."""
-    from verification.proofs import all_proofs, check
-
     names = all_proofs()
     records = []
     for done, name in enumerate(names):

@@ -7,8 +7,16 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
+from iapb import resolve_impact
 from reports.pages.records import Property
 from verification.finding import Failure, Table, attempt, of_each, titled
+from verification.laws import LAWS, PLANTED_BUGS, bulk_impacts, check_passivity
+from verification.laws.engine_laws import ENGINE_LAWS, judge_engine_law
+from verification.laws.kit import residual_count
+from verification.laws.planted_runs import PLANTED_ENGINE_FAULTS, PLANTED_TRAJECTORY_FAULTS, first_occasion
+from verification.laws.scenes import draw_scene
+from verification.laws.scenes_space import draw_spatial_scene
+from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory
 
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
 COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
@@ -21,10 +29,6 @@ Progress = Callable[[int, int], None]
 
 def compute(progress: Progress, failures: list[Failure]) -> tuple[Property, ...]:
     """Every law on our resolver, on what else the engine does, and along trajectories; each with a planted fault."""
-    from verification.laws import LAWS
-    from verification.laws.engine_laws import ENGINE_LAWS
-    from verification.laws.trajectory_laws import TRAJECTORY_LAWS
-
     records: list[Property] = []
     total = len(LAWS) + len(ENGINE_LAWS) + len(TRAJECTORY_LAWS)
     for record in (*_impact_laws(failures), *of_each(ENGINE_LAWS, _engine_law, failures), *_trajectory_laws(failures)):
@@ -35,9 +39,6 @@ def compute(progress: Progress, failures: list[Failure]) -> tuple[Property, ...]
 
 def _impact_laws(failures: list[Failure]) -> Iterator[Property]:
     """The kit on our resolver; a law that no planted bug names has none."""
-    from iapb import resolve_impact
-    from verification.laws import PLANTED_BUGS, check_passivity
-
     first: dict[str, tuple[str, Any]] = {}
     for name, bug in PLANTED_BUGS.items():
         first.setdefault(bug.caught_by, (name, bug))
@@ -61,9 +62,6 @@ def _impact_laws(failures: list[Failure]) -> Iterator[Property]:
 def _engine_law(name: str) -> Iterator[Property]:
     import numpy as np
 
-    from verification.laws.engine_laws import judge_engine_law
-    from verification.laws.planted_runs import PLANTED_ENGINE_FAULTS
-
     cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
     verdict, (fault, make) = judge_engine_law(name, cases=cases, seed=SEED), PLANTED_ENGINE_FAULTS[name]
     with np.errstate(all="ignore"):  # the faults compute with what overflows
@@ -73,12 +71,6 @@ def _engine_law(name: str) -> Iterator[Property]:
 
 def _trajectory_laws(failures: list[Failure]) -> Iterator[Property]:
     import numpy as np
-
-    from verification.laws.kit import residual_count
-    from verification.laws.planted_runs import PLANTED_TRAJECTORY_FAULTS, first_occasion
-    from verification.laws.scenes import draw_scene
-    from verification.laws.scenes_space import draw_spatial_scene
-    from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory
 
     rng = np.random.default_rng(SEED)
     scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
@@ -132,7 +124,6 @@ def bulk(depth: str, progress: Progress, failures: list[Failure]) -> Table:
 def _bulk_rows(
     label: str, method: str, clamp: bool | None, count: int, progress: Callable[..., None]
 ) -> Iterator[tuple[Any, ...]]:
-    from verification.laws import bulk_impacts
 
     result = bulk_impacts(count, SEED, method, clamp, progress=progress)
     for row in result.by_condition():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from reference.exact import bulk_energy_gain
 from verification.claims.claim import Claim
 from verification.finding import Column, Row, Table
 from verification.impacts import Family, Floats, ImpactCase, draw_of_rank, whole_numbers
@@ -117,8 +118,6 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
 
 def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) -> Floats:
     """Relative energy gain of each impact, in double-double arithmetic, plus the bound of its error."""
-    from reference.exact import bulk_energy_gain
-
     masses = np.stack([instance.mass_matrix for instance in instances])
     before = np.stack([instance.velocity for instance in instances])
     gain, uncertainty = bulk_energy_gain(masses, before, np.stack(velocities))

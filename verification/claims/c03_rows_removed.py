@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from iapb import resolve_impact
+from reference.exact import exact_impact
 from verification.claims.algebraic import (
     EPSILON,
     Batch,
@@ -57,8 +58,6 @@ def _distance(instance: ImpactCase, e: float, method: str) -> float:
 
 def _wrong_inverse(batch: Batch) -> float:
     """Impacts in which the pseudo-inverse without rounding gives another state."""
-    from reference.exact import exact_impact
-
     e = Fraction(batch.restitution)
     return float(sum(pseudo_inverse_velocity(*case.arrays, e) != exact_impact(*case.arrays, e).velocity
                      for case in batch.impacts))  # fmt: skip
@@ -66,8 +65,6 @@ def _wrong_inverse(batch: Batch) -> float:
 
 def _wrong_rows(batch: Batch) -> float:
     """Impacts in which the rows in opposite order give another state."""
-    from reference.exact import exact_impact
-
     wrong, e = 0, Fraction(batch.restitution)
     for mass, rows, velocity in (case.arrays for case in batch.impacts):
         first = exact_impact(mass, rows, velocity, e).velocity

@@ -7,6 +7,8 @@ from functools import partial
 import numpy as np
 
 from iapb import resolve_impact
+from reference.complementarity.laws import newton_lcp
+from reference.complementarity.problem import ImpactProblem
 from verification.claims.algebraic import Batch, Measure, algebraic_claim, solve_bound, summary, worst
 from verification.finding import Table
 from verification.impacts import Family, ImpactCase, approaching
@@ -20,9 +22,6 @@ def _difference(batch: Batch, solver: str) -> float:
 
 
 def _of_one(case: ImpactCase, e: float, solver: str) -> float:
-    from reference.complementarity.laws import newton_lcp
-    from reference.complementarity.problem import ImpactProblem
-
     ours = resolve_impact(*case.arrays, e).impulses
     theirs = newton_lcp(ImpactProblem.from_impact(*case.arrays, e), solver).impulse
     return float(np.abs(ours - theirs)[0] / np.abs(theirs)[0])

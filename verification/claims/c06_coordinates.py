@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from iapb import resolve_impact
+from reference.exact import exact_impact
 from verification.claims.algebraic import (
     EPSILON,
     Batch,
@@ -66,8 +67,6 @@ def _distance(instance: ImpactCase, change: Floats, e: float) -> float:
 
 def _different(batch: Batch) -> float:
     """Outcomes that differ, without rounding."""
-    from reference.exact import exact_impact
-
     different, e = 0, batch.restitution
     for mass, rows, velocity in (case.arrays for case in batch.impacts):
         shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from iapb import resolve_impact
+from iapb.system import System
 from verification.claims.claim import Claim
 from verification.finding import Column, Row, Table
 
@@ -51,8 +52,6 @@ def trials(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str, A
 
 def arm_of(study: Study, reading: str) -> Mechanism:
     """The mechanism of the arm: uniform rods as in the scene, or all of a link's mass at its end."""
-    from iapb.system import System
-
     scene = study.scene("two_link_arm_a")
     if reading == POINTS:
         for name in ("upper_arm", "forearm"):

@@ -11,6 +11,7 @@ from iapb import resolve_impact
 from verification.claims.algebraic import within_bound, worst
 from verification.claims.claim import Claim
 from verification.claims.conditions import Condition, columns
+from verification.claims.study import run_directly
 from verification.finding import Column, Table
 from verification.impacts import Family, draw_of_rank
 from verification.scenes.trace import COORDINATES
@@ -64,8 +65,6 @@ def trials(study: Study, case: Family | Condition) -> Iterator[dict[str, Any]]:
 
 def _run_with(scene: Scene, restitution: float) -> Run:
     """Run IAPB with a negative e. Scene files are not allowed one, so this run is not for a store."""
-    from verification.claims.study import run_directly
-
     contact = scene.contact.model_copy(update={"restitution": restitution})
     return run_directly(scene.model_copy(update={"contact": contact}), "IAPB", "full")
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from verification.claims.claim import Claim
 from verification.finding import Column, Row, Table
+from verification.laws.engine_laws.hand_port import leak, ours, quickest_motion
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -38,8 +39,6 @@ def cases(study: Study) -> list[tuple[float, ...]]:
 
 def trials(study: Study, case: tuple[float, ...]) -> Iterator[dict[str, Any]]:
     """One wall; its damping is a share of b − KT/2, or of KT/2 where that is negative and no damping is allowed."""
-    from verification.laws.engine_laws.hand_port import leak, ours, quickest_motion
-
     rate, K, device, share = case
     half = 0.5 * K / rate
     b = device * half

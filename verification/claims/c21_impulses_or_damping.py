@@ -9,6 +9,8 @@ import numpy as np
 
 from verification.claims.claim import Claim
 from verification.finding import Column, Region, Row, Table
+from verification.stability.maps import PAPER_DAMPING, StabilityMap, grid, loops, stability_maps, walls
+from verification.stability.sampled_wall import LAWS, PENALTY, touch_walls
 
 if TYPE_CHECKING:
     from verification.claims.study import Study
@@ -32,17 +34,12 @@ COLUMNS = (
 
 def cases(study: Study) -> list[tuple[StabilityMap, StabilityMap]]:
     """Each loop: impulses at the paper's damping, and penalties."""
-    from verification.stability.maps import stability_maps
-
     maps = stability_maps(study.depth)
     return list(zip(maps[::2], maps[1::2], strict=True))  # the two laws of a loop follow each other
 
 
 def draw(study: Study, region: Region) -> list[tuple[StabilityMap, StabilityMap]]:
     """Fresh walls inside a region, for every loop: stiffnesses drawn by decades."""
-    from verification.stability.maps import StabilityMap, grid, loops, walls
-    from verification.stability.sampled_wall import LAWS, touch_walls
-
     stiffness, damping = grid(study.depth)
     low, high = region.ends("stiffness", stiffness.tolist())
     rng, found = np.random.default_rng(study.seed), []
@@ -56,8 +53,6 @@ def draw(study: Study, region: Region) -> list[tuple[StabilityMap, StabilityMap]
 
 def trials(study: Study, case: tuple[StabilityMap, StabilityMap]) -> Iterator[dict[str, Any]]:
     """The walls of one loop: impulses at the paper's damping against three penalties."""
-    from verification.stability.maps import PAPER_DAMPING
-
     penalty, impulses = case
     loop, raised = penalty.loop, penalty.damping[penalty.damping >= PAPER_DAMPING]
     times = np.array([penalty.settling(damping) for damping in raised])
@@ -76,8 +71,6 @@ def trials(study: Study, case: tuple[StabilityMap, StabilityMap]) -> Iterator[di
 
 def _equal_gain(penalty: StabilityMap) -> tuple[float, np.ndarray]:
     """The damping whose force on touching is the impulse's, (1 + e) m/T, and when walls with it settle [s]."""
-    from verification.stability.sampled_wall import PENALTY, touch_walls
-
     loop = penalty.loop
     gain = (1.0 + loop.restitution) * loop.mass / loop.step
     contact = touch_walls(loop, penalty.stiffness, np.full_like(penalty.stiffness, gain), PENALTY)

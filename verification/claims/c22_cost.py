@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from verification.claims.claim import Claim
+from verification.cost.step_cost import impact_cost, rivals
 from verification.finding import Column, Region, Row, Table
 
 if TYPE_CHECKING:
@@ -42,8 +43,6 @@ def draw(study: Study, region: Region) -> Iterable[Rivals]:
 
 def _timed(study: Study, contacts: tuple[int, ...]) -> list[Rivals]:
     """The compiled solver that solved each problem, as daqp's answer shows, with IAPB's kernel."""
-    from verification.cost.step_cost import impact_cost, rivals
-
     rows = impact_cost(contacts, ("daqp",), REPEATS[study.depth], study.seed, LONGEST)
     return [pair for pair in rivals(rows) if pair.called == "compiled" and pair.solver.verdict == "solved"]
 

@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from iapb import resolve_impact
+from reference.exact import exact_impact
 from verification.claims.algebraic import (
     Batch,
     Exact,
@@ -75,8 +76,6 @@ def _exact(batch: Batch) -> float:
 
 def _exact_misfit(instance: ImpactCase, e: Fraction) -> Fraction:
     """Loss minus ½(1 − e²) vᵀJᵀW†Jv, both without rounding."""
-    from reference.exact import exact_impact
-
     mass, rows, velocity = instance.arrays
     after = exact_impact(mass, rows, velocity, e)
     plastic = exact_impact(mass, rows, velocity, 0)

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
+from reference.worlds import run_world
 from verification.claims.conditions import Condition, drawn, limited_conditions, start_conditions
 from verification.finding import Failure, Region, check_depth, of_each
 from verification.scenes.trace import Trace, trace_of
@@ -28,8 +29,6 @@ SEED = 20050601  # of the random instances; the month the paper appeared
 
 def run_directly(scene: Scene, world: str, rendering: str) -> Run:
     """Simulate without a store."""
-    from reference.worlds import run_world
-
     return run_world(scene, world, rendering)
 
 
@@ -58,8 +57,6 @@ class Study:
 
     def scene(self, name: str) -> Scene:
         """A scene that comes with the project."""
-        from iapb.scene import find_scene, load_scene
-
         if name not in self._scenes:
             self._scenes[name] = load_scene(find_scene(name))
         return self._scenes[name]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene
+from reference.exact import condition_number, exact_impact, row_condition_number
 from verification.hard_cases.exact import FrictionalImpact, exact_poisson
 
 Floats = NDArray[np.floating[Any]]
@@ -83,8 +84,6 @@ class HardCase:
     @cached_property
     def truth(self) -> Truth:
         """Exact v⁺ of the case's law, with the condition numbers that bound what doubles can know of it."""
-        from reference.exact import condition_number, row_condition_number
-
         velocity, rank = self.exact_outcome()
         scale = 1.0 / np.sqrt(np.diag(self.mass_matrix))
         scaled = condition_number(scale[:, None] * self.mass_matrix * scale)
@@ -93,8 +92,6 @@ class HardCase:
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
         """v⁺ of (21), or of Poisson's law where restitution differs; and the rank, or how many contacts push."""
-        from reference.exact import exact_impact
-
         mass, rows = self.mass_matrix, self.meant_jacobian
         if np.ndim(self.restitution):
             return exact_poisson(mass, rows, self.velocity, np.asarray(self.restitution))

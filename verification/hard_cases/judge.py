@@ -15,8 +15,11 @@ import numpy as np
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, find_scene, load_scene
+from iapb.simulation import simulate
 from reference.one_thread import one_thread
+from reference.time_stepping import RigidConstraints
+from reference.worlds import require_complete, run_world
 from verification.finding import Failure, of_each
 from verification.hard_cases.case import (
     COULOMB,
@@ -38,13 +41,8 @@ _STILL = 1e-9  # [m, rad] of displacement: rounding, and springs that settle
 
 def run_in_world(scene: Scene, world: str) -> Run:
     """Simulate a scene in one of the paper's worlds, or in the rigid one with Coulomb friction."""
-    from reference.worlds import require_complete, run_world
-
     if world != COULOMB:
         return run_world(scene, world)
-    from iapb.simulation import simulate
-    from reference.time_stepping import RigidConstraints
-
     return require_complete(simulate(scene, RigidConstraints(friction="coulomb"), world=world))
 
 
@@ -111,9 +109,6 @@ def _of(
 @cache
 def _warm_up() -> None:
     """Compile the step before any clock runs: a short run is timed as one piece."""
-    from iapb.scene import find_scene, load_scene
-    from iapb.simulation import simulate
-
     simulate(load_scene(find_scene("two_discs")), steps=1)
 
 

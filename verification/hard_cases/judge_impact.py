@@ -20,7 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from iapb import resolve_impact
+from iapb.contact.impact_laws import resolve_frictional_impact
 from iapb.errors import IapbError
+from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.hard_cases.case import (
     EPS,
@@ -117,8 +120,6 @@ def allowed_error(case: HardCase) -> float:
 
 
 def _found(case: HardCase, v_plus: Floats) -> Found:
-    from reference.exact import relative_energy_gain
-
     gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
     return Found(gain, _unmet(case, v_plus), _forward_error(case, v_plus))
 
@@ -174,7 +175,6 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
     if isinstance(case, FrictionalCase):
         return _resolve_friction(case, method)
-    from iapb import resolve_impact
 
     options: dict[str, Any] = {"method": "factored", "clamp": False} if method == WITHOUT_CLAMP else {"method": method}
     started = time.perf_counter()
@@ -184,8 +184,6 @@ def resolve_once(case: HardCase, method: str) -> Answer:
 
 def _resolve_friction(case: FrictionalCase, method: str) -> Answer:
     """The engine's law with friction, or Newton's and Coulomb's laws as they stand."""
-    from iapb.contact.impact_laws import resolve_frictional_impact
-
     started = time.perf_counter()
     if method == NEWTON_COULOMB:
         v_plus, clamp = np.array([float(x) for x in case.newton_with_coulomb()]), np.nan
@@ -200,8 +198,6 @@ def _resolve_friction(case: FrictionalCase, method: str) -> Answer:
 @cache
 def warm_up() -> None:
     """Compile before any clock runs."""
-    from iapb import resolve_impact
-
     resolve_impact([[1.0]], [[1.0]], [-1.0], 0.5)
     resolve_impact(np.eye(2), np.eye(2), [-1.0, -1.0], [0.5, 0.25])
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.scene import scene_from_text
+from reference.datasets import read_problem
 from verification.hard_cases.case import NO_GAIN, CaseAbsent, HardCase, Measured, TrajectoryCase, largest_gain
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
@@ -45,8 +46,6 @@ def bowl_of_mixed_scales() -> HardCase:
 
 def _mechanics(place: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M = 1 and rows J with J Jᵀ = W to the noise of the file, and the velocity whose J v is nearest to its q."""
-    from reference.datasets import read_problem
-
     problem = read_problem(find_problem(place)).problem
     values, axes = np.linalg.eigh(problem.delassus)
     kept = values > _NOISE * values[-1]

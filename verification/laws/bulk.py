@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impact
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
 from verification.impacts import ImpactCase
@@ -165,8 +166,6 @@ def bulk_impacts(
 
 def _resolve(batch: _Batch, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
     """v⁺ (n, d) and rank (n,)."""
-    from iapb import resolve_impact
-
     found = [resolve_impact(*case.arrays, case.restitution, method=method, clamp=clamp) for case in batch.cases]
     return np.array([impact.velocity for impact in found]), np.array([float(impact.rank) for impact in found])
 

@@ -14,6 +14,7 @@ from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import FACTORED, KIT, Bounds
 from verification.laws.engine_laws import ENGINE_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
+from verification.laws.strategies import impact_cases, unequal_cases
 
 _DIGITS = (0, 1, 2, 4, 8)
 
@@ -26,8 +27,6 @@ def search_counterexample(
 
     from hypothesis import HealthCheck, Phase, find, settings
     from hypothesis.errors import NoSuchExample
-
-    from verification.laws.strategies import impact_cases, unequal_cases
 
     profile = settings(
         max_examples=examples,

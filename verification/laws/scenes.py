@@ -13,6 +13,7 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
+from reference.worlds import run_world
 
 Values = dict[str, Any]
 
@@ -37,8 +38,6 @@ class SceneCase:
 
     def simulate(self) -> Run:
         """Its run."""
-        from reference.worlds import run_world
-
         return run_world(self.scene(), self.world, self.rendering, partial=True)
 
 

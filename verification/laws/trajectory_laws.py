@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 from iapb.contact.laws import ENGINE_LAWS
 from iapb.errors import ArgumentError
+from iapb.mechanics.energy import energies
 from iapb.run import Run
+from iapb.scene import scene_from_text
+from iapb.system import System
 from reference.exact import bulk_energy_gain, relative_energy_gain
 from verification.laws.bounds import FACTORED, LawResidual
 
@@ -48,9 +51,6 @@ class Trajectory:
     @cached_property
     def system(self) -> Any:
         """Mechanism, gravity and step of the scene."""
-        from iapb.scene import scene_from_text
-        from iapb.system import System
-
         return System(scene_from_text(self.run.scene_source))
 
     @cached_property
@@ -235,8 +235,6 @@ def ledger_closes(trajectory: Trajectory) -> LawResidual | None:
 
 def _energies(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """½ vᵀMv by einsum, and the potential energy of the scene, at all instants."""
-    from iapb.mechanics.energy import energies
-
     run, system = trajectory.run, trajectory.system
     _, potential = energies(system.mechanism, system.gravity, run.q, run.v)
     last = system.mechanism.mass_matrix(run.q[-1])[None]

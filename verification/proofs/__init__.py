@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from verification.proofs.checking import checked
 
 if TYPE_CHECKING:
     from verification.proofs.statement import ProofRecord, Statement
@@ -62,7 +63,5 @@ def check(name: str) -> ProofRecord:
     ArgumentError
         If there is no statement of this name.
     """
-    from verification.proofs.checking import checked
-
     started = time.perf_counter()
     return checked(load(name), started)

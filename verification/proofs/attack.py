@@ -16,7 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.impact import resolve_impact
 from iapb.errors import ArgumentError
+from reference.exact import bulk_energy_gain
+from verification.proofs.attack_kernel import resolve_batch
 from verification.proofs.bounds import gain_bound
 
 Floats = NDArray[np.float64]
@@ -103,8 +106,6 @@ def attack(
 
 def _judge(batch: Impacts, v_plus: Floats) -> tuple[Floats, Floats]:
     """Relative gains, with their own error taken off, and κ(M) of each mass matrix as rounded."""
-    from reference.exact import bulk_energy_gain
-
     gains, error = bulk_energy_gain(batch.mass_matrix, batch.velocity, v_plus)
     spectra = np.linalg.eigvalsh(batch.mass_matrix)
     return gains - error, np.maximum(1.0, spectra[:, -1] / spectra[:, 0])
@@ -151,15 +152,11 @@ def one_by_one(resolve: Callable[[Floats, Floats, Floats, float], Floats]) -> Bu
 
 def engine_resolver(method: str = "factored", clamp: bool | None = None) -> BulkResolver:
     """The engine's public `resolve_impact`, one call per impact (about 10⁴ in a second)."""
-    from iapb.contact.impact import resolve_impact
-
     return one_by_one(lambda m, j, v, e: resolve_impact(m, j, v, e, method=method, clamp=clamp).velocity)
 
 
 def factored_in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
     """The engine's compiled kernel as the simulation step calls it, without the public call around it."""
-    from verification.proofs.attack_kernel import resolve_batch
-
     v_plus = np.empty_like(velocity)
     lower = np.linalg.cholesky(mass_matrix)
     columns = np.ascontiguousarray(np.swapaxes(contact_jacobian, 1, 2))

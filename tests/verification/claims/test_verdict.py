@@ -57,6 +57,19 @@ def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
     assert verdict_of(Part("", one) for one in verdicts) == verdict
 
 
+@pytest.mark.parametrize(
+    ("part", "verdict"),
+    [
+        (Part("", NOT_TESTABLE, optional=True), REPRODUCED),
+        (Part("", NOT_TESTABLE), NOT_TESTABLE),
+        (Part("", REFUTED, optional=True), REFUTED),
+    ],
+)
+def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
+    assert verdict_of([Part("", REPRODUCED), part]) == verdict
+    assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
+
+
 def claim(**options):
     words = dict.fromkeys(("id", "statement", "place", "quantity", "tolerance"), "C99")
     functions = {"holds": lambda row: row["error"] < 1.0, "finding": lambda table: "Found."}

@@ -48,7 +48,6 @@ def case_of() -> Callable[[str], AnyCase]:
 # Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain.
 BEYOND_US = {
     "wall_far_beyond_the_bound": "gains energy",
-    "touching_cradle": "gains energy",
 }
 LARGEST_FAULT = 0.1
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from iapb import resolve_impact
+from iapb.errors import IapbError
 from verification.impacts import Floats, ImpactCase, draw_mass_matrix, draw_rows
 from verification.laws.bounds import LawResidual
 from verification.laws.resolver import Resolver
@@ -46,15 +48,11 @@ def _sized(rng: np.random.Generator, array: Floats) -> Floats:
 
 def ours(M: Floats, J: Floats, v: Floats, e: float) -> object:
     """The engine's resolver."""
-    from iapb import resolve_impact
-
     return resolve_impact(M, J, v, e)
 
 
 def finite_or_named(case: ImpactCase, subject: Resolver) -> LawResidual:
     """0 for a finite motion or an IapbError, else 1, against a tolerance of 0."""
-    from iapb.errors import IapbError
-
     try:
         answer = subject(case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy(), case.restitution)
         v_plus = np.asarray(getattr(answer, "velocity", answer))

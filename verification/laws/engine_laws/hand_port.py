@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from iapb.contact.kernels.resting import normal_force
 from verification.impacts import Floats
 from verification.laws.bounds import LawResidual
 
@@ -69,8 +70,6 @@ def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, 
 
 def ours(depth: float, rate: float, K: float, B: float) -> float:
     """The engine's penalty (5), clamped, at one contact."""
-    from iapb.contact.kernels.resting import normal_force
-
     return float(normal_force(-depth, -rate, K, B, True)) if depth > 0.0 else 0.0
 
 

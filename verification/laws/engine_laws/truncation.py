@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from iapb import resolve_impact
 from verification.impacts import Floats, ImpactCase, draw_case
 from verification.laws.bounds import FACTORED, LawResidual
 from verification.laws.impact_laws import relative_gain
@@ -24,8 +25,6 @@ def draw(rng: np.random.Generator) -> ImpactCase:
 
 def ours(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Any:
     """The engine's resolver, stopped after `budget` rows."""
-    from iapb import resolve_impact
-
     return resolve_impact(M, J, v, e, budget=budget)
 
 

@@ -397,8 +397,6 @@ def _gain(factor, f, speed, inverse_mass):  # type: ignore[no-untyped-def]
 
 
 def _square(f):  # type: ignore[no-untyped-def]
-    from verification.proofs.steps import Square
-
     return Term(1, (), Square(f))
 
 

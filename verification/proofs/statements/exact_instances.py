@@ -3,6 +3,7 @@
 import random
 from fractions import Fraction
 
+from verification.proofs import load
 from verification.proofs.exact import (
     FlintBackend,
     Instance,
@@ -38,8 +39,6 @@ def random_case(draw: random.Random) -> Instance:
 
 def exact_instances() -> Statement:
     """Theorem 2 on random rational impacts, on two exact libraries."""
-    from verification.proofs import load
-
     draw = random.Random(SEED)
     theorem = load("theorem_2")
     cases = [completed(random_case(draw), theorem.definitions) for _ in range(CASES)]
@@ -88,6 +87,4 @@ def _is_redundant(case: Instance) -> bool:
 
 
 def _printed_loss_holds(case: Instance) -> bool:
-    from verification.proofs import load
-
     return holds(load("theorem_2").twins[0].claim, case)  # type: ignore[arg-type]

@@ -78,13 +78,21 @@ def test_a_contact_is_new_unless_one_of_the_step_before_vouches_for_it(reach: fl
         for i in range(count):
             old = False
             for j in range(count_before):
-                touched = before.gap[j] <= 0.0
+                touched = before.gap[j] < 0.0
                 same = all(getattr(now, name)[i] == getattr(before, name)[j] for name in IDENTITY)
                 near = reach > 0.0 and one_surface(now, i, before, j) and distance(now, i, before, j) <= reach
                 old = old or (touched and (same or near))
             assert bool(now.is_new[i]) == (not old)
             seen.add(old)
     assert seen == {False, True}
+
+
+@pytest.mark.parametrize(("gap", "new"), [(0.0, True), (-0.0, True), (-5e-324, False), (1e-9, True)])
+def test_a_contact_is_new_until_it_has_overlapped(gap: float, new: bool) -> None:
+    now, before = pair_of_contacts(), pair_of_contacts()
+    before.gap[:] = gap
+    mark_new(now, 1, before, 1, 0.0)
+    assert bool(now.is_new[0]) is new
 
 
 def test_limits_of_distance_and_angle() -> None:
