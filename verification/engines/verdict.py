@@ -103,8 +103,8 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
     parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED) for group in groups.values()]
     absent = sorted({record.title for record in records if record.missing})
     if absent:
-        sentence = f"Not installed here, and so not compared: {', '.join(absent)}."
-        parts.append(Part(sentence, NOT_TESTABLE, optional=True))
+        said = f"Not installed here, and so not compared: {', '.join(absent)}."
+        parts.append(Part(said, NOT_TESTABLE, optional=True))
     own = [record for record in present if record.choice == OWN]
     matched = [record for record in present if record.choice != OWN]
     answer = (
