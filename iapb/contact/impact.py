@@ -56,7 +56,8 @@ class Impact:
     rank : rows found independent and used; Poisson's law: contacts that push.
     energy_change : KE⁺ − KE⁻ [J], of the rounded velocities, evaluated in double-double.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
-    status : ``"complete"``, or ``"budget"`` when the row budget ended the work early.
+    status : ``"complete"``; ``"budget"`` when the row budget ended the work early; ``"not solved"`` where Poisson's law
+        left a contact closing, as rows that nearly oppose each other can (the energy does not rise then either).
     method, law : how it was computed, and which restitution law it obeys.
     rows_used : the row budget that was in force (None = unlimited); a replay with it is exact.
     """
@@ -92,7 +93,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
         all of them; equal values obey the scalar rule.
     method : ``factored`` (default, passive in floating point), ``gram_pinv`` (the paper's (20)-(21) to the
         letter), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated); ``poisson``:
-        contacts only push, where the others take every row as an equality (with one e in [0, 1], Newton's LCP).
+        contacts only push, where the others take every row as an equality (Newton's LCP where every row approaches
+        and e in [0, 1] is one).
     budget : at most this many rows are used, the most violated first (``factored`` only). Passive at any value.
     clamp : scale Δv so that energy cannot rise by rounding either. Default: on for ``factored``, ``damped``,
         ``svd`` and Poisson's law, off for the two ``gram`` methods.
@@ -133,7 +135,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     else:
         law = "Newton, equality"
     answer = solve(problem, limit, clamped, rank_tolerance)
-    return _as_impact(problem, answer, method=method, law=law, status="complete" if answer.complete else "budget",
+    return _as_impact(problem, answer, method=method, law=law, status=answer.status,
                       rows_used=None if budget is None else limit)
 
 

@@ -222,7 +222,7 @@ class Whitened(NamedTuple):
     impulses: Floats
     rank: int
     clamp: float
-    complete: bool = True  # False where the budget ended the work with rows left
+    status: str = "complete"  # "budget" where it ended the work with rows left, "not solved" where the law is not met
 
 
 class Method(NamedTuple):
@@ -258,7 +258,8 @@ def factored(problem: ImpactInput, budget: int, clamped: bool, tolerance: float 
     rank, clamp = factored_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.restitution, c,
                                   share, budget, clamped, work, v_plus, momentum)
     ended_early = rank == budget < d and bool((work.size[:c] > share * share).any())
-    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp, not ended_early)
+    status = "budget" if ended_early else "complete"
+    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp, status)
 
 
 def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
@@ -373,12 +374,21 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
     return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp)
 
 
+# Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two LCPs
+# were not solved. Rounding leaves 1e-13; nearly dependent rows that push against each other leave more.
+_UNSOLVED = 1e-6
+
+
 def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """Poisson's law for unequal restitution, by two LCPs (compression, restitution)."""
+    """Poisson's law for unequal restitution, by two LCPs (compression, restitution), judged by what they leave."""
     work, d, c = _prepared(problem), problem.coordinates, problem.contacts
     v_plus, momentum, impulses = np.empty(d), np.empty(d), np.zeros(c)
     rank, clamp = poisson_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.unequal, c, clamped,
                                  work, make_push_work(d, c), impulses, v_plus, momentum)
     if rank < 0:
         raise SolverError(f"Poisson's law: the active-set method did not converge on {c} contacts")
-    return Whitened(v_plus, momentum, impulses, rank, clamp)
+    fresh = _prepared(problem)
+    _whitened_rows(problem, fresh)
+    closing = fresh.length[:c] * math.sqrt(sum(fresh.u * fresh.u)) * _UNSOLVED
+    met = clamp >= 1.0 - _UNSOLVED and bool(np.all(product(problem.contact_jacobian, v_plus) >= -closing))
+    return Whitened(v_plus, momentum, impulses, rank, clamp, "complete" if met else "not solved")

@@ -52,6 +52,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         motions.wall_far_beyond_the_bound,
         motions.wedged_peg_motion,
         motions.touching_cradle,
+        motions.touching_cradle_in_centimetres,
         motions.cradle_a_micrometre_apart,
         motions.cradle_a_micrometre_sunk,
         friction.double_pendulum_motion,

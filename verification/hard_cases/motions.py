@@ -174,8 +174,8 @@ def _measure_peg(run: Run) -> Measured:
 
 
 # --- Newton's cradle whose balls touch ---------------------------------------------------------------------------
-# Radii and places are binary fractions: touching is exact.
-_BALL = "{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1.0, shapes: [{{kind: circle, radius: 0.015625}}], "
+# Radii and places are binary fractions, so that touching is exact, or decimal ones, so that rounding decides the gap.
+_BALL = "{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1.0, shapes: [{{kind: circle, radius: {r}}}], "
 _CRADLE = """
 name: touching_cradle
 title: Newton's cradle whose balls touch
@@ -200,6 +200,11 @@ def touching_cradle() -> TrajectoryCase:
     return _cradle(0.0, "touching exactly")
 
 
+def touching_cradle_in_centimetres() -> TrajectoryCase:
+    """Gaps of a few 1e-18 m of either sign, as places of 0.02, 0.04 and 0.06 m give them."""
+    return _cradle(0.0, "touching but for rounding", 0.01)
+
+
 def cradle_a_micrometre_apart() -> TrajectoryCase:
     """Gaps of 1e-6 m: found one after another, a blow each."""
     return _cradle(1e-6, "a micrometre apart")
@@ -210,9 +215,10 @@ def cradle_a_micrometre_sunk() -> TrajectoryCase:
     return _cradle(-1e-6, "sunk by a micrometre")
 
 
-def _cradle(gap: float, words: str) -> TrajectoryCase:
-    places = [-0.053125] + [k * (0.03125 + gap) for k in range(4)]
-    balls = [f"  - {_BALL.format(k=k)}position: [{x!r}], velocity: [{float(k == 0)}]}}" for k, x in enumerate(places)]
+def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
+    places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
+    balls = [f"  - {_BALL.format(k=k, r=radius)}position: [{x!r}], velocity: [{float(k == 0)}]}}"
+             for k, x in enumerate(places)]  # fmt: skip
 
     def measure(run: Run) -> Measured:
         """How far momentum and energy at the end are from those of the first ball, as shares."""

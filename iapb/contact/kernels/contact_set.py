@@ -12,6 +12,9 @@ from iapb.run import COLLIDING, FREE, RESTING
 # wall, or two sides of a triangle, do not.
 ALIGNED_COSINE = 0.85
 
+# An overlap up to this [m] is touching: rounding of the places makes it, and no spring feels it.
+TOUCHING = 1e-12
+
 _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
 
 
@@ -93,11 +96,11 @@ def _close_ranks(contacts, count):
 def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED_COSINE):
     """Write is_new: temporal coherence through space, or by identity alone where `distance` is 0.
 
-    A contact is old if the step before had one (gap < 0) with the same shapes and feature, or within
+    A contact is old if the step before had one (overlap beyond TOUCHING) with the same shapes and feature, or within
     `distance` [m] on the same surface. The distance must exceed (largest speed) × (step). One old contact
     may vouch for several: a facet's edge that appears beside the facet is the same contact, as paper III says.
     A corner that slides along the floor into a wall is new, since the normals differ though the point is one.
-    A contact whose gap was exactly 0 is new: no force has held it yet (balls of a cradle that touch).
+    A contact that only touched is new: no force has held it yet (balls of a cradle).
 
     Contacts keep their order from step to step, so the search begins behind the last one found: the cost is
     linear in lasting contacts.
@@ -107,7 +110,7 @@ def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED
         contacts.is_new[i] = True
         for k in range(previous_count):
             j = begin + k if begin + k < previous_count else begin + k - previous_count
-            if previous.gap[j] < 0.0 and _is_same(contacts, i, previous, j, distance, cosine):
+            if previous.gap[j] < -TOUCHING and _is_same(contacts, i, previous, j, distance, cosine):
                 contacts.is_new[i] = False
                 begin = j + 1 if j + 1 < previous_count else 0
                 break

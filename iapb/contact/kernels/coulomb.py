@@ -22,7 +22,7 @@ from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
 
 SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
-STILL = 1e-6  # of the fastest slip: a sweep that moves less is the last one; sticking contacts creep no faster
+STILL = 1e-6  # of the fastest slip: a sweep that moves less is the last one
 
 
 class StepFriction(NamedTuple):

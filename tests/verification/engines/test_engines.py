@@ -11,6 +11,8 @@ from iapb.errors import ArgumentError, MissingDependencyError
 from reference.simulators import find_simulator, fixed_scene
 from verification.engines import compare_engines, sentence, study, verdict
 from verification.engines.study import measured
+from verification.engines.verdict import finding
+from verification.finding import NOT_TESTABLE, REPRODUCED
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +56,14 @@ def test_an_engine_that_is_absent_is_named_and_not_left_out(monkeypatch):
         def version(self):
             raise MissingDependencyError("absent", "The adapter", "pip install absent")
 
+    present = compare_engines(["iapb"], ["redundant_wedge"])
     monkeypatch.setattr(study, "find_simulator", lambda name: Absent())
     records = compare_engines(["mujoco"], ["resting_box"])
     assert [verdict(record) for record in records] == ["not installed"] * 2
     assert "pip install absent" in sentence(records)
+    found = finding([*present, *records])
+    assert (found.parts[-1].verdict, found.verdict) == (NOT_TESTABLE, REPRODUCED)
+    assert "Absent" in found.parts[-1].sentence
 
 
 def breaks(*_):

@@ -10,6 +10,7 @@ import pytest
 from iapb.compiled import block
 from iapb.contact.geometry import make_contact_buffer
 from iapb.contact.kernels.contact_set import (
+    TOUCHING,
     classify,
     cluster,
     group_of_contact,
@@ -78,7 +79,7 @@ def test_a_contact_is_new_unless_one_of_the_step_before_vouches_for_it(reach: fl
         for i in range(count):
             old = False
             for j in range(count_before):
-                touched = before.gap[j] < 0.0
+                touched = before.gap[j] < -TOUCHING
                 same = all(getattr(now, name)[i] == getattr(before, name)[j] for name in IDENTITY)
                 near = reach > 0.0 and one_surface(now, i, before, j) and distance(now, i, before, j) <= reach
                 old = old or (touched and (same or near))
@@ -87,7 +88,7 @@ def test_a_contact_is_new_unless_one_of_the_step_before_vouches_for_it(reach: fl
     assert seen == {False, True}
 
 
-@pytest.mark.parametrize(("gap", "new"), [(0.0, True), (-0.0, True), (-5e-324, False), (1e-9, True)])
+@pytest.mark.parametrize(("gap", "new"), [(0.0, True), (-1e-17, True), (-1e-12, True), (-2e-12, False), (1e-9, True)])
 def test_a_contact_is_new_until_it_has_overlapped(gap: float, new: bool) -> None:
     now, before = pair_of_contacts(), pair_of_contacts()
     before.gap[:] = gap

@@ -65,10 +65,10 @@ def tangential(system: Any, state: Any, q: np.ndarray, i: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_each_contact_stops_or_slides_at_its_limit_against_the_friction(seed: int) -> None:
-    v = np.random.default_rng(seed).normal(scale=0.02 * (seed % 3), size=24)
+    v = np.random.default_rng(seed).normal(scale=(0.0, 0.02, 1.0)[seed % 3], size=24)
     system, state, q = stepped(pile((2.0, 0.5, 1.0, 0.7)), 12, v)
     c, stuck, slides = state.contacts, 0, 0
-    assert state.contact_count[0] >= 6
+    assert state.contact_count[0] >= 5
     for i in range(state.contact_count[0]):
         limit = MU * max(c.normal_force[i], 0.0)
         slip, force = tangential(system, state, q, i) @ state.v, c.friction_force[i]
@@ -79,7 +79,7 @@ def test_each_contact_stops_or_slides_at_its_limit_against_the_friction(seed: in
         elif np.linalg.norm(slip) > 1e-4:
             slides += 1
             assert force == pytest.approx(-limit * slip / np.linalg.norm(slip), abs=2e-2 * limit)
-    assert stuck or slides
+    assert slides if seed % 3 == 2 else stuck
 
 
 @pytest.mark.parametrize("masses", [(1.0, 1.0, 1.0, 1.0), (1e-3, 1e3, 1.0, 1e2), (1e3, 1e-3, 1e-3, 1.0)])
