@@ -374,8 +374,8 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
     return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp)
 
 
-# Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two LCPs
-# were not solved. Rounding leaves 1e-13; nearly dependent rows that push against each other leave more.
+# Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two
+# LCPs were not solved. Rounding leaves 1e-13; nearly dependent rows that push against each other leave more.
 _UNSOLVED = 1e-6
 
 
