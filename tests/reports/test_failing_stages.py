@@ -73,8 +73,8 @@ def of_claims(patch: Patch, folder: Path) -> list[str]:
 
 
 def of_proofs(patch: Patch, folder: Path) -> list[str]:
-    patch.setattr(verification.proofs, "all_proofs", lambda: ("one", "two", "three"), raising=False)
-    patch.setattr(verification.proofs, "check", broken(lambda name: name, "two".__eq__), raising=False)
+    patch.setattr(proofs, "all_proofs", lambda: ("one", "two", "three"))
+    patch.setattr(proofs, "check", broken(lambda name: name, "two".__eq__))
     failures: list[Failure] = []
     assert proofs.compute(nothing, failures) == ("one", "three")
     return [failure.case for failure in failures]
@@ -87,7 +87,8 @@ def of_properties(patch: Patch, folder: Path) -> list[str]:
         patch.setattr(properties, name, size)
     impact, engine = next(iter(impact_laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
     chosen = {name: engine_laws.ENGINE_LAWS[name] for name in (engine, "budget") if name in engine_laws.ENGINE_LAWS}
-    patch.setattr(engine_laws, "ENGINE_LAWS", chosen)
+    for module in (engine_laws, properties):
+        patch.setattr(module, "ENGINE_LAWS", chosen)
     of_runs = trajectory_laws.TRAJECTORY_LAWS
     for found, name in ((impact_laws.LAWS, impact), (chosen, engine), (of_runs, "finite")):
         patch.setitem(found, name, found[name]._replace(check=broken(found[name].check, lambda *_: True)))
@@ -111,8 +112,8 @@ def of_counterexamples(patch: Patch, folder: Path) -> list[str]:
 def of_bulk(patch: Patch, folder: Path) -> list[str]:
     patch.setitem(properties.IMPACTS, "quick", 20)
     patch.setitem(properties.COMPARED_IMPACTS, "quick", 20)
-    bulk = verification.laws.bulk_impacts
-    patch.setattr(verification.laws, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
+    bulk = properties.bulk_impacts
+    patch.setattr(properties, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
     failures: list[Failure] = []
     table = properties.bulk("quick", nothing, failures)
     assert list(dict.fromkeys(row[0] for row in table.rows)) == ["factored", "gram_pinv, as printed"]
@@ -140,7 +141,7 @@ def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
     chosen = {name: judge.HARD_CASES[name] for name in ("grazing", "one_contact")}
     chosen["lost"] = broken(chosen["grazing"], lambda: True)
     patch.setattr(judge, "HARD_CASES", chosen)
-    patch.setattr(verification.hard_cases, "HARD_CASES", chosen, raising=False)
+    patch.setattr(hard_cases, "HARD_CASES", chosen)
     patch.setattr(judge, "judge_hard_case", broken(judge.judge_hard_case, lambda case, method, _: (
         method, case.name) == ("svd", chosen["grazing"]().name)))  # fmt: skip
     failures: list[Failure] = []

@@ -25,7 +25,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[HardCase, ...]:
         patch.setattr("verification.hard_cases.shared_problems.FOLDER", Path("nowhere"))
         chosen = {name: catalogue.HARD_CASES[name] for name in (*CHOSEN, "bowl_of_low_rank")}
         patch.setattr("verification.hard_cases.judge.HARD_CASES", chosen)
-        patch.setattr("verification.hard_cases.HARD_CASES", chosen, raising=False)
+        patch.setattr("reports.evidence.hard_cases.HARD_CASES", chosen)
         runner = Runner(tmp_path_factory.mktemp("runs"))
         found = compute(runner, lambda done, total: None, [])
         assert any("chatter" in label for label in runner.used)  # its runs are stored, and listed
