@@ -223,7 +223,7 @@ class Part:
     held, decided : trials in which it held, of those that could tell; unknown : trials that could not
     region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
-    optional : about what does not come with the project, such as another engine: absent, it leaves the verdict to others
+    optional : about what does not come with the project, as another engine: absent, it leaves the verdict to others
     """
 
     sentence: str
