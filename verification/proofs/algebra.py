@@ -203,52 +203,36 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class NonNegative:
+class _About:
+    """A fact about one expression."""
+
+    name: str
+    value: Expression
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        return (self.value,)
+
+
+@dataclass(frozen=True)
+class NonNegative(_About):
     """value >= 0: a commuting scalar or a 1 x 1 product as a number, a square matrix in the Loewner order
     (x' value x >= 0 for every x)."""
 
-    name: str
-    value: Expression
-
-    @property
-    def expressions(self) -> tuple[Expression, ...]:
-        return (self.value,)
-
 
 @dataclass(frozen=True)
-class Definite:
+class Definite(_About):
     """x' value x > 0 for every x other than 0."""
 
-    name: str
-    value: Expression
-
-    @property
-    def expressions(self) -> tuple[Expression, ...]:
-        return (self.value,)
-
 
 @dataclass(frozen=True)
-class Entrywise:
+class Entrywise(_About):
     """Every entry of a vector or matrix is >= 0 (impulses that only push, restitution between 0 and 1, ...)."""
 
-    name: str
-    value: Expression
-
-    @property
-    def expressions(self) -> tuple[Expression, ...]:
-        return (self.value,)
-
 
 @dataclass(frozen=True)
-class Nonzero:
+class Nonzero(_About):
     """A commuting scalar is not 0."""
-
-    name: str
-    value: Expression
-
-    @property
-    def expressions(self) -> tuple[Expression, ...]:
-        return (self.value,)
 
 
 Fact = Equation | NonNegative | Definite | Entrywise | Nonzero
