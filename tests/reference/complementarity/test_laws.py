@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from iapb import resolve_impact
+from iapb.contact import impact_methods
 from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
@@ -193,6 +195,21 @@ def test_the_engine_says_where_rows_that_oppose_each_other_are_not_solved() -> N
     found = resolve_impact(np.eye(3), rows, [0.7, -0.1, -0.2], 0.5, method="poisson")
     assert (rows @ found.velocity >= -1e-6).all() or found.status == "not solved"
     assert found.energy_change <= 0.0
+
+
+@pytest.mark.parametrize(("closing", "status"), [(2e-6, "not solved"), (5e-7, "complete")])
+def test_a_contact_left_closing_is_noticed_from_a_millionth_of_the_speed_on(
+    closing: float, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve_ = impact_methods.poisson_impact
+
+    def faulty(*given_: Any) -> Any:
+        answer = solve_(*given_)
+        given_[-2][0] -= closing  # v_plus
+        return answer
+
+    monkeypatch.setattr(impact_methods, "poisson_impact", faulty)
+    assert resolve_impact(np.eye(2), [[1.0, 0.0]], [-1.0, 0.0], 0.0, method="poisson").status == status
 
 
 @given(st.integers(0, 100_000), st.floats(0.0, 1.0))
