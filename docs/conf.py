@@ -36,7 +36,7 @@ numpydoc_use_plots = False
 
 # Signs of formulas that reStructuredText would take for markup: |u| is a norm, J* a name, p_ a symbol.
 _MARKUP = re.compile(r"(``.+?``|`[^`]+`)|([|*]|(?<=\w)_(?!\w))")
-_ELSEWHERE = re.compile(r"\[([^\]]+)\]\((?:iapb|reference|verification|reports|scenes|LICENSE|CITATION)[^)]*\)")
+_ELSEWHERE = re.compile(r"\[([^\]]+)\]\((?:iapb|reference|verification|reports|scenes|[A-Z])[^)]*\)")
 
 
 def _plain_formulas(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:

@@ -15,7 +15,7 @@ from blocks import ROOT, Block, read_blocks
 from comparing import differs
 
 UPDATE = bool(os.environ.get("IAPB_UPDATE_DOCS"))
-DOCUMENTS = ("README.md", "docs/tutorial.md", "docs/extending.md")
+DOCUMENTS = ("README.md", "docs/scenes.md", "docs/resolvers.md", "docs/tutorial.md", "docs/extending.md")
 BLOCKS = [(k, block) for name in DOCUMENTS for k, block in enumerate(read_blocks(ROOT / name, name))]
 
 

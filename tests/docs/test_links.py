@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from blocks import ROOT
 
-PAGES = ("README.md", "docs/tutorial.md", "docs/extending.md", "docs/notation.md", "docs/equations.md",
-         "docs/architecture.md")  # fmt: skip
+PAGES = ("README.md", "docs/scenes.md", "docs/resolvers.md", "docs/report.md", "docs/tutorial.md", "docs/extending.md",
+         "docs/notation.md", "docs/equations.md", "docs/architecture.md")  # fmt: skip
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
