@@ -166,6 +166,8 @@ class Run:
         default_factory=lambda: np.zeros(0), metadata=_along("chunk", "s", "wall time of each chunk"))
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run ends where it does; empty for a complete one
+    remarks: tuple[str, ...] = ()  # what was chosen for the scene, such as by contact.auto
+    distrust: tuple[str, ...] = ()  # why the result is not to be trusted (`iapb.checks`); empty where nothing is wrong
 
     @property
     def steps(self) -> int:

@@ -29,6 +29,7 @@ from reports.store.schema import (
     FORMAT_VERSION,
     GROUPS,
     JSON_TEXTS,
+    SENTENCES,
     STATE_ATTRIBUTES,
     TEXTS,
     coordinates_of,
@@ -118,6 +119,8 @@ def _write_head(file: Any, run: Run, key: str, code: str) -> None:
     file.attrs["title"] = f"{run.scene_name} · {run.world}"
     file.attrs["status"] = "complete" if run.complete else "partial"
     file.attrs["stopped"] = run.stopped
+    for name in SENTENCES:
+        file.attrs[name] = json.dumps(getattr(run, name), ensure_ascii=False)
     file.attrs["run_key"] = key
     file.attrs["code"] = code
     file.attrs["content_hash"] = content_hash(run)
@@ -259,6 +262,7 @@ def _head(file: Any) -> dict[str, Any]:
         "dt": float(file.attrs["dt"]),
         "complete": file.attrs["status"] == "complete",
         "stopped": str(file.attrs.get("stopped", "")),
+        **{name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES},
         **ranges,
     }
 

@@ -50,6 +50,7 @@ TEXTS = (
     ("coupling", "settings", "coupling_settings"),
 )
 JSON_TEXTS = frozenset({"scene_resolved", "law_settings", "coupling_settings"})
+SENTENCES = ("remarks", "distrust")  # lists of sentences, as JSON in attributes of the file; a file may lack them
 
 STATE_ATTRIBUTES = {
     "flag_values": np.arange(len(STATE_NAMES), dtype=np.int8),

@@ -55,6 +55,7 @@ def assert_same(left: Any, right: Any, place: str = "run") -> None:
         {"tool_dofs": (1, 3)},
         {"complete": False},
         {"energy": {}, "effects": ()},
+        {"remarks": ("chosen",), "distrust": ("it sank é", "it flew")},
         {"steps": 5000, "contacts": 20000},
     ],
 )
