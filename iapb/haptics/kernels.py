@@ -9,17 +9,11 @@ import numpy as np
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import LARGEST_SPEED
-from iapb.mechanics.kernels import (
-    MechanismArrays,
-    Workspace,
-    add_point_force,
-    bias,
-    difference,
-    forward_kinematics,
-    integrate,
-    mass_matrix,
-)
+from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
+from iapb.mechanics.kernels.configuration import difference, integrate
+from iapb.mechanics.kernels.dynamics import bias, mass_matrix
+from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.mechanics.kernels.vectors import add, dot, load, transform
 from iapb.run import FREE
 

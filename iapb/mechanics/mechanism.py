@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Block, Entry, block
 from iapb.errors import ArgumentError
-from iapb.mechanics import kernels, structure
+from iapb.mechanics import structure
 from iapb.mechanics.bodies import Body, finite_array, float_rows, float_vector, parent_indices, tree_indices
 from iapb.mechanics.joints import Joint
-from iapb.mechanics.kernels import Evaluation, MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels import configuration, dynamics, evaluation, kinematics
+from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, Workspace, make_workspace
 from iapb.mechanics.structure import collect_arrays, moving_parts, tree_ranges
 from iapb.mechanics.urdf import read_urdf
 
@@ -29,10 +30,12 @@ __all__ = ["Body", "Joint", "Mechanism"]
 Floats = NDArray[np.float64]
 
 # The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`).
-entries = SimpleNamespace(**{name: Entry(getattr(kernels, name)) for name in (
-    "all_finite", "bias_at", "biases_at", "centroidal_momentum", "difference", "forward_kinematics", "frame_jacobian",
-    "gravity", "integrate", "inverse_dynamics", "is_configuration", "kinetic_energy", "mass_matrices_at",
-    "mass_matrix_at", "misplaced_body", "point_jacobian", "potential_energy")})
+entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
+    configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
+    evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
+    evaluation.is_configuration, evaluation.kinetic_energy, evaluation.mass_matrices_at, evaluation.mass_matrix_at,
+    evaluation.misplaced_body, evaluation.potential_energy, kinematics.forward_kinematics, kinematics.frame_jacobian,
+    kinematics.point_jacobian)})  # fmt: skip
 
 
 class _Scratch(threading.local):

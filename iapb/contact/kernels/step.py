@@ -14,8 +14,10 @@ from iapb.contact.kernels.coulomb import add_step_friction, remember_friction
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
-from iapb.mechanics.kernels import bias, forward_kinematics, gravity, integrate, mass_matrix
 from iapb.mechanics.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
+from iapb.mechanics.kernels.configuration import integrate
+from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
+from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Faster than this [m/s, rad/s] no product of masses, stiffnesses, displacements and speeds is sure to be finite: the

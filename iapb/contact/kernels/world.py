@@ -12,7 +12,7 @@ from iapb.contact.kernels.coulomb import StepFriction
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.unilateral import PushWork
-from iapb.mechanics.kernels import MechanismArrays, Workspace
+from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 
 
 class Switches(NamedTuple):

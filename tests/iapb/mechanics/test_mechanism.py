@@ -13,8 +13,15 @@ from hypothesis import strategies as st
 from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import KINDS
-from iapb.mechanics.kernels import add_point_force, forward_kinematics, vectors
-from iapb.mechanics.kernels.kinematics import frame_jacobian, motion_at, point_jacobian, point_velocity
+from iapb.mechanics.kernels import vectors
+from iapb.mechanics.kernels.kinematics import (
+    add_point_force,
+    forward_kinematics,
+    frame_jacobian,
+    motion_at,
+    point_jacobian,
+    point_velocity,
+)
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.compiled import block
-from iapb.mechanics import kernels
 from iapb.mechanics.joints import KINDS
-from iapb.mechanics.kernels import forward_kinematics
+from iapb.mechanics.kernels import dynamics
+from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.mechanics.structure import moving_parts
 from reference.random_mechanisms import random_mechanism, random_state
@@ -85,9 +85,9 @@ def unmerged(mechanism: Mechanism, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
     """M and B from all bodies, moving or not."""
     mass, bias = np.zeros((mechanism.nv, mechanism.nv)), np.zeros(mechanism.nv)
     arrays, scratch = block(mechanism.arrays), block(mechanism.workspace())
-    kernels.forward_kinematics(arrays, q, scratch)
-    kernels.mass_matrix(arrays, scratch, mass)
-    kernels.bias(arrays, scratch, v, bias)
+    forward_kinematics(arrays, q, scratch)
+    dynamics.mass_matrix(arrays, scratch, mass)
+    dynamics.bias(arrays, scratch, v, bias)
     return mass, bias
 
 

@@ -22,7 +22,8 @@ from iapb.contact.kernels.rows import (
     twist,
 )
 from iapb.mechanics.joints import KINDS
-from iapb.mechanics.kernels import forward_kinematics, make_workspace
+from iapb.mechanics.kernels.arrays import make_workspace
+from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
 
