@@ -96,7 +96,7 @@ wheel: setup ## build dist/*.whl
 .PHONY: lock
 lock: ## resolve requirements.lock again from pyproject.toml (needs uv)
 	@uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-emit-find-links \
-		--python-version 3.11 --custom-compile-command "make lock" --group dev pyproject.toml -o requirements.lock
+		--python-version 3.11 --custom-compile-command "make lock" --extra all --group dev pyproject.toml -o requirements.lock
 
 .PHONY: clean
 clean: ## remove what runs, tests and builds left (keeps .venv)

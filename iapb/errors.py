@@ -99,6 +99,23 @@ class MissingDependencyError(IapbError, ImportError):
         super().__init__(f"{purpose} needs {package}, which is not installed. Install it with: {install}")
 
 
+#: Which extra of ``pip install 'iapb[...]'`` brings a package that the engine itself does without.
+EXTRAS = {
+    **dict.fromkeys(("scipy", "h5py", "threadpoolctl", "pinocchio", "cvxpy", "clarabel", "qpsolvers", "daqp",
+                     "quadprog", "proxsuite", "quantecon"), "reference"),
+    **dict.fromkeys(("hypothesis", "sympy", "flint"), "verify"),
+    **dict.fromkeys(("typer", "rich", "matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
+}  # fmt: skip
+
+
+def name_the_extra(error: ModuleNotFoundError, purpose: str) -> ImportError:
+    """Return a `MissingDependencyError` that names the extra of the missing package; other errors unchanged."""
+    package = (error.name or "").partition(".")[0]
+    if package not in EXTRAS:
+        return error
+    return MissingDependencyError(package, purpose, f"pip install 'iapb[{EXTRAS[package]}]'")
+
+
 class RunFileError(IapbError):
     """A file is not a readable run of this project."""
 

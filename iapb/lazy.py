@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
+from iapb.errors import name_the_extra
+
 
 def lazy_names(
     package: str, homes: Mapping[str, str]
@@ -22,7 +24,11 @@ def lazy_names(
     def load(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(homes[name], package), name)
+        try:
+            home = import_module(homes[name], package)
+        except ModuleNotFoundError as error:
+            raise name_the_extra(error, f"{package}.{name}") from error
+        value = getattr(home, name)
         setattr(sys.modules[package], name, value)
         return value
 

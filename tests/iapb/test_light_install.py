@@ -1,0 +1,69 @@
+"""The engine works without the packages of the extras, and whoever lacks one reads which extra brings it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from iapb.errors import EXTRAS
+
+ROOT = Path(__file__).resolve().parents[2]
+IMPORTED_AS = {"pin": "pinocchio", "python-flint": "flint"}
+WITHOUT = """
+import sys
+from importlib.abc import MetaPathFinder
+
+class Missing(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {missing!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Missing())
+"""
+
+
+def run_without(missing: set[str], code: str) -> subprocess.CompletedProcess[str]:
+    """Run code in a new interpreter in which these packages cannot be imported."""
+    return subprocess.run([sys.executable, "-c", WITHOUT.format(missing=missing) + code], cwd=ROOT, capture_output=True,
+                          text=True)  # fmt: skip
+
+
+def test_the_extras_of_the_messages_are_those_of_the_project() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    bring = {IMPORTED_AS.get(name, name): extra for extra in ("reference", "verify", "report") for line in extras[extra]
+             if not (name := line.partition(">")[0]).startswith("iapb")}  # fmt: skip
+    assert bring == EXTRAS
+
+
+def test_simulate_and_resolve_need_no_extra() -> None:
+    done = run_without(set(EXTRAS), """
+from iapb import find_scene, resolve_impact, simulate
+print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]], [[1.0]], [-1.0], 0.0).velocity)
+""")
+    assert done.stdout == "5 [0.]\n", done.stderr
+
+
+
+
+def test_a_name_that_needs_an_extra_says_which() -> None:
+    done = run_without({"hypothesis"}, "from verification import check_passivity")
+    assert ("MissingDependencyError: verification.check_passivity needs hypothesis, which is not installed. "
+            "Install it with: pip install 'iapb[verify]'") in done.stderr  # fmt: skip
+
+
+def test_the_command_without_its_packages_says_so_in_one_sentence() -> None:
+    done = run_without({"typer"}, "import reports; raise SystemExit(reports.main())")
+    assert done.returncode == 1
+    assert done.stderr == ("iapb: The command needs typer, which is not installed. "
+                           "Install it with: pip install 'iapb[report]'\n")  # fmt: skip
+
+
+def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
+    (tmp_path / "verification").mkdir()
+    (tmp_path / "verification" / "__init__.py").touch()
+    code = f"sys.path.insert(0, {str(tmp_path)!r}); import reports; raise SystemExit(reports.main())"
+    done = run_without(set(), code)
+    assert done.returncode == 1
+    assert f"{tmp_path / 'verification'} hides the package {ROOT / 'verification'}" in done.stderr
