@@ -7,7 +7,7 @@ in `EFFECTS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,13 +41,15 @@ _POSES = 4  # at which gravity is looked for
 class Effect:
     """One effect of a scene: on or off, why, and what leaving it out would change.
 
-    `reason` and `left_out` are sentences for readers; `reason` carries the scene's own values.
+    `reason` and `left_out` are sentences for readers; `reason` carries the scene's own values. `ignores` names the
+    field of the contact section that contacts would need and that the law does not use; else it is empty.
     """
 
     name: str
     active: bool
     reason: str
     left_out: str
+    ignores: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,10 @@ class Question:
         if self.pairs == 0:
             return "nothing can touch: the scene has no pair of shapes"
         return None if part in self.uses else f"the law '{self.law}' does not use it"
+
+    def ignored(self, field: str, *parts: str) -> str:
+        """Return the field where contacts would need it and the law uses none of these parts; else an empty text."""
+        return field if self.pairs and not self.uses.intersection(parts) else ""
 
     def without_device(self) -> str | None:
         """Return why no device takes part; None if one does."""
@@ -214,9 +220,9 @@ def impulses(question: Question) -> Effect:
     if unused is None and question.restitutions[-1] == -1.0:
         unused = f"{_restitution(question)}: an impulse would be zero"
     reason = unused or f"new contacts collide: {_restitution(question)}"
-    return Effect(
-        "impulses", unused is None, reason, "bodies would be stopped by springs alone and sink in further"
-    )
+    left_out = "bodies would be stopped by springs alone and sink in further"
+    ignored = question.ignored("restitution", IMPULSES, OWN_RESTITUTION)
+    return Effect("impulses", unused is None, reason, left_out, ignored)
 
 
 def _restitution(question: Question) -> str:
@@ -254,21 +260,24 @@ def penalty_stiffness(question: Question) -> Effect:
     """K of (5)."""
     value = question.scene.contact.stiffness
     active, reason = _valued(question, PENALTY, "stiffness", value, "N/m")
-    return Effect("penalty_stiffness", active, reason, "nothing would hold a body that rests on another")
+    ignored = question.ignored("stiffness", PENALTY) if value else ""
+    return Effect("penalty_stiffness", active, reason, "nothing would hold a body that rests on another", ignored)
 
 
 def contact_damping(question: Question) -> Effect:
     """B of (5)."""
     value = question.scene.contact.damping
     active, reason = _valued(question, PENALTY, "damping", value, "N s/m")
-    return Effect("contact_damping", active, reason, "resting contacts would swing on their springs")
+    ignored = question.ignored("damping", PENALTY) if value else ""
+    return Effect("contact_damping", active, reason, "resting contacts would swing on their springs", ignored)
 
 
 def friction(question: Question) -> Effect:
     """Friction at resting contacts: Coulomb's law, or (6)."""
     value = question.scene.contact.friction
     active, reason = _valued(question, FRICTION, "friction", value, "")
-    return Effect("friction", active, reason, "bodies would slide along each other without loss")
+    ignored = question.ignored("friction", FRICTION) if value else ""
+    return Effect("friction", active, reason, "bodies would slide along each other without loss", ignored)
 
 
 def clustering(question: Question) -> Effect:
@@ -449,6 +458,12 @@ def decide_for(
         own_gains=coupling if hasattr(coupling, "stiffness") else None, rendering=rendering,
     )
     return tuple(decide(question) for decide in EFFECTS)
+
+
+def ignored_fields(effects: Iterable[Any]) -> tuple[str, ...]:
+    """Return the fields that the scene gives and the law ignores, friction first; of effects, or those of a run."""
+    found = [effect.ignores for effect in effects if effect.ignores]
+    return tuple(sorted(found, key=lambda field: field != "friction"))
 
 
 def active_names(effects: Sequence[Effect]) -> frozenset[str]:

@@ -172,7 +172,8 @@ class Recorder:
             **{each.name: self.joined("steps", each.name) for each in _STEPS},
             contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in _CONTACTS}),
             impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in _IMPACTS}),
-            energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason) for one in simulation.effects),
+            energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
+                                     for one in simulation.effects),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped,
         )

@@ -111,11 +111,12 @@ class ImpactTable:
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One line of the effects table: what was on, and why."""
+    """One line of the effects table: what was on, and why; `ignores`: the field of the scene that the law ignored."""
 
     name: str
     active: bool
     reason: str
+    ignores: str = ""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact.laws import OWN_RESTITUTION, StepResult
+from iapb.contact.laws import FRICTION, IMPACT_FRICTION, OWN_RESTITUTION, StepResult
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
@@ -75,12 +75,16 @@ class RigidConstraints:
     scheme: str = "automatic"
     friction: str = "none"
     name = "rigid constraints"
-    uses = frozenset({OWN_RESTITUTION})
 
     def __post_init__(self) -> None:
         for argument, value, known in (("scheme", self.scheme, SCHEMES), ("friction", self.friction, FRICTION_LAWS)):
             if value not in known:
                 raise ArgumentError(argument, value, one_of(value, known))
+
+    @property
+    def uses(self) -> frozenset[str]:
+        """Parts of the contact section that the law uses: restitution, and friction in all but "none"."""
+        return frozenset({OWN_RESTITUTION} | ({FRICTION, IMPACT_FRICTION} if self.friction != "none" else set()))
 
     @property
     def settings(self) -> dict[str, Any]:

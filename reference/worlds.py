@@ -6,9 +6,11 @@
 | IAPB | impulses and penalties | four-channel |
 | PB | penalties | four-channel |
 | CBuc | rigid constraints | unilateral coupler |
+| ideal-friction | rigid constraints with Coulomb's law of friction, by complementarity | four-channel |
 | IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
 | IAPB-push | impulses that only push (two LCPs), and penalties | four-channel |
 
+The paper's rigid worlds, ideal and CBuc, have no friction: they ignore the scene's, and a run says so.
 Restitution that differs between bodies needs no world of its own: IAPB does as the scene says.
 """
 
@@ -49,6 +51,9 @@ WORLDS: dict[str, Callable[[str], World]] = {
     "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
     "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
     "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
+    "ideal-friction": lambda rendering: World(
+        "ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"
+    ),
     "IAPB-friction": lambda rendering: World(
         "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
     ),
@@ -63,7 +68,7 @@ def find_world(name: str, rendering: str = "full") -> World:
 
     Parameters
     ----------
-    name : ideal, IAPB, PB or CBuc
+    name : a key of `WORLDS`
     rendering : how IAPB meets the device's limits: full (ignores them), saturate, scale or spread
 
     Raises
@@ -88,7 +93,7 @@ def run_world(
     partial: bool = False,
     **options: Any,
 ) -> Run:
-    """Simulate a scene in one of the paper's worlds.
+    """Simulate a scene in a world.
 
     Parameters
     ----------

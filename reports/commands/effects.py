@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from iapb import decide_effects
+from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError
 from reference.worlds import find_world
 from reports.commands.progress import stage_progress
@@ -19,8 +20,8 @@ from verification.cost.effects import effects_of, summary
 def effects(
     scene: SceneName,
     world: Annotated[str | None, typer.Option(
-        help="Decide for one world (ideal, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an effect is on if some "
-             "world needs it.")] = None,
+        help="Decide for one world (ideal, ideal-friction, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an "
+             "effect is on if some world needs it.")] = None,
     rendering: Rendering = "full",
     measure: Annotated[bool, typer.Option(
         "--measure", help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "
@@ -37,7 +38,9 @@ def effects(
         chosen = find_world(world, rendering)
         found = decide_effects(source, chosen.law, chosen.coupling_in(source))
     on = [effect for effect in found if effect.active]
-    print(f"Effects of {source.name}" + (f" in {world}" if world else "") + ": what is on, and what it prevents")
+    ignored = ignored_fields(found)
+    said = f" ({world} ignores {', '.join(ignored)})" if ignored else ""
+    print(f"Effects of {source.name}" + (f" in {world}" if world else "") + f": what is on, and what it prevents{said}")
     for effect in on:
         print(f"  {effect.name:<20}{effect.reason}\n{'':<22}without it: {effect.left_out}")
     print("Off, because")

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from iapb.effects import ignored_fields
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED
@@ -30,8 +31,9 @@ def scene_given(name: str, values: list[str] | None) -> Scene:
 
 def run(
     scene: SceneName,
-    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); IAPB-friction: with "
-                                            "Coulomb friction in impacts; IAPB-push: contacts only push.")] = "IAPB",
+    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); ideal-friction: with "
+                                            "Coulomb friction; IAPB-friction: with Coulomb friction in impacts; "
+                                            "IAPB-push: contacts only push.")] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
@@ -56,7 +58,9 @@ def describe(run: Run, existed: bool) -> None:
     """Say in sentences what happened."""
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
-    print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}.")
+    ignored = ignored_fields(run.effects)
+    said = f"; ignores {', '.join(ignored)}" if ignored else ""
+    print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}.")
     print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
           f"({duration(seconds / steps)} a step).")
     impacts = run.impacts

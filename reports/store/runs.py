@@ -172,6 +172,8 @@ def _write_effects(group: Any, run: Run) -> None:
     reasons = tuple(effect.reason for effect in run.effects)
     write_quantity(group, "active", np.array(active, np.int8), ("effect",), "1", "1 where the effect was on")
     write_quantity(group, "reason", reasons, ("effect",), "1", "why")
+    ignores = tuple(effect.ignores for effect in run.effects)
+    write_quantity(group, "ignores", ignores, ("effect",), "1", "field of the scene that the law ignored, or empty")
 
 
 def read_run(path: Path | str) -> Run:
@@ -305,5 +307,6 @@ def _energy(group: Any, path: str) -> dict[str, Any]:
 
 def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:
     names, active, reasons = (read_values(group, name, path) for name in ("effect", "active", "reason"))
-    rows = zip(names, active, reasons, strict=True)
-    return tuple(EffectRow(name, bool(on), reason) for name, on, reason in rows)
+    ignores = read_values(group, "ignores", path) if "ignores" in group else ("",) * len(names)  # files of before
+    rows = zip(names, active, reasons, ignores, strict=True)
+    return tuple(EffectRow(name, bool(on), reason, ignored) for name, on, reason, ignored in rows)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError, IapbError
-from iapb.scene import find_scene, load_scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate
 from reference.worlds import WORLDS, find_world, require_complete, run_world
 
@@ -17,8 +18,9 @@ PEG = load_scene(find_scene("peg_corner"))
 STEPS = 60
 
 COUPLINGS = {"ideal": "four-channel", "IAPB": "four-channel", "PB": "four-channel", "CBuc": "unilateral",
-             "IAPB-friction": "four-channel", "IAPB-push": "four-channel"}
+             "ideal-friction": "four-channel", "IAPB-friction": "four-channel", "IAPB-push": "four-channel"}
 LAWS = {"ideal": "rigid constraints", "IAPB": "impulse-augmented penalty", "PB": "penalty", "CBuc": "rigid constraints",
+        "ideal-friction": "rigid constraints",
         "IAPB-friction": "impulse-augmented penalty with impact friction",
         "IAPB-push": "impulse-augmented penalty, contacts only push"}
 
@@ -45,6 +47,42 @@ def test_contacts_of_the_pushing_world_never_pull_and_those_of_iapb_do():
     least = {name: run_world(PEG, name).contacts.impulse.min() for name in ("IAPB", "IAPB-push")}
     assert least["IAPB"] < -1e-6 and least["IAPB-push"] >= 0.0
     assert run_world(PEG, "IAPB-push").impacts.energy_lost.min() >= 0.0
+
+
+SLOPE = Scene.model_validate({
+    "name": "slope", "rate": 500.0, "duration": 0.2, "gravity": [0.0, -9.81],
+    "bodies": [{"name": "box", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 600.0,
+                "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
+                "position": [0.05 * np.sin(np.pi / 9.0), 0.05 * np.cos(np.pi / 9.0), -np.pi / 9.0]}],
+    "walls": [{"name": "slope", "kind": "half_plane", "point": [0.0, 0.0],
+               "normal": [np.sin(np.pi / 9.0), np.cos(np.pi / 9.0)]}],
+    "contact": {"friction": 0.5},
+})  # fmt: skip
+
+
+def test_a_box_on_a_slope_slides_in_the_world_without_friction_and_sticks_in_the_one_with_it():
+    down = np.array([np.cos(np.pi / 9.0), -np.sin(np.pi / 9.0)])
+    slid = {name: float(np.diff(run_world(SLOPE, name).q[[0, -1], :2], axis=0)[0] @ down)
+            for name in ("ideal", "ideal-friction")}  # fmt: skip
+    # The step is a hundredth of 0.2 s, and the law is of first order.
+    assert slid["ideal"] == pytest.approx(0.5 * 9.81 * np.sin(np.pi / 9.0) * 0.2**2, rel=0.02)
+    assert abs(slid["ideal-friction"]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "ignored"),
+    [("ideal", ("friction", "stiffness", "damping")), ("ideal-friction", ("stiffness", "damping")),
+     ("PB", ("restitution",)), ("IAPB", ()), ("IAPB-friction", ())],
+)  # fmt: skip
+def test_a_run_says_which_fields_of_the_scene_its_law_ignores(name, ignored):
+    assert ignored_fields(run_world(SLOPE, name, steps=1).effects) == ignored
+
+
+def test_what_a_scene_does_not_give_is_not_said_to_be_ignored():
+    bare = SLOPE.with_values({"contact.friction": 0.0, "contact.damping": 0.0})
+    assert ignored_fields(run_world(bare, "ideal", steps=1).effects) == ("stiffness",)
+    alone = load_scene(find_scene("double_pendulum"))
+    assert ignored_fields(run_world(alone, "ideal", steps=1).effects) == ()
 
 
 def test_a_scene_may_be_given_by_name_or_path():

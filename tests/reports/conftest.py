@@ -82,7 +82,8 @@ def make_run() -> Callable[..., Run]:
             "contacts": _contacts(rng, steps, contacts),
             "impacts": _impacts(rng, impacts, d),
             "energy": {"kinetic": rng.random(steps + 1), "impact_loss": rng.random(steps)},
-            "effects": (EffectRow("gravity", False, "the scene names none"), EffectRow("friction", True, "μ = 0.3")),
+            "effects": (EffectRow("gravity", False, "the scene names none"), EffectRow("friction", True, "μ = 0.3"),
+                        EffectRow("contact_damping", False, "no springs", "damping")),
             "chunk_steps": np.array([steps], np.int64),
             "chunk_seconds": np.array([0.5]),
         }
