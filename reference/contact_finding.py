@@ -44,16 +44,10 @@ class Contacts(NamedTuple):
 
 def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float) -> Contacts:
     """The contacts with gap <= margin [m]; axes (n + 1, 3, 3), origins (n + 1, 3) of bodies, the world's last."""
-    ids, values = np.empty((_room(shapes, pairs), 3), np.int64), np.empty((_room(shapes, pairs), 7))
-    turned = axes[shapes.body]
-    center = np.einsum("kij,kj->ki", turned, shapes.center) + origins[shapes.body]
-    frames = turned @ shapes.axes
-    owner = np.repeat(shapes.body, shapes.count)
-    flat = np.zeros((len(owner), 3))
-    flat[:, :2] = shapes.vertices
-    corners = np.einsum("kij,kj->ki", axes[owner], flat) + origins[owner]
-    for plane in np.flatnonzero(shapes.kind == HALF_PLANE):  # its second row is a direction
-        corners[shapes.first[plane] + 1] -= origins[shapes.body[plane]]
+    room = _room(shapes.kind, shapes.count, pairs)
+    ids, values = np.empty((room, 3), np.int64), np.empty((room, 7))
+    corners, center, frames = _placed(shapes.kind, shapes.first, shapes.count, shapes.body, shapes.vertices,
+                                      shapes.center, shapes.axes, axes, origins)  # fmt: skip
     count = _find(shapes.kind, shapes.radius, shapes.first, shapes.count, corners, center, frames, shapes.half_size,
                   pairs, float(margin), ids, values)  # fmt: skip
     a, b = ids[:count, 0].astype(np.int32), ids[:count, 1].astype(np.int32)
@@ -61,10 +55,33 @@ def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origin
                     values[:count, 6])  # fmt: skip
 
 
-def _room(shapes: Shapes, pairs: NDArray[np.int32]) -> int:
+@numba.njit(cache=True, fastmath=False)
+def _room(kind, count, pairs):  # type: ignore[no-untyped-def]
     """Largest number of contacts, with room for a clipped face."""
-    most = np.where(shapes.kind == BOX, 8, np.maximum(shapes.count, 2))
-    return int(most[pairs[:, 0]].sum()) + 16 if len(pairs) else 1
+    room = 16
+    for k in range(len(pairs)):
+        a = pairs[k, 0]
+        room += 8 if kind[a] == BOX else max(count[a], 2)
+    return room
+
+
+@numba.njit(cache=True, fastmath=False)
+def _placed(kind, first, count, body, vertices, center, frames, axes, origins):  # type: ignore[no-untyped-def]
+    """Corners, centres and axes of all shapes in the world; the second row of a half-plane is a direction."""
+    corners, centers, turned = np.zeros((len(vertices), 3)), np.zeros((len(kind), 3)), np.zeros((len(kind), 3, 3))
+    for s in range(len(kind)):
+        own, origin = axes[body[s]], origins[body[s]]
+        for i in range(3):
+            for k in range(3):
+                centers[s, i] += own[i, k] * center[s, k]
+                for j in range(3):
+                    turned[s, i, j] += own[i, k] * frames[s, k, j]
+            centers[s, i] += origin[i]
+            for c in range(first[s], first[s] + count[s]):
+                corners[c, i] = own[i, 0] * vertices[c, 0] + own[i, 1] * vertices[c, 1]
+                if kind[s] != HALF_PLANE or c == first[s]:
+                    corners[c, i] += origin[i]
+    return corners, centers, turned
 
 
 @numba.njit(cache=True, fastmath=False)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,16 +63,29 @@ def contact_jacobian(directions: Floats, geometry: Contacts, origins: Floats, fr
     With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
     origins (n + 1, 3), frames (n + 1, 6, d) : of the bodies, the world's last
     """
-    count = len(directions)
-    rows, sizes = np.zeros((count, frames.shape[2])), np.zeros(count)
-    norms = np.linalg.norm(frames.reshape(-1, 2, 3 * frames.shape[2]), axis=2)
-    for bodies, sign in ((geometry.body_a, 1.0), (geometry.body_b, -1.0)):
-        arms = geometry.point - origins[bodies]
-        along = np.concatenate([directions, cross(arms, directions)], axis=1)
-        rows += sign * np.einsum("cx,cxd->cd", along, frames[bodies])
-        reach = np.linalg.norm(arms, axis=1) + np.linalg.norm(geometry.point, axis=1)
-        sizes += norms[bodies, 0] + reach * norms[bodies, 1]
-    rows[np.linalg.norm(rows, axis=1) <= ROW_NOISE * sizes] = 0.0
+    return np.asarray(_rows(directions, geometry.point, geometry.body_a, geometry.body_b, origins, frames))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _rows(directions, points, bodies_a, bodies_b, origins, frames):  # type: ignore[no-untyped-def]
+    count, d = len(directions), frames.shape[2]
+    rows, along = np.zeros((count, d)), np.empty(6)
+    for c in range(count):
+        n, size, length = directions[c], 0.0, 0.0
+        for side in range(2):
+            body, sign = (bodies_a[c], 1.0) if side == 0 else (bodies_b[c], -1.0)
+            x, y, z = points[c] - origins[body]
+            along[:3] = n
+            along[3], along[4], along[5] = y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0]
+            for k in range(d):
+                for i in range(6):
+                    rows[c, k] += sign * along[i] * frames[body, i, k]
+            reach = np.sqrt(x * x + y * y + z * z) + np.sqrt((points[c] ** 2).sum())
+            size += np.sqrt((frames[body, :3] ** 2).sum()) + reach * np.sqrt((frames[body, 3:] ** 2).sum())
+        for k in range(d):
+            length += rows[c, k] ** 2
+        if np.sqrt(length) <= ROW_NOISE * size:
+            rows[c] = 0.0
     return rows
 
 
@@ -111,25 +125,46 @@ def write_contacts(
 
     friction : (c, 3) tangential impulses, world axes, recorded as forces where `forced`
     """
-    kept = np.flatnonzero((found.gap <= 0.0) | (impulse > 0.0))
-    was = identities(state.contacts, range(int(state.contact_count[0])))
-    identity = identities(found.geometry, kept)
-    for name in Contacts._fields:
-        getattr(state.contacts, name)[: len(kept)] = getattr(found.geometry, name)[kept]
-    state.contacts.normal_velocity[: len(kept)] = found.gamma[kept]
-    state.contacts.normal_force[: len(kept)] = np.where(forced, impulse, 0.0)[kept] / dt
-    state.contacts.friction_force[: len(kept)] = np.where(forced[:, None], friction, 0.0)[kept] / dt
-    state.contacts.is_new[: len(kept)] = [name not in was for name in identity]
-    state.contact_impulse[: len(kept)] = np.where(forced, 0.0, impulse)[kept]
-    state.contact_count[1], state.contact_count[0] = state.contact_count[0], len(kept)
+    into = state.contacts
+    _write(into.shape_a, into.shape_b, into.feature, into.body_a, into.body_b, into.point, into.normal, into.gap,
+           into.is_new, into.normal_velocity, into.normal_force, into.friction_force, state.contact_impulse,
+           state.contact_count, *found.geometry, found.gamma, impulse, friction, forced, dt)  # fmt: skip
 
 
-def write_impact(state: Any, system: Any, v: Floats, change: Floats, impulse: Floats, rows: Floats) -> None:
-    """Log the blows of a step as one impact: velocity before, its change, generalized impulse and rows (c, d)."""
+@numba.njit(cache=True, fastmath=False)
+def _write(  # type: ignore[no-untyped-def]
+    into_a, into_b, into_feature, into_body_a, into_body_b, into_point, into_normal, into_gap, is_new, normal_velocity,
+    normal_force, friction_force, blow, contact_count, shape_a, shape_b, body_a, body_b, feature, point, normal, gap,
+    gamma, impulse, friction, forced, dt,
+):  # fmt: skip
+    before, count = contact_count[0], 0
+    old_a, old_b, old_feature = into_a[:before].copy(), into_b[:before].copy(), into_feature[:before].copy()
+    for c in range(len(gap)):
+        if gap[c] > 0.0 and not impulse[c] > 0.0:
+            continue
+        new = True
+        for k in range(before):
+            if old_a[k] == shape_a[c] and old_b[k] == shape_b[c] and old_feature[k] == feature[c]:
+                new = False
+        into_a[count], into_b[count], into_feature[count] = shape_a[c], shape_b[c], feature[c]
+        into_body_a[count], into_body_b[count], into_gap[count] = body_a[c], body_b[c], gap[c]
+        is_new[count], normal_velocity[count] = new, gamma[c]
+        normal_force[count] = impulse[c] / dt if forced[c] else 0.0
+        blow[count] = 0.0 if forced[c] else impulse[c]
+        for i in range(3):
+            into_point[count, i], into_normal[count, i] = point[c, i], normal[c, i]
+            friction_force[count, i] = friction[c, i] / dt if forced[c] else 0.0
+        count += 1
+    contact_count[1], contact_count[0] = before, count
+
+
+def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats) -> None:
+    """Log the blows of a step as one impact: velocity before, mass matrix, generalized impulse and rows (c, d)."""
     log = state.impacts
     log.logged[0] = 0
     if not len(rows):
         return
+    change = np.linalg.solve(mass, impulse)
     log.group[0], log.rows[0], log.rank[0] = max(system.tool_tree, 0), len(rows), np.linalg.matrix_rank(rows)
     log.scale[0], log.clamp[0] = 1.0, 1.0
     log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
@@ -139,4 +174,5 @@ def write_impact(state: Any, system: Any, v: Floats, change: Floats, impulse: Fl
 
 def identities(contacts: Any, rows: Any) -> list[tuple[int, int, int]]:
     """Which contact each row is: its two shapes and their features."""
-    return [(int(contacts.shape_a[i]), int(contacts.shape_b[i]), int(contacts.feature[i])) for i in rows]
+    first, second, feature = contacts.shape_a, contacts.shape_b, contacts.feature
+    return [(int(first[i]), int(second[i]), int(feature[i])) for i in rows]

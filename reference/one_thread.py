@@ -6,9 +6,13 @@ them: the rigid world then took four times as long with four busy neighbours on 
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import Any
+
+_limited: ContextVar[bool] = ContextVar("_limited", default=False)
 
 
 @cache
@@ -21,7 +25,15 @@ def _controller() -> Any:
     return ThreadpoolController()
 
 
-def one_thread() -> AbstractContextManager[object]:
-    """Limit the BLAS of numpy and of scipy to one thread."""
-    limited: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
-    return limited
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Limit the BLAS of numpy and of scipy to one thread; inside another such block this costs nothing."""
+    if _limited.get():
+        yield
+        return
+    with _controller().limit(limits=1, user_api="blas"):
+        token = _limited.set(True)
+        try:
+            yield
+        finally:
+            _limited.reset(token)

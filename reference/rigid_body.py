@@ -45,11 +45,13 @@ class PinocchioMechanism:
         self.model, self.data = model, model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
         self._bodies: list[int] | None = None  # frames of the bodies, in the mechanism's order
+        self._below = np.tril_indices(self.nv, -1)
 
     def mass_matrix(self, q: Floats) -> Floats:
         """M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
-        upper = np.triu(_pinocchio().crba(self.model, self.data, q))
-        return upper + np.triu(upper, 1).T
+        mass = np.array(_pinocchio().crba(self.model, self.data, q))
+        mass[self._below] = mass.T[self._below]
+        return mass
 
     def bias(self, q: Floats, v: Floats) -> Floats:
         """B(q, v) (d,) without gravity."""

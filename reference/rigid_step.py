@@ -32,6 +32,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,7 +107,7 @@ def rigid_step(
         where no solver reaches a residual of STEP_TOLERANCE; says with how many contacts, and what each solver said
     """
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
-    v_free = velocity + dt * np.linalg.solve(mass_matrix, force)
+    v_free = velocity + dt * solve_mass(mass_matrix, force)
     poisson = scheme == "stewart-trinkle" and bool(np.any(np.greater(restitution, 0.0)))
     if not poisson:
         try:
@@ -141,7 +142,7 @@ def poisson_step(
     """Compress to J v >= b, return e_i of each impulse (c,), and keep J v >= b once more."""
     compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
     returned = restitution * compressed.impulse
-    bounced = compressed.velocity + np.linalg.solve(mass_matrix, contact_jacobian.T @ returned)
+    bounced = compressed.velocity + solve_mass(mass_matrix, contact_jacobian.T @ returned)
     kept = nearest_velocity(mass_matrix, bounced, contact_jacobian, bound)
     impulse = compressed.impulse + returned + kept.impulse
     return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual), POISSON)
@@ -155,11 +156,60 @@ def nearest_velocity(
     offset = contact_jacobian[kept] @ v_free - bound[kept]
     if (offset >= 0.0).all():  # nothing is touched: the common step of free motion
         return RigidStep(v_free, impulse, 0.0)
-    cholesky = np.linalg.cholesky(mass_matrix)
-    rows = np.linalg.solve(cholesky, contact_jacobian[kept].T).T
+    factor = _cholesky(mass_matrix)
+    rows = _whitened(factor, contact_jacobian[kept])
     scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
     impulse[kept], residual = _solve_step(rows, offset, scale)
-    return RigidStep(v_free + np.linalg.solve(cholesky.T, rows.T @ impulse[kept]), impulse, residual)
+    return RigidStep(v_free + _back(factor, rows.T @ impulse[kept]), impulse, residual)
+
+
+def solve_mass(mass_matrix: Floats, right: Floats) -> Floats:
+    """M⁻¹ b for one vector b (d,)."""
+    factor = _cholesky(mass_matrix)
+    return np.asarray(_back(factor, _whitened(factor, right[None])[0]))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _cholesky(mass):  # type: ignore[no-untyped-def]
+    """Lower L of M = L Lᵀ; a step is so small that numpy's calls, not LAPACK, would take the time."""
+    factor = np.zeros_like(mass)
+    for j in range(len(mass)):
+        for i in range(j, len(mass)):
+            rest = mass[i, j]
+            for k in range(j):
+                rest -= factor[i, k] * factor[j, k]
+            if i == j:
+                if not rest > 0.0:
+                    raise np.linalg.LinAlgError("Matrix is not positive definite")
+                factor[j, j] = np.sqrt(rest)
+            else:
+                factor[i, j] = rest / factor[j, j]
+    return factor
+
+
+@numba.njit(cache=True, fastmath=False)
+def _whitened(factor, rows):  # type: ignore[no-untyped-def]
+    """Rows J L⁻ᵀ."""
+    found = np.empty(rows.shape)
+    for c in range(len(rows)):
+        for i in range(len(factor)):
+            rest = rows[c, i]
+            for k in range(i):
+                rest -= factor[i, k] * found[c, k]
+            found[c, i] = rest / factor[i, i]
+    return found
+
+
+@numba.njit(cache=True, fastmath=False)
+def _back(factor, right):  # type: ignore[no-untyped-def]
+    """L⁻ᵀ b."""
+    found = np.empty(len(right))
+    for i in range(len(right) - 1, -1, -1):
+        rest = right[i]
+        for k in range(i + 1, len(right)):
+            rest -= factor[k, i] * found[k]
+        found[i] = rest / factor[i, i]
+    return found
 
 
 def velocity_bounds(

@@ -118,7 +118,7 @@ class RigidConstraints:
         impulse = (normal + step.dragging)[:, blows].sum(axis=1)
         pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
         write_contacts(state, found, step.normal, step.tangential, ~blows, dt)
-        write_impact(state, system, v, np.linalg.solve(mass, impulse), impulse, found.jacobian[blows])
+        write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus = mechanics.integrate(q, step.velocity, dt)
         contact_state = _contact_state(found, step.normal, blows)
         return StepResult(q_plus, step.velocity, pressing, dragging, impulse, contact_state)

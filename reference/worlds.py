@@ -28,6 +28,7 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate
 from iapb.system import coupling_of
+from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 
 
@@ -118,7 +119,8 @@ def run_world(
         scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
     label = name if rendering == "full" else f"{name} {rendering}"
-    run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
+    with one_thread():  # once for all steps of a rigid world
+        run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
     return run if partial else require_complete(run)
 
 
