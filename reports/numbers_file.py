@@ -48,13 +48,14 @@ def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: st
 
 
 def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
-    yield from _outcomes("verdicts", ((one.topic, one.outcome, one.sentence, one.timed) for one in evidence.verdicts))
+    yield from _outcomes("verdicts", ((one.title, one.verdict, one.answer, one.timed) for one in evidence.topics))
     yield from _outcomes("claims", ((one.key, one.verdict, one.answer, one.timed) for one in evidence.claims))
     yield from _claim_parts(evidence.claims)
     for claim in evidence.claims:
         for name, table in claim.tables.items():
             yield f"claims/{claim.key}" + (f", {name}" if name != claim.key else ""), table
-    yield from _checks(evidence)
+    broken = tuple((f"{one.title}: {one.question}", one.answer) for one in evidence.counterexamples)
+    yield "counterexamples", titled(("who and law", "what happens"), broken, prose=("what happens",))
     yield from ((f"inputs/{name}", value) for name, value in evidence.inputs.items() if isinstance(value, Table))
     yield from ((f"effects/{scene}", table) for scene, table in evidence.effects.items())
     for topic in evidence.topics:
@@ -72,18 +73,6 @@ def _claim_parts(claims: Iterable[Finding]) -> Iterator[tuple[str, Table]]:
     yield "claims/parts", titled(titles, rows[False])
     if rows[True]:
         yield "claims/parts, from times", titled(titles, rows[True], timed=titles[1:], timed_rows=True)
-
-
-def _checks(evidence: Evidence) -> Iterator[tuple[str, Table]]:
-    yield "proofs", titled(("statement", "holds", "wrong twins"),
-                            tuple((one.name, one.holds, len(one.twins)) for one in evidence.proofs))
-    yield "properties", titled(
-        ("law", "cases", "worst", "bound", "holds", "fault caught"),
-        tuple((one.law, one.cases, one.worst, one.bound, one.holds, one.fault_caught) for one in evidence.properties),
-        prose=("worst",))  # fmt: skip
-    yield "counterexamples", titled(("who and law", "what happens"),
-                                     tuple((f"{one.who}: {one.law}", one.sentence) for one in evidence.counterexamples),
-                                     prose=("what happens",))  # fmt: skip
 
 
 def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Table]]:

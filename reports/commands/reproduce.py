@@ -63,8 +63,8 @@ def make_report(out: Path, depth: str) -> None:
     path = write_report(out / REPORT_NAME, build_report(evidence, recipes))
     failed = evidence.failed + failed_cases(out / "tables", "figures", undrawn)
     beside = write_companions(out, evidence, figures, depth)
-    for verdict in evidence.verdicts:
-        print(f"{verdict.topic}: {verdict.sentence}")
+    for topic in evidence.topics:
+        print(f"{topic.title}: {topic.answer}")
     size, files = path.stat().st_size / 1e6, len(evidence.manifest)
     print(f"\n{path} ({size:.1f} MB, from {files} run and table files) in {time.perf_counter() - started:.0f} s.")
     print(f"Beside it: {', '.join(file.name for file in beside)}.")

@@ -1,4 +1,4 @@
-"""All evidence of a report, stage by stage, and the sentence of the first page that each stage earns."""
+"""All evidence of a report, stage by stage."""
 
 from __future__ import annotations
 
@@ -7,32 +7,21 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from reports.evidence import (
-    claims,
-    counterexamples,
-    hard_cases,
-    proofs,
-    properties,
-    runs,
-)
+from reports.evidence import claims, runs
 from reports.evidence.depends import depends_of
 from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic, failed_topic
-from reports.evidence.verdicts import verdicts
 from reports.figures.two_link_arm import arm_energies
-from reports.pages.records import (
-    Counterexample,
-    Evidence,
-    FailedCases,
-    HardCase,
-    Property,
-)
+from reports.pages.records import Evidence, FailedCases
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
 from verification.cost import effects
 from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, Table, attempt
+from verification.hard_cases import study as hard_cases
+from verification.laws import study as laws
+from verification.proofs import check_all, on_proofs
 from verification.proofs.statement import ProofRecord
 
 Progress = Callable[[str, int, int], None]
@@ -40,7 +29,7 @@ Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress
 
 # what draws random numbers -> module with its SEED
 SEEDS = {
-    "claims": "verification.claims.study", "properties": "reports.evidence.properties",
+    "claims": "verification.claims.study", "properties": "verification.laws.study",
     "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.robots",
     "power balance": "verification.mechanics.power_balance",
     "coordinates": "verification.mechanics.coordinate_invariance",
@@ -58,22 +47,23 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs["arm_energies"] = _arm_energies()
 
     ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth))
-    proved = kept.stage("proofs", tuple[ProofRecord, ...], proofs.compute)
-    laws = kept.stage("properties", tuple[Property, ...], properties.compute)
-    broken = kept.stage("counterexamples", tuple[Counterexample, ...], counterexamples.compute)
-    bulk = kept.stage("bulk impacts", Table, partial(properties.bulk, depth), None)
-    hard = kept.stage("hard cases", tuple[HardCase, ...], partial(hard_cases.compute, runner))
+    proved = kept.stage("proofs", tuple[ProofRecord, ...], check_all)
+    broken = kept.stage("counterexamples", tuple[Finding, ...], laws.counterexamples)
+    hard = kept.stage("hard cases", tuple[Finding, ...], partial(hard_cases.hard_cases, runner))
     timed = kept.stage("accuracy", Table, _methods, None)
-    topics = tuple(_topic(kept, name, runner, depth) for name in TOPICS)
-    inputs |= {"work_precision": timed, "energy_gains": bulk, hard_cases.INPUT: hard_cases.summary(hard)}
+    gains, properties, *others = (_topic(kept, name, runner, depth) for name in TOPICS)
+    topics = (gains, kept.finding("proofs", proved, on_proofs), properties,
+              kept.finding("hard cases", hard, hard_cases.on_hard_cases), *others)  # fmt: skip
+    if kept.failures["claims"] and not ledger:
+        topics = (failed_topic("claims", kept.failures["claims"][0]), *topics)
+    inputs["work_precision"] = timed
     needed = kept.stage("effects", dict[str, Table], effects.effects_of_scenes, {})
     inputs["effect_costs"] = effects.summary(needed)
-    evidence = Evidence(
-        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, properties=laws, counterexamples=broken,
-        hard_cases=hard, effects=needed, topics=topics, failed=kept.failed(),
-        provenance=provenance(), manifest=manifest(runner.used, kept.stages, out), bulk=bulk,
+    return Evidence(
+        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, counterexamples=broken, hard_cases=hard,
+        effects=needed, topics=topics, failed=kept.failed(), provenance=provenance(),
+        manifest=manifest(runner.used, kept.stages, out),
     )  # fmt: skip
-    return _with_verdicts(evidence)
 
 
 def _methods(progress: Callable[[int, int], None], failures: list[Failure]) -> Table:
@@ -92,12 +82,6 @@ def provenance() -> dict[str, str]:
 
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
     return collect_provenance(seeds=seeds, packages=PEERS) | {"sources": evidence_version()}
-
-
-def _with_verdicts(evidence: Evidence) -> Evidence:
-    from dataclasses import replace
-
-    return replace(evidence, verdicts=verdicts(evidence))
 
 
 def _arm_energies() -> Mapping[str, Any]:
@@ -123,6 +107,11 @@ class _Kept:
             return found
 
         return self.attempt(name, records, nothing)
+
+    def finding(self, name: str, records: Sequence[Any], said: Callable[[Any, list[Failure]], Finding]) -> Finding:
+        """The finding on the records of a stage; without any, why there are none."""
+        failures = self.failures[name]
+        return said(records, failures) if records or not failures else failed_topic(name, failures[0])
 
     def attempt(self, name: str, compute: Compute, nothing: Any) -> Any:
         """What is computed under a name, or `nothing` where that raises; an interrupt passes through."""

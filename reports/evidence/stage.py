@@ -142,7 +142,7 @@ def plain_records(records: Any, tables: dict[str, Table], name: str = "table") -
         tables[label], words = columns_of(label, records)
         return words
     if is_dataclass(records) and not isinstance(records, type):
-        own = str(getattr(records, "id", None) or getattr(records, "key", None) or name)
+        own = str(getattr(records, "key", name))
         return {field.name: plain_records(getattr(records, field.name), tables, own) for field in fields(records)}
     if isinstance(records, Mapping):
         return {str(key): plain_records(value, tables, str(key)) for key, value in records.items()}

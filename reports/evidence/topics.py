@@ -10,6 +10,8 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 
 # key of the finding -> module and function of its study
 TOPICS: dict[str, str] = {
+    "energy-gains": "verification.laws.study:energy_gains",
+    "properties": "verification.laws.study:properties",
     "cross-checks": "verification.mechanics.cross_checks:cross_checks",
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
@@ -31,5 +33,5 @@ def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int
 def failed_topic(name: str, failure: Failure) -> Finding:
     """A topic in place of one that could not be computed: it says why."""
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
-    title = name.replace("-", " ").capitalize()
-    return finding_of(name, title, "", sentence, (Part(sentence, NOT_COMPUTED),))
+    key, title = name.replace(" ", "-"), name.replace("-", " ").capitalize()
+    return finding_of(key, title, "", sentence, (Part(sentence, NOT_COMPUTED),))

@@ -15,7 +15,7 @@ METHOD, CONDITION, GAIN, SHARE = "method", "condition of M from", "largest relat
 
 
 @recipe(
-    "energy-gains", "Does rounding make energy?", "energy_gains", section="properties",
+    "energy-gains", "Does rounding make energy?", "energy-gains/impacts", section="properties",
     caption="The worst of all random impacts in each decade of κ(M). First picture: the gain itself; second: the gain "
     "as a share of the bound 10 d ε √κ that the factored form promises. Above the dashed line the promise is broken.",
 )  # fmt: skip

@@ -15,7 +15,7 @@ from reports.figures.plot import Plot
 from reports.figures.style import AMBER, BLUE, INK, MUTED, PAPER, PURPLE, RULE, VERMILION, LineStyle
 from verification.finding import Table
 
-INPUT = "hard_cases"
+INPUT = "hard-cases/every method"
 CASE, KIND, METHOD, OUTCOME, GAIN, ERROR = "case", "kind", "method", "outcome", "energy gain", "forward error"
 STABLE = "stable"
 MARKS: dict[str, LineStyle] = {

@@ -15,7 +15,7 @@ from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
-from reports.pages.records import Evidence, Verdict
+from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
@@ -41,7 +41,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
     page, text = _environment().get_template("page.html.j2"), script()
     return page.render(
         script=text, policy=policy(text), played=played(figures),
-        evidence=evidence, sections=SECTIONS, figures=figures, verdicts=evidence.verdicts,
+        evidence=evidence, sections=SECTIONS, figures=figures,
         counts=count_verdicts(evidence.claims), maps={claim.key: map_of(claim) for claim in evidence.claims},
         part_counts=count_verdicts(part for claim in evidence.claims for part in claim.parts),
         used={user for entry in evidence.manifest for user in entry.used_by},
@@ -52,7 +52,7 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
     tables = {f"{topic.key}/{name}": table for topic in evidence.topics for name, table in topic.tables.items()}
-    return {**scenes, **tables, "energy_gains": evidence.bulk, **evidence.inputs}
+    return {**scenes, **tables, **evidence.inputs}
 
 
 def count_verdicts(found: Iterable[Finding | Part]) -> dict[str, int]:
@@ -82,11 +82,11 @@ def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, s
     return {name: figure.key for figure in drawn if figure.panels[0].film for name in figure.inputs}
 
 
-def badge_words(verdict: Verdict, topics: Sequence[Finding]) -> str:
-    """Return what a verdict of the first page amounts to in words; of a topic's findings, how many fail."""
-    parts = [part for topic in topics if topic.key == verdict.link for part in topic.parts]
-    failing = sum(part.verdict == REFUTED for part in parts)
-    return f"{failing} of {len(parts)} findings fail" if failing else FINDINGS[verdict.outcome]
+def badge_words(topic: Finding) -> str:
+    """Return what a topic amounts to in words, on the first page: how many of its findings fail."""
+    failing = sum(part.verdict == REFUTED for part in topic.parts)
+    counted = failing and len(topic.parts) > 1
+    return f"{failing} of {len(topic.parts)} findings fail" if counted else FINDINGS[topic.verdict]
 
 
 def counted(part: Part) -> str:

@@ -28,7 +28,7 @@ from verification.finding import VERDICTS, Column, Failure, Finding, Part, Table
 class Record:
     """A record as the stages have them."""
 
-    id: str
+    key: str
     value: float
     holds: bool
     note: str | None = None

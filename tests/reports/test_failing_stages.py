@@ -11,28 +11,19 @@ import pytest
 import typer
 
 import verification.claims
-import verification.hard_cases
-import verification.laws
-import verification.proofs
 from reports.commands import reproduce
-from reports.evidence import (
-    claims,
-    counterexamples,
-    gather,
-    hard_cases,
-    proofs,
-    properties,
-    runs,
-    survival,
-)
+from reports.evidence import claims, gather, runs, survival
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
+from verification import proofs
 from verification.claims import c07_plastic
 from verification.cost import effects, impacts
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
+from verification.hard_cases import study as hard_cases
 from verification.laws import engine_laws, impact_laws, trajectory_laws
+from verification.laws import study as laws
 from verification.mechanics import cross_checks
 
 Patch = pytest.MonkeyPatch
@@ -76,7 +67,7 @@ def of_proofs(patch: Patch, folder: Path) -> list[str]:
     patch.setattr(proofs, "all_proofs", lambda: ("one", "two", "three"))
     patch.setattr(proofs, "check", broken(lambda name: name, "two".__eq__))
     failures: list[Failure] = []
-    assert proofs.compute(nothing, failures) == ("one", "three")
+    assert proofs.check_all(nothing, failures) == ("one", "three")
     return [failure.case for failure in failures]
 
 
@@ -84,40 +75,39 @@ def of_properties(patch: Patch, folder: Path) -> list[str]:
     sizes = {"KIT_IMPACTS": 3, "FAULT_IMPACTS": 1, "ENGINE_CASES": 1, "SIMULATED": 1, "FAULT_CASES": 1,
              "TRAJECTORIES": 2, "IN_SPACE": 0, "TRAJECTORY_STEPS": 5}  # fmt: skip
     for name, size in sizes.items():
-        patch.setattr(properties, name, size)
+        patch.setattr(laws, name, size)
     impact, engine = next(iter(impact_laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
     chosen = {name: engine_laws.ENGINE_LAWS[name] for name in (engine, "budget") if name in engine_laws.ENGINE_LAWS}
-    for module in (engine_laws, properties):
+    for module in (engine_laws, laws):
         patch.setattr(module, "ENGINE_LAWS", chosen)
     of_runs = trajectory_laws.TRAJECTORY_LAWS
     for found, name in ((impact_laws.LAWS, impact), (chosen, engine), (of_runs, "finite")):
         patch.setitem(found, name, found[name]._replace(check=broken(found[name].check, lambda *_: True)))
-    failures: list[Failure] = []
-    records = properties.compute(nothing, failures)
+    found = laws.properties(None, "quick", nothing)
     every = len(impact_laws.LAWS) + len(chosen) + len(of_runs)
-    assert len(records) == every - 3
-    assert [failure.case for failure in failures] == [impact, engine, "finite"]
+    assert len(found.tables["laws"].rows) == every - 3
+    assert [failure.case for failure in found.failures] == [impact, engine, "finite"]
     return ["a law of each kind"]
 
 
 def of_counterexamples(patch: Patch, folder: Path) -> list[str]:
     for name in ("printed_formula", "restitution_per_contact", "saturation"):
-        made = getattr(counterexamples, name)
-        patch.setattr(counterexamples, name, broken(wraps(made)(lambda: 1), lambda name=name: name == "saturation"))
+        made = getattr(laws, name)
+        patch.setattr(laws, name, broken(wraps(made)(lambda: 1), lambda name=name: name == "saturation"))
     failures: list[Failure] = []
-    assert counterexamples.compute(nothing, failures) == (1, 1)
+    assert laws.counterexamples(nothing, failures) == (1, 1)
     return [failure.case for failure in failures]
 
 
 def of_bulk(patch: Patch, folder: Path) -> list[str]:
-    patch.setitem(properties.IMPACTS, "quick", 20)
-    patch.setitem(properties.COMPARED_IMPACTS, "quick", 20)
-    bulk = properties.bulk_impacts
-    patch.setattr(properties, "bulk_impacts", broken(bulk, lambda n, seed, method, clamp: clamp is False))
-    failures: list[Failure] = []
-    table = properties.bulk("quick", nothing, failures)
-    assert list(dict.fromkeys(row[0] for row in table.rows)) == ["factored", "gram_pinv, as printed"]
-    return [failure.case for failure in failures]
+    patch.setitem(laws.IMPACTS, "quick", 20)
+    patch.setitem(laws.COMPARED_IMPACTS, "quick", 20)
+    patch.setattr(laws, "bulk_impacts", broken(laws.bulk_impacts, lambda n, seed, method, clamp: clamp is False))
+    found = laws.energy_gains(None, "quick", nothing)
+    methods = found.tables["impacts"].column("method")
+    assert list(dict.fromkeys(methods)) == ["factored", "gram_pinv, as printed"]
+    assert "In 20 random impacts" in found.answer and found.verdict == NOT_COMPUTED
+    return [failure.case for failure in found.failures]
 
 
 def of_cross_checks(patch: Patch, folder: Path) -> list[str]:
@@ -145,9 +135,10 @@ def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
     patch.setattr(judge, "judge_hard_case", broken(judge.judge_hard_case, lambda case, method, _: (
         method, case.name) == ("svd", chosen["grazing"]().name)))  # fmt: skip
     failures: list[Failure] = []
-    found = hard_cases.compute(Runner(folder), nothing, failures)
-    assert [case.id for case in found] == ["grazing", "one_contact"]
-    assert "svd" not in found[0].outcomes and "svd" in found[1].outcomes
+    found = hard_cases.hard_cases(Runner(folder), nothing, failures)
+    assert [case.key for case in found] == ["grazing", "one_contact"]
+    assert ["svd" in [part.name for part in case.parts] for case in found] == [False, True]
+    assert hard_cases.on_hard_cases(found, failures).verdict == NOT_COMPUTED
     return [failure.case for failure in failures]
 
 

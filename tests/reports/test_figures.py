@@ -45,7 +45,8 @@ def inputs() -> dict[str, object]:
     names = {name for recipe in RECIPES for name in recipe.needs}
     given: dict[str, object] = {name: run for name in names if name.startswith(("corner/", "device/"))}
     given |= {name: load_scene(find_scene(name[6:])).resolved() for name in names if name.startswith("scene/")}
-    return given | {"group/IAPB": group, "arm_energies": arm_energies(), "energy_gains": GAINS, "work_precision": WORK}
+    tables = {"arm_energies": arm_energies(), "energy-gains/impacts": GAINS, "work_precision": WORK}
+    return given | tables | {"group/IAPB": group}
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.key)

@@ -6,53 +6,58 @@ from pathlib import Path
 
 import pytest
 
-from reports.evidence.hard_cases import INPUT, compute, summary
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, draw
-from reports.figures.hard_cases import MARKS, decade, hard_cases
-from reports.pages.records import HardCase
+from reports.figures.hard_cases import INPUT, MARKS, decade, hard_cases
 from reports.runner import Runner
-from verification.finding import Table
+from verification.finding import Finding, Table
+from verification.hard_cases import study
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 
 
+def summary(cases: tuple[Finding, ...]) -> Table:
+    return study.on_hard_cases(cases).tables["every method"]
+
+
 @pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[HardCase, ...]:
+def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Finding, ...]:
     from verification.hard_cases import catalogue
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("verification.hard_cases.shared_problems.FOLDER", Path("nowhere"))
         chosen = {name: catalogue.HARD_CASES[name] for name in (*CHOSEN, "bowl_of_low_rank")}
         patch.setattr("verification.hard_cases.judge.HARD_CASES", chosen)
-        patch.setattr("reports.evidence.hard_cases.HARD_CASES", chosen)
+        patch.setattr("verification.hard_cases.study.HARD_CASES", chosen)
         runner = Runner(tmp_path_factory.mktemp("runs"))
-        found = compute(runner, lambda done, total: None, [])
+        found = study.hard_cases(runner, lambda done, total: None, [])
         assert any("chatter" in label for label in runner.used)  # its runs are stored, and listed
     return found
 
 
-def test_every_case_is_a_record_with_a_row_for_each_method(cases: tuple[HardCase, ...]) -> None:
-    assert [case.id for case in cases] == [*CHOSEN, "bowl_of_low_rank"]
-    assert cases[0].outcomes["factored"] == "stable"
-    assert cases[1].outcomes["gram_cholesky"] == "gains energy"
-    assert (cases[2].kind, cases[2].outcomes["IAPB"]) == ("motion", "stable")
-    assert "bowl.5" in cases[3].skipped and not cases[3].numbers.rows
-    assert len(summary(cases).rows) == sum(len(case.outcomes) for case in cases)
+def test_every_case_is_a_record_with_a_row_for_each_method(cases: tuple[Finding, ...]) -> None:
+    assert [case.key for case in cases] == [*CHOSEN, "bowl_of_low_rank"]
+    outcomes = [{part.name: part.sentence for part in case.parts} for case in cases]
+    assert outcomes[0]["factored"] == "stable"
+    assert outcomes[1]["gram_cholesky"] == "gains energy"
+    assert (cases[2].details["kind"], outcomes[2]["IAPB"]) == ("motion", "stable")
+    assert "bowl.5" in cases[3].answer and not cases[3].computed and not cases[3].tables
+    assert len(summary(cases).rows) == sum(len(case.parts) for case in cases)
 
 
-def test_a_note_has_a_column_only_where_there_is_one(cases: tuple[HardCase, ...]) -> None:
-    assert all(len(row) == len(case.numbers.columns) for case in cases for row in case.numbers.rows)
-    assert "note" not in cases[0].numbers.keys
+def test_a_note_has_a_column_only_where_there_is_one(cases: tuple[Finding, ...]) -> None:
+    tables = [table for case in cases for table in case.tables.values()]
+    assert all("note" not in table.keys or any(table.column("note")) for table in tables)
+    assert "note" not in cases[0].tables[cases[0].key].keys
 
 
-def test_records_are_read_back_as_they_were(cases: tuple[HardCase, ...], tmp_path: Path) -> None:
-    stage = Stage(tmp_path, "hard_cases", tuple[HardCase, ...], {})
+def test_records_are_read_back_as_they_were(cases: tuple[Finding, ...], tmp_path: Path) -> None:
+    stage = Stage(tmp_path, "hard_cases", tuple[Finding, ...], {})
     assert stage.get_or_compute(lambda: cases) == cases
     assert stage.get_or_compute(lambda: pytest.fail("computed twice")) == cases
 
 
-def test_the_matrix_shows_every_case_and_method(cases: tuple[HardCase, ...]) -> None:
+def test_the_matrix_shows_every_case_and_method(cases: tuple[Finding, ...]) -> None:
     figure = draw(hard_cases, {INPUT: summary(cases)})
     assert isinstance(figure, Figure)
     assert [panel.label for panel in figure.panels] == ["Impacts, by method", "Motions, by world"]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.builder import ROWS_SHOWN, badge_words, build_page
-from reports.pages.records import Evidence, HardCase, StoredFile, Verdict
+from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from verification.finding import MIXED, REFUTED, REPRODUCED, WHERE, Part, Region, finding_of, titled
+from verification.hard_cases.study import finding_on
 
+DETAILS = dict.fromkeys(("source", "kind", "why it is hard", "truth", "expected"), "said")
 RUNS = tuple(
     StoredFile(f"run {n}", f"runs/{n}.h5", "k" * 64, f"{n:064d}", f"iapb run peg_corner --set rate={n}", 1000, ("C10",))
     for n in range(3)
@@ -34,7 +36,7 @@ def test_a_claim_without_runs_and_a_claim_on_times_say_so():
 
 
 def test_a_section_names_the_files_its_numbers_are_kept_in():
-    case = HardCase("bar", "bar", "ours", "impact", "w", "l", "e", titled(("method", "outcome"), (("svd", "stable"),)))
+    case = finding_on("bar", "bar", titled(("method", "outcome"), (("svd", "stable"),)), DETAILS)
     page = build_page(Evidence(claims=CLAIMS, hard_cases=(case,), manifest=KEPT), ())
     assert "<code>tables/claims-1.h5</code>" in page.split('<section id="claims"')[1].split("</section>")[0]
     assert "<code>tables/hard_cases-1.h5</code>" in page.split('<section id="hard-cases"')[1].split("</section>")[0]
@@ -77,5 +79,6 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count():
 
 def test_a_topic_with_failing_findings_counts_them():
     topic = finding_of("mechanics", "t", "l", "v", (Part("a", REPRODUCED), Part("b", REFUTED)))
-    assert badge_words(Verdict("t", REFUTED, "v", "mechanics"), (topic,)) == "1 of 2 findings fail"
-    assert badge_words(Verdict("t", MIXED, "v", "proofs"), (topic,)) == "mixed"
+    assert badge_words(topic) == "1 of 2 findings fail"
+    assert badge_words(finding_of("proofs", "t", "l", "v", (Part("a", REFUTED),))) == "fails"
+    assert badge_words(finding_of("proofs", "t", "l", "v", (Part("a", MIXED),))) == "mixed"

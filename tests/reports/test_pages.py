@@ -14,18 +14,10 @@ from typing import Any
 import pytest
 
 from iapb.errors import ArgumentError
-from reports.evidence.verdicts import verdicts as first_page
 from reports.figures.two_link_arm import arm_energies
 from reports.pages.builder import OUTCOME_MARKS
 from reports.pages.formulas import formula, prose
-from reports.pages.records import (
-    Evidence,
-    FailedCases,
-    HardCase,
-    Property,
-    StoredFile,
-    Verdict,
-)
+from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from reports.report import build_report, write_report
 from verification.cost.effects import COLUMNS as EFFECTS
@@ -35,12 +27,15 @@ from verification.finding import (
     REFUTED,
     REPRODUCED,
     VERDICTS,
+    Finding,
     Part,
-    failure_of,
     finding_of,
     table_of,
     titled,
 )
+from verification.hard_cases.study import finding_on, on_hard_cases
+from verification.laws.study import COLUMNS as LAWS
+from verification.laws.study import counterexample
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -76,22 +71,29 @@ class Outline(HTMLParser):
             self.wrong.append(tag)
 
 
-def _hard_case(*rows: tuple[Any, ...]) -> HardCase:
+SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "problems of others"})
+
+
+def _hard_case(*rows: tuple[Any, ...], title: str = "bar") -> Finding:
     numbers = titled(("method", "outcome", "forward error"), rows)
-    return HardCase("bar", "bar", "ours", "impact", "$0.5$ J", "exact", "no gain", numbers)
+    details = {"source": "ours", "kind": "impact", "why it is hard": "$0.5$ J", "truth": "exact", "expected": "no gain"}
+    return finding_on("bar", title, numbers, details)
 
 
 @pytest.fixture(scope="module")
 def full() -> Evidence:
     claim = finding_of("C01", "C01", "KE never rises <b>", "half of the printed loss: $\\frac{1}{2}$",
                        (Part("as printed.", MIXED, "as printed"),), {"C01": titled(("κ", "gain"), ((1e3, 2e-16),))})
+    law = {"law": "KE", "cases": 10, "worst": 0.0, "bound": 1.0, "holds": True, "fault": "sign", "fault caught": True}
     return Evidence(
         inputs={"arm_energies": arm_energies()},
-        verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "properties"),),
         claims=(claim, finding_of("C02", "C02", "the same", "no", (Part("n.", REFUTED),))),
-        properties=(Property("KE", 10, "0", "1", True, "sign", True),),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
-        topics=(finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
+        counterexamples=(counterexample("gram_pinv", "no gain", "It gains.", (("e", "0.5"),), "assert gain <= 0"),
+                         counterexample("saturate", "passive", "It gains too.", (("M", "[[1]]"),))),
+        topics=(finding_of("properties", "Energy", "", "It never rises.", (Part("It never rises.", REPRODUCED),),
+                           {"laws": table_of(LAWS, [law])}),
+                finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
                            (Part("It holds to 1e-14.", REPRODUCED),),
                            {"trees": titled(("joints", "error"), ((3, 1e-14),))}),),
         effects={"peg": table_of(EFFECTS, [{"effect": "gravity", "active": False, "reason": "none in the scene"}])},
@@ -162,6 +164,12 @@ def test_a_short_formula_has_the_signs_of_the_long_one() -> None:
     assert len(str(formula(latex))) < 0.8 * len(convert(latex))
 
 
+def test_a_counterexample_shows_its_input_and_the_test_to_paste(full: Evidence) -> None:
+    page = build_report(full)
+    assert "<code>assert gain &lt;= 0</code>" in page and '<th scope="row">e</th><td><code>0.5</code>' in page
+    assert page.count("and a test to paste") == 1 and "[[1]]" in page
+
+
 def test_text_is_escaped_and_formulas_are_not(full: Evidence) -> None:
     page = build_report(full)
     assert "KE never rises &lt;b&gt;" in page
@@ -188,14 +196,6 @@ def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
     assert str(prose(text)).replace("\u202f", " ") == shown
 
 
-def test_claims_have_no_common_verdict_unless_none_was_computed() -> None:
-    claims = (finding_of("C01", "C01", "s", "a", (Part("p", REPRODUCED),)),)
-    failed = (FailedCases("claims", (failure_of("C02", ValueError("planted")),), "file"),)
-    assert first_page(Evidence(claims=claims, failed=failed)) == ()
-    (verdict,) = first_page(Evidence(failed=failed))
-    assert (verdict.outcome, verdict.link) == (NOT_COMPUTED, "claims")
-
-
 def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
     page = build_report(Evidence(hard_cases=(_hard_case(("factored", "stable", 1e-16), ("gram", "refused", None)),)))
     assert '<span class="good">✓</span> factored: stable' in page
@@ -205,17 +205,17 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
 
 
 def test_a_hard_case_without_its_files_says_so() -> None:
-    page = build_report(Evidence(hard_cases=(replace(_hard_case(), skipped="needs bowl.lcp"),)))
+    page = build_report(Evidence(hard_cases=(SKIPPED,)))
     assert "Skipped: needs bowl.lcp." in page
 
 
 def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
-    stable, failing = _hard_case(("IAPB", "stable", 0.0)), _hard_case(("IAPB", "gains energy", 0.5))
-    (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, name="stiff wall"))))
-    assert verdict.outcome == MIXED
-    assert "1 of 2" in verdict.sentence and "stiff wall (gains energy)" in verdict.sentence
-    (verdict,) = first_page(Evidence(hard_cases=(stable, replace(failing, skipped="no file"))))
-    assert verdict.outcome == REPRODUCED and "1 were skipped" in verdict.sentence
+    stable = _hard_case(("IAPB", "stable", 0.0))
+    found = on_hard_cases((stable, _hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))
+    assert found.verdict == MIXED
+    assert "1 of 2" in found.answer and "stiff wall (gains energy)" in found.answer
+    found = on_hard_cases((stable, SKIPPED))
+    assert found.verdict == REPRODUCED and "1 were skipped" in found.answer
 
 
 def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Evidence) -> None:
@@ -225,11 +225,12 @@ def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Ev
     assert "<summary>Trees</summary>" in page
 
 
-def test_a_topic_with_a_verdict_stands_on_the_first_page_with_the_worst_of_its_findings() -> None:
+def test_a_topic_with_an_answer_stands_on_the_first_page_with_the_worst_of_its_findings() -> None:
     parts = (Part("a", REPRODUCED), Part("b", MIXED))
     topics = (finding_of("mechanics", "Linkages", "", "Most hold.", parts),
-              finding_of("scenes", "Scenes", "", "", parts))
-    assert first_page(Evidence(topics=topics)) == (Verdict("Linkages", MIXED, "Most hold.", "mechanics"),)
+              finding_of("scene-ledger", "Scenes", "", "", parts))
+    first = build_report(Evidence(topics=topics)).split('<section id="verdict"')[1].split("</section>")[0]
+    assert "Most hold." in first and ">mixed<" in first and "Scenes" not in first
 
 
 def test_prose_keeps_a_lone_dollar() -> None:

@@ -12,11 +12,24 @@ from __future__ import annotations
 
 import importlib
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from verification.finding import (
+    REFUTED,
+    REPRODUCED,
+    Column,
+    Failure,
+    Finding,
+    Part,
+    attempt,
+    finding_of,
+    table_of,
+)
 from verification.proofs.checking import checked
 
 if TYPE_CHECKING:
@@ -65,3 +78,26 @@ def check(name: str) -> ProofRecord:
     """
     started = time.perf_counter()
     return checked(load(name), started)
+
+
+def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[ProofRecord, ...]:
+    """Check all statements, none for one that raises."""
+    names = all_proofs()
+    records = []
+    for done, name in enumerate(names):
+        progress(done, len(names))
+        records.append(attempt(name, partial(check, name), failures))
+    progress(len(names), len(names))
+    return tuple(record for record in records if record is not None)
+
+
+def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = ()) -> Finding:
+    """How many statements are proved, and how many wrong twins refuted."""
+    rows = [{"statement": one.name, "holds": one.holds, "wrong twins": len(one.twins)} for one in records]
+    table = table_of((Column("statement"), Column("holds"), Column("wrong twins")), rows)
+    proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
+    sentence = (f"{proved} of {len(rows)} statements are proved by certificates that a machine expanded; "
+                f"{twins} wrong twins are refuted by exact counterexamples.")
+    parts = (Part(sentence, REPRODUCED if proved == len(rows) else REFUTED),)
+    return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, parts, {"statements": table},
+                      failures)  # fmt: skip

@@ -19,7 +19,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES
 from reports.figures.two_link_arm import arm_energies
-from reports.pages.records import Evidence, Verdict
+from reports.pages.records import Evidence
 from reports.report import build_report
 from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
 
@@ -102,10 +102,9 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
         inputs={**runs, "arm_energies": arm_energies()},
-        verdicts=(Verdict("Energy", REPRODUCED, "It never rises.", "claims"),),
         claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
                            (Part("p.", MIXED, "as printed"),), {"C01": table}),),
-        topics=(finding_of("scene-ledger", "The scenes", "Asked.", "", (Part("It holds.", REPRODUCED),),
+        topics=(finding_of("scene-ledger", "The scenes", "Asked.", "It holds.", (Part("It holds.", REPRODUCED),),
                            {"wide": table}),),
         provenance={"commit": "0123456789abcdef" * 4},
     )

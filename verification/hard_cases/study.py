@@ -1,0 +1,121 @@
+"""All named hard cases, every method and world on each: a Finding per case, and what the engine makes of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from verification.finding import (
+    NOT_COMPUTED,
+    REFUTED,
+    REPRODUCED,
+    Column,
+    Failure,
+    Finding,
+    Part,
+    Table,
+    attempt,
+    finding_of,
+    table_of,
+    verdict_of_trials,
+)
+from verification.hard_cases.case import CaseAbsent, HardCaseVerdict, TrajectoryCase
+from verification.hard_cases.catalogue import HARD_CASES
+from verification.hard_cases.judge import Simulate, judge_hard_cases
+
+STABLE = "stable"
+COLUMNS = (
+    Column("method"), Column("outcome"), Column("energy gain"), Column("gain allowed"), Column("restitution residual"),
+    Column("forward error"), Column("error allowed"), Column("smallest fault seen"), Column("rank"),
+    Column("exact rank"), Column("time", "µs", timed=True), Column("note"),
+)
+OF_CASE = (Column("case"), Column("kind"))
+_ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
+_NOTES = {
+    "impact": "Stable: gain at most 10 d ε √κ(M), restitution to 1e-8, error within what is allowed. Gain exact, "
+              "(KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric, allowed 10 n ε √κ (√κ + κ(A)), "
+              "n = max(c, d), κ of M scaled to a unit diagonal. Smallest fault: the least relative error of impulse or "
+              "velocity, planted in the answer, that is not stable any more. Median time of a call.",
+    "motion": "Stable: no energy made, restitution to 1e-8, error within what the step excuses. Gain: the most energy "
+              "ever made, as a share of what was there or was fed in; error: distance from the law as a share of the "
+              "answer; restitution of its collisions, weighted by the impulses. Smallest fault: all displacements and "
+              "changes of velocity too large, or too small, by that share. Median time of a step.",
+}  # fmt: skip
+
+
+def hard_cases(
+    simulate: Simulate, progress: Callable[[int, int], None], failures: list[Failure]
+) -> tuple[Finding, ...]:
+    """Judge all methods and worlds on all cases; a part per method. A case without its files says so."""
+    found = []
+    for done, name in enumerate(HARD_CASES):
+        progress(done, len(HARD_CASES))
+        found.append(attempt(name, partial(_judged, name, simulate, failures), failures))
+    progress(len(HARD_CASES), len(HARD_CASES))
+    return tuple(case for case in found if case is not None)
+
+
+def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:
+    """What the engine makes of the cases; in its table every method and world on every case."""
+    tried = [case for case in cases if case.computed]
+    ours = {case.title: _outcome(case) for case in tried}
+    failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
+    skipped = len(cases) - len(tried)
+    sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases with certain answers."
+                + (f" Not on: {'; '.join(failing)}." if failing else "")
+                + (f" {skipped} were skipped: their files are absent." if skipped else ""))  # fmt: skip
+    verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
+    question = "Is the engine stable on problems on which methods have been seen to fail?"
+    rows = [{"case": case.title, "kind": case.details["kind"], **row}
+            for case in tried for row in case.tables[case.key].records()]  # fmt: skip
+    table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all but the notes
+    parts = (Part(sentence, verdict),)
+    return finding_of("hard-cases", "Hard cases", question, sentence, parts, {"every method": table}, failures)
+
+
+def _outcome(case: Finding) -> str:
+    """What came of a case by the engine; empty where it was not tried."""
+    by = {part.name: part.sentence for part in case.parts}
+    return next((by[name] for name in _ENGINE if name in by), "")
+
+
+def _judged(name: str, simulate: Simulate, failures: list[Failure]) -> Finding:
+    try:
+        case = HARD_CASES[name]()
+    except CaseAbsent as absent:
+        return Finding(name, name.replace("_", " "), "", str(absent), NOT_COMPUTED,
+                       details={"source": "problems of others"})  # fmt: skip
+    kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
+    rows = [_row(found) for found in judge_hard_cases(cases=[name], simulate=simulate, failures=failures)]
+    table = table_of(COLUMNS, rows, digits=2, note=_NOTES[kind])
+    return finding_on(name, case.name, table if any(row["note"] for row in rows) else table.without("note"),
+                      {"kind": kind, "source": case.source, "why it is hard": case.why_hard, "truth": case.law,
+                       "expected": case.expected})  # fmt: skip
+
+
+def finding_on(key: str, title: str, table: Table, details: dict[str, str]) -> Finding:
+    """The finding on a case, from a row per method or world."""
+    parts = tuple(Part(row["outcome"], REPRODUCED if row["outcome"] == STABLE else REFUTED, row["method"])
+                  for row in table.records())  # fmt: skip
+    stable = [part.verdict == REPRODUCED for part in parts]
+    found = finding_of(key, title, "Which methods are stable?", f"{sum(stable)} of {len(parts)} stable", parts,
+                       {key: table})  # fmt: skip
+    return replace(found, verdict=verdict_of_trials(stable), details=details)
+
+
+def _row(found: HardCaseVerdict) -> dict[str, Any]:
+    """A verdict as a row; what does not apply or was not delivered is a dash."""
+    return {
+        "method": found.method, "outcome": found.verdict, "energy gain": _known(found.energy_gain),
+        "gain allowed": _known(found.energy_bound), "restitution residual": _known(found.restitution_residual),
+        "forward error": _known(found.forward_error), "error allowed": _known(found.forward_bound),
+        "smallest fault seen": _known(found.smallest_fault), "rank": None if found.note else found.rank,
+        "exact rank": found.exact_rank, "time": _known(found.seconds * 1e6), "note": found.note,
+    }  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
