@@ -95,14 +95,16 @@ def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Fl
     s = 1 in the plane, t = z × n; s = 2 in space, so that (n, t_1, t_2) is right-handed.
     """
     normals = found.geometry.normal
-    tangents = _tangents(normals) if getattr(system.scene, "dimensions", 2) == 3 else cross(Z, normals)[:, None]
+    tangents = unit_tangents(normals, getattr(system.scene, "dimensions", 2) == 3)
     _, origins, frames = mechanics_of(system).bodies(q)
     rows = [contact_jacobian(tangents[:, k], found.geometry, origins, frames) for k in range(tangents.shape[1])]
     return tangents, np.stack(rows, axis=1)
 
 
-def _tangents(normals: Floats) -> Floats:
-    """Two unit tangents (c, 2, 3) of each normal (c, 3)."""
+def unit_tangents(normals: Floats, spatial: bool) -> Floats:
+    """Unit tangents (c, s, 3) of normals (c, 3): one in the plane, z × n, two in space."""
+    if not spatial:
+        return cross(Z, normals)[:, None]
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]  # the coordinate axis that is farthest from the normal
     first = cross(normals, least)
     first /= np.linalg.norm(first, axis=1)[:, None]

@@ -26,8 +26,7 @@ COMMANDS = {
     "prove": "Check every machine-checked statement, or print the proof of one.",
     "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
               "counterexample.",
-    "compare": "Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem "
-               "files.",
+    "compare": "Compare the worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
     "bench": "Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula.",
     "sweep": "Simulate every point of STUDY that is not there yet, one run file each, and write a table of them all.",
     "store": "Look after the run and table files below a folder.",

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
+    from verification.worlds.comparison import compare_worlds as compare_worlds
 
 _HOME = {
     "check_passivity": "verification.laws",
     "bulk_impacts": "verification.laws",
     "judge_hard_cases": "verification.hard_cases",
     "work_precision": "verification.cost.impacts",
+    "compare_worlds": "verification.worlds.comparison",
 }
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

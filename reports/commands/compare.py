@@ -1,30 +1,54 @@
-"""`iapb compare`: IAPB beside complementarity, on random impacts, the project's scenes and problem files."""
+"""`iapb compare`: a scene in several worlds; or IAPB beside complementarity on impacts, scenes and problem files."""
 
 from __future__ import annotations
 
+import json
+import math
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from iapb.errors import ArgumentError
 from reference.datasets import problem_files
 from reference.fclib import write_fclib
+from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress
-from verification.complementarity.findings import parts_of
+from reports.commands.run import Values, scene_given
+from reports.evidence.stage import plain_records
+from reports.figures.figure import NotComputed, draw
+from reports.figures.standalone import standalone
+from reports.figures.worlds import worlds as worlds_figure
+from reports.store.keys import plain
+from reports.store.tables import Column, write_tables
+from reports.store.tables import Table as StoredTable
+from verification.complementarity.complementarity import finding_of_study
 from verification.complementarity.findings import problems as problem_parts
 from verification.complementarity.problems import FACTORS, ProblemStudy, own_problems, study_problems
-from verification.complementarity.study import ComparisonStudy
 from verification.complementarity.study import compare as study_all
-from verification.cost.step_cost import CostRow
-from verification.finding import Failure
+from verification.complementarity.tables import problems as problems_table
+from verification.finding import Failure, Finding, Table, finding_of, titled
+from verification.worlds.comparison import compare_worlds
+
+FOLDER = Path("out/compare")
+_SHOWN = ("map", "friction", "convergence")  # tables of the comparison with complementarity that are printed whole
 
 
 def compare(
+    scene: Annotated[str | None, typer.Argument(
+        help="A scene file, or the name of a scene that comes with the project; without one: IAPB beside "
+             "complementarity, on random impacts and the project's scenes.")] = None,
+    worlds: Annotated[str | None, typer.Option(
+        help="Worlds of SCENE, as IAPB,PB,ideal; default: IAPB, PB, ideal, and those with friction if SCENE has some."
+    )] = None,
+    against: Annotated[str | None, typer.Option(
+        help="The world that the others are compared with; default: ideal, or ideal-friction if SCENE has friction."
+    )] = None,
+    set_: Values = None,
+    impacts: Annotated[int, typer.Option(min=0, help="Impacts of SCENE, at most, that every solver is given.")] = 12,
     problems: Annotated[list[Path] | None, typer.Option(
         help="A folder of problem files (LCP, MLCP, FCLIB) for every solver. Repeatable.")] = None,
     only_problems: Annotated[bool, typer.Option(
@@ -32,13 +56,20 @@ def compare(
     full: Annotated[bool, typer.Option("--full", help="Ten times the impacts, more repeats.")] = False,
     export: Annotated[Path | None, typer.Option(
         help="Write our own problems to this folder as FCLIB files, and stop.")] = None,
+    out: Annotated[Path | None, typer.Option(
+        help="File of the results, .h5 or .json; default: in out/compare. The figure stands beside it.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
 ) -> None:
-    """Compare IAPB with complementarity: motion, energy, adhesion, extensions, time; and solvers on problem files."""
+    """Compare the worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
+    if out is not None and out.suffix not in (".h5", ".json"):
+        raise ArgumentError("--out", str(out), "a file that ends in .h5 or .json")
+    for given, option in ((worlds, "--worlds"), (against, "--against"), (set_, "--set")):
+        if given and scene is None:
+            raise typer.BadParameter("give a SCENE", param_hint=option)
     for folder in problems or ():
         _require_problems(folder)
-    console = Console()
     if export is not None:
         export.mkdir(parents=True, exist_ok=True)
         with stage_progress() as progress:
@@ -46,22 +77,25 @@ def compare(
             count = _export(export)
         print(f"{count} problems written to {export}")
         return
+    figure = ""
     with stage_progress() as progress:
-        if only_problems:
-            failures: list[Failure] = []
-            studies = [study_problems(folder, progress=progress, failures=failures) for folder in problems or ()]
-            found = [part for study in studies for part in problem_parts(study)]
-            tables = [table for study in studies for table in _problem_tables(study)]
+        if scene is not None:
+            found = compare_worlds(scene_given(scene, set_), worlds.split(",") if worlds else None, against,
+                                   impacts=impacts, progress=progress)  # fmt: skip
+            lines, place, figure = _scene_lines(found), out or FOLDER / f"{found.details['scene']}.h5", _figure(found)
+        elif only_problems:
+            found, lines = _problems_alone(problems or (), progress)
+            place = out or FOLDER / "problems.h5"
         else:
             study = study_all("full" if full else "quick", problems or (), progress=progress)
-            found, tables, failures = list(parts_of(study)), _tables(study), list(study.failures)
-    for table in tables:
-        console.print(table)
-    for part in found:
-        console.print(f"• {part.sentence}", highlight=False)
-    if failures:
-        for one in failures:
-            print(f"Not computed: {one.case}: {one.error}: {one.reason}")
+            found = finding_of_study(study)
+            lines, place = _study_lines(found, study.problems), out or FOLDER / "complementarity.h5"
+    _keep(found, place, figure)
+    if json_:
+        print(json.dumps(plain_finding(found), ensure_ascii=False, indent=1))
+    else:
+        _print(found, lines, place, figure)
+    if found.failures:
         raise typer.Exit(1)
 
 
@@ -81,88 +115,130 @@ def _export(folder: Path) -> int:
     return len(problems)
 
 
-def _tables(study: ComparisonStudy) -> list[Table]:
-    tables = [_map_table(study), _friction_table(study), _convergence_table(study), _cost_table(study)]
-    return tables + [table for each in study.problems for table in _problem_tables(each)]
+def _problems_alone(folders: Iterable[Path], progress: Any) -> tuple[Finding, list[str]]:
+    failures: list[Failure] = []
+    studies = [study_problems(folder, progress=progress, failures=failures) for folder in folders]
+    parts = [part for study in studies for part in problem_parts(study)]
+    tables = {study.folder: problems_table(study) for study in studies}
+    found = finding_of("problems", "Solvers on problem files", "", "", parts, tables, failures)
+    return found, [line for study in studies for line in _problem_lines(study, tables[study.folder])]
 
 
-def _table(title: str, *headings: str) -> Table:
-    table = Table(title=title)
-    for i, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if i == 0 else "right", overflow="fold")
-    return table
+def _keep(found: Finding, place: Path, figure: str) -> None:
+    """Store the results, and the figure beside them."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if place.suffix == ".json":
+        place.write_text(json.dumps(plain_finding(found), ensure_ascii=False), encoding="utf-8")
+    else:
+        tables: dict[str, StoredTable] = {}
+        words = json.dumps(plain_records(found, tables), ensure_ascii=False)
+        column = Column("json", (words,), "1", "what was found as JSON, without the rows of its tables")
+        write_tables(place, (*(table for table in tables.values() if table.columns),
+                             StoredTable("finding", (column,), found.answer)))  # fmt: skip
+    if figure:
+        place.with_suffix(".svg").write_text(figure, encoding="utf-8")
 
 
-def _map_table(study: ComparisonStudy) -> Table:
-    table = _table("IAPB and the Newton LCP (distances in the kinetic metric, of |v⁻|)", "impacts", "e", "redundant",
-                   "cases", "agree", "pull", "artefact", "negative p", "typical", "largest", "extra loss")  # fmt: skip
-    for cell in study.cells + study.scenes:
-        typical = "" if cell.agree == 1.0 else f"{cell.typical:.2g}"
-        table.add_row(cell.family, f"{cell.restitution:g}", str(cell.redundancy), str(cell.cases), _share(cell.agree),
-                      _share(cell.adhesive), _share(cell.artefact), _share(cell.adhesive_share), typical,
-                      f"{cell.farthest:.2g}", f"{max(cell.extra_loss, 0.0):.2g}")  # fmt: skip
-    return table
+def plain_finding(found: Finding) -> dict[str, Any]:
+    """Return what was found as JSON has it: texts, numbers and tables; null where a number is not finite."""
+    parts = [{"name": part.name, "verdict": part.verdict, "sentence": part.sentence} for part in found.parts]
+    tables = {name: {"columns": list(table.titles), "rows": [[_cell(value) for value in row] for row in table.cells]}
+              for name, table in found.tables.items()}  # fmt: skip
+    return {"question": found.question, "answer": found.answer, "verdict": found.verdict, "parts": parts,
+            "details": dict(found.details), "tables": tables}  # fmt: skip
 
 
-def _friction_table(study: ComparisonStudy) -> Table:
-    table = _table("Friction in the impact: IAPB, Coulomb's NCP, its relaxation CCP (energies of KE⁻)", "e", "μ",
-                   "cases", "all push", "as NCP", "reduced", "unsolved", "NCP gains", "CCP gains", "most, IAPB",
-                   "most, NCP", "most, CCP")  # fmt: skip
-    for c in study.friction:
-        table.add_row(f"{c.restitution:g}", f"{c.friction:g}", *(str(n) for n in (
-            c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains)),
-            f"{c.largest_gain:.0e}", f"{c.largest_gain_ncp:.2g}", f"{c.largest_gain_ccp:.2g}")  # fmt: skip
-    return table
+def _cell(value: Any) -> Any:
+    value = plain(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _convergence_table(study: ComparisonStudy) -> Table:
-    table = _table("The rigid world against event-driven truth: errors per step, coarse to fine", "scene", "device",
-                   "until [s]", "events", "positions", "order", "velocities", "order")  # fmt: skip
-    for row in study.convergence:
-        table.add_row(row.scene, "yes" if row.coupled else "no", f"{row.duration:g}", str(row.events),
-                      f"{row.position_coarse:.3g} to {row.position_fine:.3g}", f"{row.position_order:.2f}",
-                      f"{row.velocity_coarse:.3g} to {row.velocity_fine:.3g}", f"{row.velocity_order:.2f}")  # fmt: skip
-    return table
+def _figure(found: Finding) -> str:
+    drawn = draw(worlds_figure, found.tables)
+    return "" if isinstance(drawn, NotComputed) else standalone(drawn)
 
 
-def _cost_table(study: ComparisonStudy) -> Table:
-    solvers = list(dict.fromkeys(row.solver for row in study.impact_costs))
-    table = _table("Time per impact [µs]: median (least to largest)", "impacts", "contacts", *solvers)
-    cells = {(row.family, row.contacts, row.solver): row for row in study.impact_costs}
-    for family, contacts in sorted({(row.family, row.contacts) for row in study.impact_costs}):
-        table.add_row(family, str(contacts), *(_spread(cells[family, contacts, solver]) for solver in solvers))
-    return table
+def _print(found: Finding, lines: Sequence[str], place: Path, figure: str) -> None:
+    for line in lines:
+        print(line)
+    for part in found.parts:
+        print(sentence(part.sentence, "• "))
+    for one in found.failures:
+        print(f"Not computed: {one.case}: {one.error}: {one.reason}")
+    if figure:
+        print(f"Figure: {place.with_suffix('.svg')}")
+    print(f"Stored in {place}")
 
 
-def _spread(row: CostRow) -> str:
-    if not row.repeats:
-        return row.verdict
-    median, least, largest = (f"{seconds * 1e6:.3g}" for seconds in (row.median, row.least, row.largest))
-    return f"{median} ({least} to {largest})" + ("" if row.verdict == "solved" else f" {row.verdict}")
+def _scene_lines(found: Finding) -> list[str]:
+    """One page: distances, energy and time by world, then what the solvers say of the impacts."""
+    table, against = found.tables["worlds"], found.details["against"]
+    lines = [found.title, sentence(found.answer)]
+    lines += [sentence(f"{row['world']} ignores {row['ignores']}.") for row in table.records() if row["ignores"]]
+    others = table.only(name != against for name in table.column("world"))
+    far = titled(
+        ("world", "apart, rms [mm]", "most [mm]", "end [mm]", "velocity, rms [mm/s]", "impulse, rms [N s]",
+         "end [N s]"),
+        [(row["world"], *(1e3 * row[f"configuration, {size}"] for size in ("rms", "most", "end")),
+          1e3 * row["velocity, rms"], row["impulse, rms"], row["impulse, end"]) for row in others.records()], 3)
+    rest = ("world", "energy lost", "most above start and work", "deepest overlap", "impacts", "time per step",
+            "times the fastest")  # fmt: skip
+    lines += ["", f"Distance from {against} (impulse: resultant of all contacts)", *table_lines(far)]
+    lines += ["", "Energy, penetration, time", *table_lines(table.select(rest))]
+    if "solvers" in found.tables:
+        every = found.tables["solvers"]
+        there = every.only(row["missing"] < row["problems"] for row in every.records())
+        shown = there.without("left out", "missing", "spread of velocities")
+        lines += ["", "Its impacts as problems, by every solver", *table_lines(shown)]
+        lines += [sentence(text, "  ") for text in _unsolved(found.tables["problems"])]
+        absent = [name for name in every.column("solver") if name not in there.column("solver")]
+        lines += [sentence(f"Not installed: {', '.join(absent)}.", "  ")] if absent else []
+    return [*lines, ""]
 
 
-def _problem_tables(study: ProblemStudy) -> list[Table]:
-    verdicts = _table(f"{study.folder}: every solver on every problem", "problem", "unknowns", "rank", "asymmetry",
-                      *study.solvers, "spread")  # fmt: skip
-    for line in study.lines:
-        by = dict(line.verdicts)
-        skew = f"{line.asymmetry:.1g}" if line.asymmetry else ""
-        outcomes = (by.get(solver, "") for solver in study.solvers)
-        verdicts.add_row(line.problem, str(line.unknowns), str(line.rank), skew, *outcomes, f"{line.spread:.0e}")
-    for file in study.unread:
-        verdicts.add_row(file.file, "", "", "", *("not read" for _ in study.solvers), "")
-    return [verdicts, _profile_table(study)]
+def _unsolved(problems: Table) -> list[str]:
+    """Which solver did not solve what, and why, once for each solver and outcome."""
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in problems.records():
+        if row["outcome"] not in ("solved", "missing"):
+            found.setdefault((row["solver"], row["outcome"]), []).append(row)
+    said = []
+    for (solver, outcome), rows in found.items():
+        residual = rows[0]["worst residual"]
+        why = ": ".join(filter(None, [f"residual {residual:.1e}" if residual else "", rows[0]["note"]]))
+        said.append(f"{solver} {outcome} {len(rows)}, such as {rows[0]['problem']}: {why.removeprefix('refused: ')}")
+    return said
 
 
-def _profile_table(study: ProblemStudy) -> Table:
+def _study_lines(found: Finding, studies: Sequence[ProblemStudy]) -> list[str]:
+    lines: list[str] = []
+    for name in _SHOWN:
+        if name in found.tables:
+            lines += [sentence(found.tables[name].note) or name, *table_lines(found.tables[name]), ""]
+    if "time per impact" in found.tables:
+        lines += ["Time per impact [µs], median", *table_lines(_costs(found.tables["time per impact"]), keys=2), ""]
+    return lines + [line for study in studies for line in _problem_lines(study, problems_table(study))]
+
+
+def _costs(table: Table) -> Table:
+    """A row per kind of impact and size, a column per solver; what was not solved says so."""
+    cells: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for row in table.records():
+        time = row["median"]
+        failed = "" if row["outcome"] == "solved" else row["outcome"]
+        said = " ".join(filter(None, ["" if time is None else f"{time:.3g}", failed]))
+        cells.setdefault((row["impacts"], row["contacts"]), {})[row["solver"]] = said
+    solvers = list(dict.fromkeys(table.column("solver")))
+    return titled(("impacts", "contacts", *solvers),
+                  [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
+
+
+def _problem_lines(study: ProblemStudy, table: Table) -> list[str]:
     shown = [1.0, 3.0, 10.0, 100.0, 1e5]
-    title = "Performance profile (Dolan and Moré): share solved within a factor of the fastest"
-    table = _table(title, "kind", "solver", *(f"{factor:g}" for factor in shown))  # fmt: skip
-    for kind, solver, share in study.profile:
-        at = [share[np.searchsorted(FACTORS, factor, side="right") - 1] for factor in shown]
-        table.add_row(kind, solver, *(_share(float(value)) for value in at))
-    return table
-
-
-def _share(value: float) -> str:
-    return f"{100 * value:.0f} %"
+    at = [int(np.searchsorted(FACTORS, factor, side="right")) - 1 for factor in shown]
+    profile = titled(("solver", "kind", *(f"within {factor:g}" for factor in shown)),
+                     [(solver, kind, *(f"{100 * float(share[k]):.0f} %" for k in at))
+                      for kind, solver, share in study.profile])  # fmt: skip
+    return [f"{study.folder}: every solver on every problem", *table_lines(table), "",
+            "Performance profile (Dolan and Moré): share solved within a factor of the fastest's time",
+            *table_lines(profile), ""]  # fmt: skip

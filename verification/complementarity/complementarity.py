@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from iapb.run import Run
 from verification.complementarity import tables
 from verification.complementarity.findings import parts_of
 from verification.complementarity.study import ComparisonStudy, compare
-from verification.finding import REPRODUCED, Finding, Part, finding_of
+from verification.finding import REPRODUCED, Failure, Finding, Part, Table, finding_of
 
 ID, TITLE = "complementarity", "Against complementarity"
 LEAD = (
@@ -34,11 +34,20 @@ def complementarity(run: Callable[..., Run], depth: str, progress: Callable[[int
         progress(len(stages) - 1, STAGES)
 
     study = _renamed(compare(depth, [FOLDER] if FOLDER.is_dir() else [], progress=say))
-    failures = list(study.failures)
-    parts = tuple(parts_of(study, failures))
-    made = tables.all_tables(study, failures) | {"worlds": tables.worlds(run, failures=failures)}
+    failures = list[Failure]()
+    more = {"worlds": tables.worlds(run, failures=failures)}
     progress(STAGES, STAGES)
-    return finding_of(ID, TITLE, LEAD, answer(study, parts), parts, made, failures)
+    return finding_of_study(study, more, failures)
+
+
+def finding_of_study(
+    study: ComparisonStudy, more: Mapping[str, Table] | None = None, failures: Sequence[Failure] = ()
+) -> Finding:
+    """Return what a comparison says: each sentence judged from the records, and all its tables; `more` joins them."""
+    failed = [*study.failures, *failures]
+    parts = tuple(parts_of(study, failed))
+    made = tables.all_tables(study, failed) | dict(more or {})
+    return finding_of(ID, TITLE, LEAD, answer(study, parts), parts, made, failed)
 
 
 STAGES = 9  # of `compare`, with a folder of problems

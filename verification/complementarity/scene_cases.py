@@ -17,6 +17,8 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from reference.complementarity.problem import ImpactProblem
+from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
 from verification.impacts import ImpactCase
 
@@ -65,6 +67,41 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
     return SceneImpacts(tuple(cases), left_out)
 
 
+def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProblem, ...], int]:
+    """Return impacts of an IAPB run as problems, and how many `impacts_of_run` leaves out.
+
+    At most `most` impacts: the one with the most contacts, and others spread over the motion. A scene with friction
+    gives each impact twice, without friction and with it, although IAPB's own impacts have none.
+    """
+    mechanism, mu = mechanism_of(scene), scene.contact.friction
+    found = impacts_of_run(run, scene)
+    if not found.cases:
+        return (), found.left_out
+    taken = [blow for blow in _group_impacts(run, mechanism) if not blow.scaled]
+    widest = max(range(len(taken)), key=lambda k: found.cases[k].contacts)
+    spread = np.linspace(0, len(taken) - 1, most - 1).round().astype(int).tolist()
+    problems = []
+    for k in sorted({widest, *spread}):
+        case, v, e = found.cases[k], found.cases[k].velocity, found.cases[k].restitution
+        name = f"impact {k + 1} at {run.time[taken[k].step]:.4g} s"
+        problems.append(ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, v, e, name=name))
+        if mu > 0.0:
+            rows = _with_tangents(run, scene, mechanism, taken[k])
+            problems.append(ImpactProblem.from_impact(
+                case.mass_matrix, rows.reshape(-1, mechanism.nv), v, e, mu, contact_size=rows.shape[1],
+                name=f"{name}, μ = {mu:g}"))  # fmt: skip
+    return tuple(problems), found.left_out
+
+
+def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
+    """Rows (k, s, d) of the contacts that approach: the normal, then one tangent in the plane or two in space."""
+    normals = run.contacts.normal[_contacts_of(run, mechanism, blow)]
+    tangents = unit_tangents(normals, getattr(scene, "dimensions", 2) == 3)
+    directions = np.concatenate([normals[:, None], tangents], axis=1)
+    rows = np.stack([_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)], axis=1)
+    return rows[rows[:, 0] @ blow.v_minus < -scene.contact.approach_velocity]
+
+
 class _GroupImpact(NamedTuple):
     """All that one contact group underwent in one step: the engine resolves its islands one by one."""
 
@@ -99,18 +136,23 @@ def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = No
     return impacts_of_run(run_world(scene, world), scene)
 
 
-def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
-    """nᵀ(J_a − J_b) (k, d) of the step's contacts that belong to the impact's contact group."""
+def _contacts_of(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> list[int]:
+    """The step's contacts that belong to the impact's contact group."""
+    table = run.contacts
+    return [m for m in range(int(table.offsets[blow.step]), int(table.offsets[blow.step + 1]))
+            if mechanism.tree_of_body[table.body_a[m]] in blow.trees]  # fmt: skip
+
+
+def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact, directions: Floats | None = None) -> Floats:
+    """nᵀ(J_a − J_b) (k, d) of the contacts of the impact's group; or along other directions (k, 3)."""
     table, q = run.contacts, run.q[blow.step]
-    chosen = [
-        m for m in range(int(table.offsets[blow.step]), int(table.offsets[blow.step + 1]))
-        if mechanism.tree_of_body[table.body_a[m]] in blow.trees
-    ]  # fmt: skip
+    chosen = _contacts_of(run, mechanism, blow)
+    directions = table.normal[chosen] if directions is None else directions
     rows = np.zeros((len(chosen), mechanism.nv))
     for i, m in enumerate(chosen):
-        rows[i] = table.normal[m] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
+        rows[i] = directions[i] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
         if table.body_b[m] >= 0:
-            rows[i] -= table.normal[m] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
+            rows[i] -= directions[i] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
     return rows
 
 

@@ -1,0 +1,134 @@
+"""Worlds on one scene: distances are those of closed forms, what fails is named, impacts reach every solver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError, IapbError, SolverError
+from iapb.scene import load_scene
+from reference.complementarity import benchmark, solvers
+from reference.complementarity.solution import Answer
+from reference.complementarity.solvers import SOLVERS, SolverEntry
+from reference.worlds import run_world
+from verification import compare_worlds
+from verification.complementarity import problems
+from verification.complementarity.scene_cases import problems_of_run
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
+from verification.worlds import comparison
+from verification.worlds.comparison import default_worlds
+
+HERE = Path(__file__).parent
+SLOPE = load_scene(HERE / "slope.yaml").with_values({"duration": 0.2})
+DOOR = load_scene(HERE / "door.yaml").with_values({"duration": 0.3})
+
+
+def row(finding, world):
+    return next(one for one in finding.tables["worlds"].records() if one["world"] == world)
+
+
+def test_a_box_that_slides_is_apart_from_one_that_sticks_by_the_closed_forms():
+    found = compare_worlds(SLOPE, ["ideal", "ideal-friction"], impacts=0)
+    slides, down = row(found, "ideal"), 9.81 * np.sin(np.pi / 9.0)
+    assert found.details["against"] == "ideal-friction"
+    # Half a step of 1 ms in 0.2 s: 0.5 % of the way; the others are exact.
+    assert slides["configuration, end"] == pytest.approx(0.5 * down * 0.2**2, rel=0.006)
+    assert slides["velocity, end"] == pytest.approx(down * 0.2, rel=1e-6)
+    assert slides["impulse, end"] == pytest.approx(1.0 * down * 0.2, rel=1e-6)  # the friction that is missing, m = 1 kg
+    assert slides["configuration, most"] == slides["configuration, end"]
+    sticks = row(found, "ideal-friction")
+    assert sticks["configuration, rms"] is None and sticks["law"] == "rigid constraints"
+    assert (slides["ignores"], sticks["ignores"]) == ("friction, stiffness, damping", "stiffness, damping")
+    assert sticks["time per step"] > 0.0 and min(slides["times the fastest"], sticks["times the fastest"]) == 1.0
+
+
+def test_a_hinge_and_a_ball_count_by_their_inertia():
+    found = compare_worlds(DOOR, ["PB", "IAPB"], "IAPB", impacts=0)
+    runs = {name: run_world(DOOR, name) for name in ("PB", "IAPB")}
+    turn, *ball = runs["PB"].q[-1] - runs["IAPB"].q[-1]
+    about_hinge = 0.43 + 8.0 * 0.4**2
+    squares = about_hinge * turn**2 + 0.5 * (ball[0] ** 2 + ball[1] ** 2) + 5e-4 * ball[2] ** 2
+    assert row(found, "PB")["configuration, end"] == pytest.approx(np.sqrt(squares / 8.5), rel=1e-9)
+    overlap = 1e3 * max(-runs["PB"].contacts.gap.min(), 0.0)
+    assert row(found, "PB")["deepest overlap"] == pytest.approx(overlap)
+    assert max(found.tables["over time"].where(world="PB").column("penetration")) == pytest.approx(1e-3 * overlap)
+    lost = 1.045 - runs["IAPB"].energy["kinetic"][-1]  # ½ 0.5 (0.3² + 2²) at the start
+    assert row(found, "IAPB")["energy lost"] == pytest.approx(lost - 0.0225, abs=1e-9)
+
+
+def test_names_are_checked_and_the_reference_world_joins():
+    with pytest.raises(ArgumentError, match="did you mean ideal-friction"):
+        compare_worlds(SLOPE, ["ideal-fricton"])
+    with pytest.raises(ArgumentError, match="against = 'idael'"):
+        compare_worlds(SLOPE, ["PB"], "idael")
+    assert default_worlds(SLOPE) == ("IAPB", "PB", "IAPB-friction", "ideal", "ideal-friction")
+    smooth = SLOPE.with_values({"contact.friction": 0.0, "duration": 0.002})
+    found = compare_worlds(smooth, ["PB"], impacts=0)
+    assert found.tables["worlds"].column("world") == ["PB", "ideal"] and found.details["against"] == "ideal"
+
+
+def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
+    def breaks(scene, world, **options):
+        if world == "PB":
+            raise SolverError("no solution")
+        return run_world(scene, world, **options)
+
+    monkeypatch.setattr(comparison, "run_world", breaks)
+    short = SLOPE.with_values({"duration": 0.002})
+    found = compare_worlds(short, ["IAPB", "PB", "ideal"], "ideal", impacts=0)
+    assert found.tables["worlds"].column("world") == ["IAPB", "ideal"]
+    assert found.verdict == NOT_COMPUTED
+    assert [(one.case, one.reason) for one in found.failures] == [("world PB", "no solution")]
+    with pytest.raises(IapbError, match="cannot be simulated in the world PB.*no solution"):
+        compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0)
+
+
+def test_a_world_that_stops_early_is_compared_until_then_and_said(monkeypatch):
+    def stops(scene, world, **options):
+        return run_world(scene, world, **options | ({"steps": 7} if world == "PB" else {}))
+
+    monkeypatch.setattr(comparison, "run_world", stops)
+    found = compare_worlds(SLOPE.with_values({"duration": 0.02}), ["IAPB", "PB"], "IAPB", impacts=0)
+    assert row(found, "PB")["until"] == pytest.approx(0.007)
+    assert len(found.tables["over time"].where(world="PB").rows) == 8
+
+
+def wrong(problem):
+    """A solver that is content with no impulse at all."""
+    return Answer(np.zeros(problem.size), "done")
+
+
+def test_every_solver_is_judged_on_the_impacts_by_residuals(monkeypatch):
+    load = solvers._load
+    monkeypatch.setattr(solvers, "_load", lambda name, entry: wrong if name.startswith("wrong") else load(name, entry))
+    kept = {"gauss_seidel": "lcp", "nsgs": "cone", "wrong": "lcp", "wrong with friction": "cone"}
+    for name, takes in kept.items():
+        monkeypatch.setitem(SOLVERS, name, SOLVERS.get(name) or SolverEntry("nowhere", "numba", "", takes))
+
+    def asked(names):
+        def chosen(problem):
+            return [name for name in names if (kept[name] == "cone") == (problem.friction is not None)]
+
+        for module in (problems, benchmark):
+            monkeypatch.setattr(module, "solver_names", chosen)
+        return compare_worlds(DOOR, ["IAPB"], "IAPB", impacts=2)
+
+    found = asked(kept)
+    rows = {one["solver"]: (one["solved"], one["failed"], one["problems"]) for one in found.tables["solvers"].records()}
+    assert rows == {"gauss_seidel": (1, 0, 1), "nsgs": (1, 0, 1), "wrong": (0, 1, 1), "wrong with friction": (0, 1, 1)}
+    assert {part.name: part.verdict for part in found.parts} == dict.fromkeys(("runs", "motion", "solvers"), REPRODUCED)
+    alone = asked(["wrong", "wrong with friction"])
+    assert {part.name: part.verdict for part in alone.parts}["solvers"] == MIXED
+
+
+def test_the_problems_of_a_rough_impact_have_normals_and_tangents():
+    (smooth, rough), left_out = problems_of_run(run_world(DOOR, "IAPB"), DOOR, 1)
+    assert left_out == 0 and smooth.friction is None and rough.friction.tolist() == [0.2] and rough.contact_size == 2
+    normal, tangent = rough.contact_jacobian
+    assert np.array_equal(normal, smooth.contact_jacobian[0])
+    # The ball moves by (x, y, turn): unit directions at right angles, and its radius along the tangent.
+    assert np.hypot(*tangent[1:3]) == pytest.approx(1.0) and tangent[1:3] @ normal[1:3] == pytest.approx(0.0, abs=1e-12)
+    assert abs(tangent[3]) == pytest.approx(0.05) and normal[3] == pytest.approx(0.0, abs=1e-12)
+    assert problems_of_run(run_world(SLOPE, "IAPB"), SLOPE.with_values({"contact.friction": 0.0}), 3)[0] == ()
