@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
 from reference import worlds
+from reports.batches import worker_pool
 from reports.store.folder import Checkpoint, Place, RunStore
 from reports.store.runs import RunEntry
 from reports.uses import UsedRun, add_use, run_command
+from verification.finding import attempt
 
 Progress = Callable[[int, int], None]
+Wanted = tuple[Scene, str, str]
 
 
 @dataclass(frozen=True)
@@ -93,15 +97,35 @@ class Runner:
     def _place(self, scene: Scene, world: str, rendering: str) -> Place:
         return self.store.place_of(self.inputs(scene, world, rendering), self.label(scene, world, rendering))
 
+    @contextmanager
+    def crew(self, workers: int) -> Iterator[Callable[[Sequence[Wanted]], Iterator[Run | None]]]:
+        """Give a function that makes many runs in as many processes; a run is used only once somebody asks for it.
+
+        It yields the runs in the order in which they are wanted, None for one that raises.
+        """
+        with worker_pool(workers) as pool:
+
+            def made(wanted: Sequence[Wanted]) -> Iterator[Run | None]:
+                results = pool.map(partial(_fetched, str(self.store.folder)), wanted)
+                for (scene, world, rendering), fetched in zip(wanted, results, strict=True):
+                    if fetched is not None:
+                        self._know(fetched, scene, world, rendering)
+                    yield None if fetched is None else fetched.run
+
+            yield made
+
     def _note(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
         """Say that the present user uses a run."""
+        self._know(fetched, scene, world, rendering)
+        self.use_again(fetched.entry.file)
+
+    def _know(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
         name, entry = fetched.entry.file, fetched.entry
         if name not in self._known:
             command = run_command(scene, world, rendering) or f"iapb store again out/runs/{name}"
             size = (self.store.folder / name).stat().st_size
             self._known[name] = UsedRun(self.label(scene, world, rendering), name, entry.run_key, entry.content_hash,
                                         command, size, entry.status)
-        self.use_again(name)
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
@@ -120,6 +144,12 @@ class Runner:
                                     checkpoint=checkpoint)  # fmt: skip
 
         return compute
+
+
+def _fetched(folder: str, wanted: Wanted) -> Fetched | None:
+    """One run, in another process; what raises there is asked for again here, and raises where it belongs."""
+    fetched = attempt("run", partial(Runner(folder).fetch, *wanted, keep=False), [])
+    return fetched if fetched is not None and fetched.run.complete else None
 
 
 def run_inputs(scene: Scene, law: Any, coupling: Any, world: str) -> dict[str, Any]:

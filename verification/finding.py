@@ -30,9 +30,11 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 )  # fmt: skip
 # What fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
-# Trials that confirm a region, at least: were a quarter of the region wrong, ten in a row would hold in one case of
-# twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024.
-LEAST_CONFIRMING = 10
+# Trials that confirm a region, at least, and that decide a part: were a quarter of the region wrong, ten in a row would
+# hold in one case of twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024.
+LEAST_CONFIRMING = LEAST_DECIDED = 10
+# What held in half of all cases would fail five times in a row in one case of 32.
+LEAST_FAILING = 5
 SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
 _MOST_ENDS = 8  # more than two intervals have
 _DECADES = 1e3  # a condition that spans more is measured by decades
@@ -52,6 +54,7 @@ class Column:
 
     key : by which code finds it; heading : in words, by default the key; unit : empty where there is none
     condition : chosen, not measured; part : rows with the same value are judged apart
+    cases : how many cases a row stands for, such as the impacts of a batch, of which the worst is judged
     timed : a measured time, or made from some: it need not repeat
     prose : sentences, whose numbers stand in other tables and are compared there
     """
@@ -61,6 +64,7 @@ class Column:
     heading: str = ""
     condition: bool = False
     part: bool = False
+    cases: bool = False
     timed: bool = False
     prose: bool = False
 
@@ -327,7 +331,8 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
 
     What is mixed is "reproduced where" a region is confirmed: found on one half of the trials, it must hold in all
     trials of the other half that lie inside, and in all that `fresh` draws inside. At least LEAST_CONFIRMING trials
-    must confirm it: fresh ones where they can be drawn, else those of the other half.
+    must confirm it: fresh ones where they can be drawn, else those of the other half. Where fewer than LEAST_DECIDED
+    cases decide, the part is not testable here, unless at least LEAST_FAILING trials decide and all of them fail.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
     held, decided = trials.holds.count(True), sum(outcome is not None for outcome in trials.holds)
@@ -337,7 +342,20 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
         region, tried = _confirmed(trials, fresh)
         part = replace(part, region=region, verdict=WHERE if region else MIXED)
         said = f"{said}; {tried}"
+    cases = _decided_cases(trials)
+    if decided < LEAST_DECIDED <= cases:
+        said = f"{said}, which stand for {cases} cases"
+    elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE and (held or decided < LEAST_FAILING):
+        part = replace(part, verdict=NOT_TESTABLE)
+        said = f"{said}; fewer than {LEAST_DECIDED} decide"
     return replace(part, sentence=f"{said}.")
+
+
+def _decided_cases(trials: Table) -> int:
+    """How many cases the trials that can tell stand for."""
+    decided = trials.only(held is not None for held in trials.holds)
+    counts = [column.key for column in trials.columns if column.cases]
+    return max(len(decided.rows), *(sum(count or 0 for count in decided.column(key)) for key in counts), 0)
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:

@@ -46,7 +46,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
     inputs["arm_energies"] = _arm_energies()
 
-    ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth))
+    ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth, workers=claims.cores()))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], check_all)
     broken = kept.stage("counterexamples", tuple[Finding, ...], laws.counterexamples)
     hard = kept.stage("hard cases", tuple[Finding, ...], partial(hard_cases.hard_cases, runner))

@@ -12,7 +12,7 @@ from importlib import import_module
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from verification.claims.claim import Claim
-from verification.claims.study import Asked, Runner, Study, run_directly
+from verification.claims.study import Ahead, Asked, Runner, Study, run_directly
 from verification.finding import VERDICTS, Column, Failure, Finding, Table, attempt, with_failures
 
 _FILES = (
@@ -52,6 +52,7 @@ def check_claims(
     ids: Sequence[str] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     asked: Asked | None = None,
+    ahead: Ahead | None = None,
 ) -> tuple[Finding, ...]:
     """Check the paper's claims and return one finding each; what raises is among the failures of its claim.
 
@@ -62,6 +63,7 @@ def check_claims(
     ids : the claims to check; default all
     progress : called as progress(claims done, claims in all, id of the next)
     asked : called as asked(scene, world, rendering) whenever a claim uses a run, also one made for an earlier claim
+    ahead : makes many runs at once, where there are cores for it (see `Study`)
 
     Raises
     ------
@@ -72,7 +74,7 @@ def check_claims(
     if unknown:
         raise ArgumentError("ids", unknown, one_of(unknown[0], CLAIMS, "some of "))
     chosen = tuple(CLAIMS) if ids is None else tuple(ids)
-    study, results = Study(run, depth, asked=asked), []
+    study, results = Study(run, depth, asked=asked, ahead=ahead), []
     for done, name in enumerate(chosen):
         if progress is not None:
             progress(done, len(chosen), name)

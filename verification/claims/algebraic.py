@@ -24,7 +24,7 @@ COLUMNS = (
     Column("contacts", condition=True),
     Column("condition number", condition=True),
     Column("restitution", condition=True),
-    Column("impacts"),
+    Column("impacts", cases=True),
     Column("error"),
     Column("bound"),
 )
@@ -70,7 +70,7 @@ def trial_of(
     """Return the row of one batch of `count` impacts."""
     part, family, e = case
     rational = exact is not None and part in exact.errors
-    count = max(count // 4, 2) if rational else count
+    count = max(count // 4, 4) if rational else count  # of three batches at least ten impacts decide
     impacts = list((whole_numbers if rational else draw)(family, count, study.seed))
     batch = Batch(impacts, family, e, study.seed)
     measure = Measure(exact.errors[part], lambda _: 0.0) if exact and rational else parts[part]

@@ -48,6 +48,7 @@ def trials(study: Study, case: tuple[Any, ...]) -> Iterator[dict[str, Any]]:
         part, family, e = case
         yield trial_of(study, (part, family, e), IMPACTS[study.depth], {RANDOM: Measure(_gain, energy_bound)})
         return
+    study.make_ahead(study.starts(), [("IAPB", RENDERED[case[0]])])
     traces = list(study.each(study.starts(), lambda start: [study.trace(start, "IAPB", RENDERED[case[0]])]))
     yield {"part": case[0], "coordinates": 3, "restitution": 0.0,
            "impacts": sum(len(trace.impact_step) for trace in traces),

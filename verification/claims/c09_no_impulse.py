@@ -29,7 +29,7 @@ COLUMNS = (
     Column("coordinate", part=True),
     *columns("tilt", "clearance", "travel", "friction", "approach_velocity"),
     Column("contacts", condition=True),
-    Column("impacts"),
+    Column("impacts", cases=True),
     Column("error"),
     Column("bound"),
 )

@@ -6,14 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.closeness import (
-    COLUMNS,
-    FEW,
-    closest,
-    distances,
-    median_ratio,
-    peg_claim,
-)
+from verification.claims.closeness import COLUMNS, FRESH, closest, distances, median_ratio, peg_claim
 from verification.claims.conditions import Condition
 from verification.finding import Column, Region, Table
 from verification.scenes.trace import COORDINATES
@@ -33,7 +26,7 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 def draw(study: Study, region: Region) -> list[Condition]:
     """Fresh starts, each with the paper's threshold and with one of ours."""
-    found = study.fresh(study.starts(), region, FEW)
+    found = study.fresh(study.starts(), region, FRESH)
     return [*(replace(start, approach_velocity=Condition().approach_velocity) for start in found), *found]
 
 
@@ -57,7 +50,7 @@ CLAIM = peg_claim(
     trials=trials,
     holds=closest,
     finding=finding,
-    fresh=FEW,
+    runs=(("ideal", "full"), ("IAPB", "full"), ("PB", "full"), ("CBuc", "full")),
     draw=draw,
     axes=("tilt", "clearance", "coordinate"),
 )

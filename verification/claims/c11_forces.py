@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.closeness import FEW, peg_claim
+from verification.claims.closeness import peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, momentum_distance, peak_force, resting_force
@@ -81,6 +81,6 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=FEW,
+    runs=(("ideal", "full"), ("IAPB", "full"), ("PB", "full"), ("CBuc", "full")),
     axes=("tilt", "clearance", "part"),
 )

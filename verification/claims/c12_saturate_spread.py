@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.closeness import INDISTINGUISHABLE, MANY, peg_claim
+from verification.claims.closeness import INDISTINGUISHABLE, peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import comparison_window, root_mean_square, share_limited
@@ -72,7 +72,7 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=MANY,
+    runs=(("IAPB", "full"), *(("IAPB", rendering) for rendering in RENDERINGS)),
     limited=True,
     axes=("tilt", "clearance", "part"),
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from verification.claims.closeness import COLUMNS as DISTANCE_COLUMNS
-from verification.claims.closeness import FEW, closest, distances, median_ratio, peg_claim
+from verification.claims.closeness import closest, distances, median_ratio, peg_claim
 from verification.claims.conditions import Condition, columns
 from verification.finding import Row, Table
 from verification.scenes.measures import deepest_penetration
@@ -60,7 +60,7 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=FEW,
+    runs=(("ideal", "full"), ("IAPB", "spread"), ("PB", "full"), ("CBuc", "full")),
     limited=True,
     axes=("tilt", "clearance", "coordinate"),
 )

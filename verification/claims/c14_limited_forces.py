@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.closeness import MANY, peg_claim
+from verification.claims.closeness import peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import peak_force
@@ -63,7 +63,7 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=MANY,
+    runs=(("IAPB", "spread"), ("PB", "full")),
     limited=True,
     axes=("tilt", "force_limit", "coordinate"),
 )

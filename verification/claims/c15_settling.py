@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from verification.claims.closeness import MANY, peg_claim
+from verification.claims.closeness import peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import bounces, settling_time
@@ -80,6 +80,6 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=MANY,
+    runs=(("IAPB", "full"), ("IAPB", "spread"), ("PB", "full")),
     axes=("tilt", "clearance", "part"),
 )

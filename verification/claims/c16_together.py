@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from verification.claims.closeness import MANY, peg_claim
+from verification.claims.closeness import peg_claim
 from verification.claims.conditions import START_COLUMNS, Condition, columns
 from verification.finding import Column, Row, Table
 from verification.scenes.measures import largest_separation, share_limited
@@ -65,7 +65,7 @@ CLAIM = peg_claim(
     trials=trials,
     holds=holds,
     finding=finding,
-    fresh=MANY,
+    runs=tuple(("IAPB", rendering) for rendering in RENDERINGS),
     limited=True,
     axes=("tilt", "force_limit", "rendering"),
 )

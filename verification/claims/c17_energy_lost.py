@@ -90,5 +90,6 @@ CLAIM = Claim(
     trials=trials,
     holds=holds,
     finding=finding,
+    runs=(("IAPB", "full"), ("PB", "full")),
     axes=("stiffness", "damping", "part"),
 )

@@ -73,8 +73,12 @@ def trials(study: Study, case: Socket) -> Iterator[dict[str, Any]]:
 
 def _found(study: Study, case: Socket) -> FalseCollisions:
     distances = {"cluster_distance": 1e-3 * case.cluster, "coherence_distance": 1e-3 * case.coherence}
-    scene = socket(distances | {"damping": case.damping}, case.rate)
-    return study.once(("socket", case), lambda: count_false(scene, lambda scene: study.run(scene, "IAPB", "full")))
+
+    def count() -> FalseCollisions:
+        scene = socket(distances | {"damping": case.damping}, case.rate)
+        return count_false(scene, lambda scene: study.run(scene, "IAPB", "full"))
+
+    return study.once(("socket", case), count)
 
 
 def _row(plain: FalseCollisions, filtered: FalseCollisions, coherence: float, rate: float) -> dict[str, Any]:

@@ -41,6 +41,7 @@ class Claim:
     cases : what is tried; trials : (study, case) -> the trials of one case
     holds : one trial -> True, False, or None where it cannot tell; a pure function of the row
     finding : judged trials -> one sentence with numbers
+    runs : (world, rendering) of the runs that a trial uses, where cases are conditions of the peg
     draw : (study, region) -> fresh cases inside a region, for its confirmation; None where there are none
     axes : two condition columns over which the outcome is best drawn, and the column that splits the maps
     """
@@ -55,12 +56,14 @@ class Claim:
     trials: Callable[[Study, Any], Iterable[Row]]
     holds: Callable[[Row], bool | None]
     finding: Callable[[Table], str]
+    runs: tuple[tuple[str, str], ...] = ()
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     axes: tuple[str, ...] = ()
 
     def measure(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
         """Return the judged trials of all cases, or of these."""
-        chosen = self.cases(study) if cases is None else cases
+        chosen = tuple(self.cases(study) if cases is None else cases)
+        study.make_ahead(chosen if self.runs else (), self.runs)
         return self.judge(table_of(self.columns, study.each(chosen, partial(self.trials, study))))
 
     def judge(self, table: Table) -> Table:

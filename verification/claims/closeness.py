@@ -27,23 +27,23 @@ COLUMNS = (
     Column("CBuc, largest"),
 )
 
-# Fresh starts that confirm a region: where the rigid worlds, a second each, are asked, and elsewhere.
-FEW, MANY = 12, 30
+# Fresh starts that confirm a region: one that fails in a tenth of its starts would be confirmed once in 24 times.
+FRESH = 30
 # Distances below this [m, rad] are nothing that a hand or a figure could tell apart (a tenth of a micrometre): a
 # coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat, cannot tell.
 INDISTINGUISHABLE = 1e-7
 
 
-def peg_claim(*, fresh: int, limited: bool = False, **words: Any) -> Claim:
+def peg_claim(*, limited: bool = False, **words: Any) -> Claim:
     """Return a claim on every start of the peg, with device limits or without; `words` are the other fields of Claim.
 
-    fresh : starts between those, drawn to confirm a region
+    FRESH starts between those are drawn to confirm a region.
     """
 
     def cases(study: Study) -> tuple[Condition, ...]:
         return study.limited() if limited else study.starts()
 
-    return Claim(**{"cases": cases, "draw": lambda study, region: study.fresh(cases(study), region, fresh)} | words)
+    return Claim(**{"cases": cases, "draw": lambda study, region: study.fresh(cases(study), region, FRESH)} | words)
 
 
 def distances(study: Study, condition: Condition, rendering: str) -> Iterator[dict[str, Any]]:

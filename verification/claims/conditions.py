@@ -108,20 +108,25 @@ def limited_conditions(depth: str) -> tuple[Condition, ...]:
 def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) -> list[Condition]:
     """Return conditions drawn at random inside a region, each of them between the ends of what was tested.
 
-    All conditions vary at once, the approach velocity by decades. Four digits are kept, so that they repeat anywhere.
+    Tilt, clearance and travel come from one sequence for all claims, which no search has seen: the first `count` that
+    lie inside. So regions that overlap share the runs of the rigid worlds, which see nothing else. The other
+    conditions are drawn between the region's ends, the approach velocity by decades. All vary at once; four digits are
+    kept, so that they repeat anywhere.
     """
-    rng = np.random.default_rng([seed, count])
-    found = []
-    for _ in range(count):
-        values = {}
-        for name in UNITS:
-            low, high = region.ends(name, [getattr(condition, name) for condition in tested])
-            share = rng.random()
-            by_decades = name == "approach_velocity"
-            value = low * (high / low) ** share if by_decades else low + share * (high - low)
-            values[name] = float(f"{value:.4g}")
-        found.append(Condition(**values))
+    rng, found = np.random.default_rng(seed), list[Condition]()
+    ends = {name: [getattr(condition, name) for condition in tested] for name in UNITS}
+    while len(found) < count:
+        shares = dict(zip(UNITS, rng.random(len(UNITS)), strict=True))
+        start = {name: _between(min(ends[name]), max(ends[name]), shares[name]) for name in START}
+        if all(low <= start[name] <= high for name in START for low, high in [region.ends(name, ends[name])]):
+            others = {name: _between(*region.ends(name, ends[name]), shares[name], by_decades=name in BY_DECADES)
+                      for name in UNITS if name not in START}  # fmt: skip
+            found.append(Condition(**start, **others))
     return found
+
+
+def _between(low: float, high: float, share: float, by_decades: bool = False) -> float:
+    return float(f"{low * (high / low) ** share if by_decades else low + share * (high - low):.4g}")
 
 
 def wall_conditions() -> tuple[Condition, ...]:
@@ -136,6 +141,9 @@ UNITS = {
     "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
     "approach_velocity": "m/s", "force_limit": "F_limit",
 }  # fmt: skip
+
+START = ("tilt", "clearance", "travel")  # where the peg starts: all that a rigid world sees
+BY_DECADES = ("approach_velocity",)
 
 
 def columns(*names: str) -> tuple[Column, ...]:

@@ -22,6 +22,8 @@ from verification.scenes.trace import Trace, trace_of
 Case = TypeVar("Case")
 Result = TypeVar("Result")
 Runner = Callable[[Scene, str, str], Run]
+Wanted = tuple[Scene, str, str]
+Ahead = Callable[[Sequence[Wanted]], Iterable[Run | None]]
 Asked = Callable[[Scene, str, str], None]
 
 SEED = 20050601  # of the random instances; the month the paper appeared
@@ -40,6 +42,7 @@ class Study:
     depth : "quick" or "full", how fine the conditions are
     seed : of the random impacts
     asked : called whenever a claim uses a run, also one that was made for an earlier claim
+    ahead : makes many runs at once, one per triple in their order; None where one fails, which is then asked of `run`
     failures : receives the cases that raise; without it their exceptions pass through
     """
 
@@ -47,6 +50,7 @@ class Study:
     depth: str = "quick"
     seed: int = SEED
     asked: Asked | None = None
+    ahead: Ahead | None = None
     failures: list[Failure] | None = None
     _traces: dict[tuple[Any, ...], Trace] = field(default_factory=dict, repr=False)
     _results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
@@ -83,6 +87,15 @@ class Study:
             run = self.run(self.place(seen), world, rendering)
             self._traces[key] = trace_of(run)
         return self._traces[key]
+
+    def make_ahead(self, conditions: Iterable[Condition], runs: Iterable[tuple[str, str]]) -> None:
+        """Make the runs (world, rendering) of these conditions that are still missing, where there is an `ahead`."""
+        if self.ahead is None:
+            return
+        wanted = [(condition.seen_by(*run), *run) for condition in conditions for run in runs]
+        missing = [key for key in dict.fromkeys(wanted) if key not in self._traces]
+        found = self.ahead([(self.place(seen), world, rendering) for seen, world, rendering in missing])
+        self._traces |= {key: trace_of(run) for key, run in zip(missing, found, strict=True) if run is not None}
 
     def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
         """What `compute` returns, computed once for each key."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -84,7 +85,12 @@ def _switched_off(filters: tuple[bool, bool]) -> dict[str, float]:
 def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
     """The scene with some of its contact's values changed, and its rate [Hz]."""
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
-    return load_scene(find_scene(SCENE)).with_values(values if rate is None else values | {"rate": rate})
+    return _shipped().with_values(values if rate is None else values | {"rate": rate})
+
+
+@cache
+def _shipped() -> Scene:
+    return load_scene(find_scene(SCENE))
 
 
 def count_false(scene: Scene, simulate: Simulate = simulate) -> FalseCollisions:

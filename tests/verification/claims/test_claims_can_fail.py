@@ -62,8 +62,8 @@ PLANTED = {
         {"impulses settle after": 0.2, "penalty settles after": 0.1},
     ),
     "C22": (
-        {"ratio": 3.0, "least ratio": 2.0, "largest ratio": 4.0},
-        {"ratio": 0.3, "least ratio": 0.2, "largest ratio": 0.5},
+        {"ratio": 1.3, "lower quartile": 1.11, "upper quartile": 4.0},
+        {"ratio": 0.8, "lower quartile": 0.2, "upper quartile": 0.9},
     ),
     "C05": ({"error": 0.0, "bound": 0.0}, {"error": np.nan, "bound": 1.0}),
     "C10": ({"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}),

@@ -5,17 +5,17 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
 from verification.claims import Study, check_claims, study
-from verification.claims.conditions import Condition
+from verification.claims.conditions import Condition, drawn
 from verification.claims.study import run_directly
-from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE, Region
 
-FEW = (Condition(0.0), Condition(0.1, friction=0.1))
+FEW = tuple(Condition(tilt, friction=0.1) for tilt in (0.0, *(0.1 + 0.01 * n for n in range(10))))
 SWAPPED = {"IAPB": "PB", "PB": "IAPB"}
 
 
 @pytest.fixture
 def few(monkeypatch):
-    """Two starts only, one device limit, worlds that are compiled: a second, not a minute."""
+    """Eleven starts only, one device limit, worlds that are compiled: seconds, not a minute."""
     monkeypatch.setattr(study, "start_conditions", lambda depth: FEW)
     monkeypatch.setattr(study, "limited_conditions", lambda depth: FEW)
 
@@ -53,9 +53,36 @@ def test_rigid_worlds_do_not_see_friction_or_penalties():
 def test_worlds_under_the_wrong_name_are_found_out(few):
     right = {result.key: result for result in check_claims(ids=["C14", "C15"])}
     wrong = {result.key: result for result in check_claims(run=swapped, ids=["C14", "C15", "C16"])}
-    assert {result.verdict for result in right.values()} == {REPRODUCED}
+    assert (right["C14"].verdict, right["C15"].verdict) == (WHERE, REPRODUCED)
     assert (wrong["C14"].verdict, wrong["C15"].verdict) == (REFUTED, REFUTED)
     assert wrong["C16"].verdict == NOT_TESTABLE  # a world without impulses reaches no limit
+
+
+def test_runs_made_ahead_are_not_made_again_and_change_no_number(few):
+    made, here = [], []
+
+    def ahead(wanted):
+        found = [run_directly(*one) if n % 3 else None for n, one in enumerate(wanted)]
+        made.extend(found)
+        return found
+
+    def run(*wanted):
+        here.append(wanted)
+        return run_directly(*wanted)
+
+    plain, quick = (check_claims(run=each, ids=["C14"], ahead=crew)
+                    for each, crew in ((run_directly, None), (run, ahead)))  # fmt: skip
+    assert plain == quick and made and len(here) == made.count(None)
+
+
+def test_regions_that_overlap_share_the_starts_that_confirm_them():
+    tested = Study().starts()
+    wide, narrow = (drawn(tested, Region((("tilt", "rad", None, high),)), 1, 40) for high in (0.3, 0.15))
+    assert len(wide) == len(narrow) == 40 and all(start.tilt <= 0.15 for start in narrow)
+    assert set(narrow) >= {start for start in wide if start.tilt <= 0.15}
+    friction = drawn(tested, Region((("friction", "", 0.1, None),)), 1, 40)
+    assert all(start.friction >= 0.1 for start in friction)
+    assert [start.seen_by("ideal", "full") for start in friction] == [start.seen_by("ideal", "full") for start in wide]
 
 
 def test_progress_names_every_claim():

@@ -6,6 +6,8 @@ import pytest
 from verification.claims.claim import Claim
 from verification.finding import (
     LEAST_CONFIRMING,
+    LEAST_DECIDED,
+    LEAST_FAILING,
     MIXED,
     NOT_COMPUTED,
     NOT_TESTABLE,
@@ -76,8 +78,9 @@ def claim(**options):
     return Claim(**words, **functions, **{"columns": COLUMNS, "cases": None, "trials": None} | options)
 
 
-def concluded(*trials):
-    table = table_of(COLUMNS, [dict(zip(("part", "tilt", "error"), trial, strict=True)) for trial in trials])
+def concluded(*trials, times=LEAST_DECIDED):
+    rows = [dict(zip(("part", "tilt", "error"), trial, strict=True)) for trial in trials for _ in range(times)]
+    table = table_of(COLUMNS, rows)
     return claim().conclude(claim().judge(table))
 
 
@@ -93,20 +96,46 @@ def test_failures_are_told_apart_by_part_with_their_conditions():
     found = concluded(("x", 0.0, 0.5), ("x", 0.3, 2.0), ("y", 0.0, 0.5), ("y", 0.3, 0.5))
     x, y = found.parts
     assert (found.verdict, x.verdict, y.verdict) == (MIXED, MIXED, REPRODUCED)
-    assert x.fails == "in 1 of 2 trials, with tilt 0.3 rad" and y.fails == ""
+    assert x.fails == "in 10 of 20 trials, with tilt 0.3 rad" and y.fails == ""
     assert found.details["conditions"] == "tilt 0, 0.3 rad"
-    assert (x.held, x.decided, y.held, y.decided) == (1, 2, 2, 2)
+    assert (x.held, x.decided, y.held, y.decided) == (10, 20, 20, 20)
 
 
 def test_a_part_that_never_holds_says_so():
     x, _ = concluded(("x", 0.0, 2.0), ("x", 0.3, 2.0), ("y", 0.0, 0.0)).parts
-    assert (x.verdict, x.fails) == (REFUTED, "in all 2 trials")
+    assert (x.verdict, x.fails) == (REFUTED, "in all 20 trials")
 
 
 def test_trials_that_cannot_tell_are_counted_apart():
-    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * 3, holds=(True, None, None)))
-    assert (part.verdict, part.held, part.decided, part.unknown) == (REPRODUCED, 1, 1, 2)
-    assert part.sentence == "holds in 1 of 1 trials; 2 of 3 cannot tell."
+    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * 12, holds=(True,) * 10 + (None, None)))
+    assert (part.verdict, part.held, part.decided, part.unknown) == (REPRODUCED, 10, 10, 2)
+    assert part.sentence == "holds in 10 of 10 trials; 2 of 12 cannot tell."
+
+
+@pytest.mark.parametrize(
+    ("held", "failed", "verdict"),
+    [
+        (LEAST_DECIDED - 1, 0, NOT_TESTABLE),
+        (LEAST_DECIDED, 0, REPRODUCED),
+        (1, 3, NOT_TESTABLE),
+        (3, 1, NOT_TESTABLE),
+        (0, LEAST_FAILING - 1, NOT_TESTABLE),
+        (0, LEAST_FAILING, REFUTED),
+        (1, LEAST_DECIDED - 1, REFUTED),
+    ],
+)
+def test_few_trials_decide_nothing(held, failed, verdict):
+    outcomes = (True,) * held + (False,) * failed + (None,) * 3
+    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * len(outcomes), holds=outcomes))
+    assert part.verdict == verdict
+    assert ("fewer than 10 decide" in part.sentence) == (verdict == NOT_TESTABLE)
+
+
+def test_a_trial_may_stand_for_many_cases():
+    columns = (Column("impacts", cases=True),)
+    of = {count: judge_part("x", table_of(columns, [{"impacts": count}] * 2, holds=(True, None))) for count in (9, 10)}
+    assert of[9].verdict == NOT_TESTABLE and of[10].verdict == REPRODUCED
+    assert of[10].sentence == "holds in 1 of 1 trials; 1 of 2 cannot tell, which stand for 10 cases."
 
 
 def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
