@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import velocity_scale
 from reference.complementarity.solvers import solve
 
 Floats = NDArray[np.float64]
@@ -63,7 +64,7 @@ def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
     p_c, first = _solved(compression, solver)
     returned = problem.restitution * p_c
     bounced = replace(compression, gamma_minus=problem.gamma_plus(p_c + returned))
-    extra, second = _solved(bounced, solver)
+    extra, second = _solved(bounced, solver, velocity_scale(problem))
     impulse = p_c + returned + extra
     return Outcome(problem.velocity_plus(impulse), impulse, max(first, second))
 
@@ -100,14 +101,19 @@ def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
     return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
 
 
-def _solved(problem: ImpactProblem, solver: str | None) -> tuple[Floats, float]:
-    """p (n,) and its recomputed residual by that solver, or by the first of LADDER that reaches LAW_TOLERANCE."""
-    said = []
+def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
+    """p (n,) and its recomputed residual by that solver, or by the first of LADDER that reaches LAW_TOLERANCE.
+
+    The residual is relative to `speed` [m/s] where the problem's own velocities are smaller: what compression has
+    stopped leaves rounding, which opposed rows may contradict.
+    """
+    said, own = [], velocity_scale(problem)
     for name in LADDER if solver is None else (solver,):
         solution = solve(problem, name)
-        if solution.solved(LAW_TOLERANCE):
-            return solution.answer(), solution.residuals.worst
-        said.append(f"{name} left a residual of {solution.residuals.worst:.1e}: {solution.note}")
+        residual = solution.residuals.worst * own / max(speed, own)
+        if residual <= LAW_TOLERANCE:
+            return solution.answer(), residual
+        said.append(f"{name} left a residual of {residual:.1e}: {solution.note}")
     raise SolverError("; ".join(said))
 
 

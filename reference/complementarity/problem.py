@@ -3,6 +3,8 @@
 Frictionless, by Newton's law:  0 <= p ⟂ gamma_plus + E gamma_minus >= 0,  gamma_plus = gamma_minus + W p.
 With friction mu and blocks (normal, tangent...):  K ∋ p ⟂ u + mu |u_T| n ∈ K*  (Coulomb's law, an NCP),
 where u is gamma_plus with E gamma_minus added to its normals. `relaxed` drops the shift mu |u_T|: the CCP.
+A joint is a block with gamma_plus = 0 in all its components and p of either sign: a mixed problem (MLCP). Components
+that a joint does not have are rows of zeros.
 """
 
 from __future__ import annotations
@@ -35,11 +37,11 @@ class ImpactProblem:
     ----------
     delassus : (n, n) W = J M⁻¹ Jᵀ [1/kg]
     gamma_minus : (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
-    restitution : (k,) Newton's e of each contact, in [0, 1]
+    restitution : (k,) Newton's e of each contact, in [0, 1]; joints have none
     friction : (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
     contact_size : components per contact, normal first: 1, 2 (planar friction) or 3
     relaxed : True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
-    bilateral : (k,) True where w = 0 holds with p of either sign (joints of an MLCP), or None; no friction then
+    bilateral : (k,) True where the block is a joint's, or None
     mass_matrix, contact_jacobian, velocity : the mechanics (d, d), (n, d), (d,) where they are known
     """
 
@@ -66,6 +68,7 @@ class ImpactProblem:
         *,
         contact_size: int | None = None,
         relaxed: bool = False,
+        bilateral: ArrayLike | None = None,
         name: str = "",
     ) -> ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M (d, d)."""
@@ -78,7 +81,8 @@ class ImpactProblem:
         coefficients = _per_contact("restitution", restitution, len(jacobian), size)
         mu = None if friction is None else _per_contact("friction", friction, len(jacobian), size)
         gamma, w = jacobian @ v, factor @ factor.T
-        return cls(w, gamma, coefficients, mu, size, relaxed, name, mass, jacobian, v)
+        joints = _joints(bilateral, len(coefficients))
+        return cls(w, gamma, coefficients, mu, size, relaxed, name, mass, jacobian, v, joints)
 
     @classmethod
     def from_delassus(
@@ -101,11 +105,7 @@ class ImpactProblem:
         size = contact_size or (1 if friction is None else 3)
         coefficients = _per_contact("restitution", restitution, len(gamma), size)
         mu = None if friction is None else _per_contact("friction", friction, len(gamma), size)
-        joints = None if bilateral is None else np.array(bilateral, dtype=np.bool_)
-        if joints is not None and (joints.shape != gamma.shape or friction is not None):
-            raise ArgumentError(
-                "bilateral", bilateral, f"shape ({len(gamma)},), in a problem without friction"
-            )
+        joints = _joints(bilateral, len(coefficients))
         return cls(w, gamma, coefficients, mu, size, relaxed, name, bilateral=joints)
 
     @property
@@ -130,9 +130,9 @@ class ImpactProblem:
 
     @cached_property
     def offset(self) -> Floats:
-        """The constant b (n,) of w = W p + b: gamma_minus with e gamma_minus added to the normals [m/s]."""
+        """The constant b (n,) of w = W p + b: gamma_minus with e gamma_minus added to contacts' normals [m/s]."""
         b = self.gamma_minus.copy()
-        b[:: self.contact_size] *= 1.0 + self.restitution
+        b[:: self.contact_size] *= 1.0 + np.where(self.two_sided, 0.0, self.restitution)
         return b
 
     @cached_property
@@ -201,6 +201,15 @@ def _per_contact(argument: str, value: ArrayLike, components: int, size: int) ->
     if not ((array >= 0.0) & (array <= upper) & np.isfinite(array)).all():
         raise ArgumentError(argument, value, "values in [0, 1]" if upper == 1.0 else "finite values >= 0")
     return np.ascontiguousarray(np.broadcast_to(array, components // size))
+
+
+def _joints(bilateral: ArrayLike | None, blocks: int) -> NDArray[np.bool_] | None:
+    if bilateral is None:
+        return None
+    joints = np.array(bilateral, dtype=np.bool_)
+    if joints.shape != (blocks,):
+        raise ArgumentError("bilateral", bilateral, f"shape ({blocks},)")
+    return joints
 
 
 def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:

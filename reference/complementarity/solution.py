@@ -128,14 +128,14 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     mu, size, scale = problem.friction_or_zero, problem.contact_size, velocity_scale(problem)
     w = problem.contact_velocity(impulse).reshape(-1, size) / scale
     if problem.friction is not None and not problem.relaxed:
-        w = de_saxce_shift(w, mu)
+        w = de_saxce_shift(w, np.where(problem.two_sided, 0.0, mu))
     p = impulse_scale(problem)[:, None] * impulse.reshape(-1, size) / scale
     joints = problem.two_sided  # cone: the whole line, dual cone: zero
     natural = np.where(joints[:, None], w, p - project_on_cone(p - w, mu))
     product = np.abs(np.einsum("ij,ij->i", p, w)) / np.maximum(1.0, np.linalg.norm(p, axis=1))
     return Residuals(
         float(np.where(joints, 0.0, distance_to_cone(p, mu)).max()),
-        float(np.where(joints, np.abs(w[:, 0]), distance_to_dual_cone(w, mu)).max()),
+        float(np.where(joints, np.linalg.norm(w, axis=1), distance_to_dual_cone(w, mu)).max()),
         float(product.max()),
         float(np.abs(natural).max()),
     )

@@ -124,6 +124,95 @@ def test_moreau_ball_reproduces_the_siconos_reference() -> None:
     assert np.abs(stepped.impulse[:, 0] - reference[:, 4]).max() <= 1e-12
 
 
+# --- springs ----------------------------------------------------------------------------------------------------
+def test_a_mass_on_a_spring_meets_the_wall_when_the_cosine_says() -> None:
+    """q = cos ωt meets −1/2 at ωt = 2π/3; half its speed is left, the amplitude after is √(1/4 + 3/16)."""
+    omega, e = 2.0, 0.5
+    exact = event_driven(LinearSystem([[3.0]], [0.0], [[1.0]], [0.5], e, [[3.0 * omega**2]]), [1.0], [0.0], 4.0)
+    meets, speed = 2.0 * np.pi / 3.0 / omega, omega * np.sqrt(0.75)
+    assert exact.event_time[1] == pytest.approx(meets, rel=1e-14)
+    assert exact.v[1, 0] == pytest.approx(e * speed, rel=1e-14)
+    back = 2.0 * np.arctan2(e * speed / omega, -0.5) / omega
+    assert exact.event_time[2] - exact.event_time[1] == pytest.approx(back, rel=1e-13)
+    q, _ = exact.state([meets + 0.5 * back])
+    assert q[0, 0] == pytest.approx(np.hypot(0.5, e * speed / omega), rel=1e-13)
+
+
+def hopper(k: float = 100.0, g: float = 10.0) -> LinearSystem:
+    """Two masses of 1 kg on one another with a spring of 1 m between, on the floor."""
+    return LinearSystem(np.eye(2), [-g - k, -g + k], [[1.0, 0.0]], [0.0], 0.0, k * np.array([[1.0, -1.0], [-1.0, 1.0]]))
+
+
+def test_a_contact_is_released_when_the_spring_lifts_its_weight() -> None:
+    """The upper mass swings by 0.3 m about its rest at 0.9 m; the spring pulls 10 N where the cosine is −2/3."""
+    exact = event_driven(hopper(), [0.0, 0.6], [0.0, 0.0], 0.6)
+    assert exact.event_time[1] == pytest.approx(np.arccos(-2.0 / 3.0) / 10.0, rel=1e-13)
+    q, v = exact.state([exact.event_time[1]])
+    assert q[0] == pytest.approx([0.0, 1.1], abs=1e-13) and v[0, 1] == pytest.approx(10.0 * 0.3 * np.sqrt(5.0) / 3.0)
+    q, _ = exact.state(exact.event_time[1] + np.array([1e-3, 4e-3]))
+    # it leaves with neither velocity nor acceleration: the gap is j t³/6 with j = k v / m
+    assert q[:, 0] == pytest.approx(100.0 * v[0, 1] * np.array([1e-9, 6.4e-8]) / 6.0, rel=2e-2)
+
+
+def test_a_weak_swing_never_releases_the_contact() -> None:
+    exact = event_driven(hopper(), [0.0, 0.9 - 0.19], [0.0, 0.0], 10.0)
+    assert len(exact.event_time) == 1 and exact.end == 10.0
+    q, _ = exact.state([10.0])
+    assert q[0] == pytest.approx([0.0, 0.9 - 0.19 * np.cos(100.0)], abs=1e-12)
+
+
+def chain(e: float) -> tuple[LinearSystem, list[float], list[float]]:
+    """Three masses in a row with two springs; the outer ones strike walls, neighbours each other."""
+    K = np.array([[40.0, -40.0, 0.0], [-40.0, 65.0, -25.0], [0.0, -25.0, 25.0]])
+    rows = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]]
+    system = LinearSystem(np.diag([1.0, 2.0, 0.7]), [0.3, -0.2, 0.1], rows, [0.4, 0.3, 0.3, 0.4], e, K)
+    return system, [0.0, 0.1, -0.1], [-1.0, 2.0, -1.5]
+
+
+def test_elastic_walls_keep_the_energy_of_springs() -> None:
+    system, q0, v0 = chain(1.0)
+    exact = event_driven(system, q0, v0, 3.0)
+    q, v = exact.state(np.linspace(0.0, 3.0, 400))
+    total = energy(system, q, v) + 0.5 * np.einsum("ti,ij,tj->t", q, np.asarray(system.stiffness), q)
+    assert len(exact.event_time) > 8 and np.abs(total / total[0] - 1.0).max() <= 1e-12
+    assert np.min(q @ system.rows.T + system.start) >= -1e-12  # no event is missed
+
+
+def test_springs_agree_with_an_integrator_that_watches_the_gaps() -> None:
+    """scipy's DOP853 with events: the first impacts of the chain, e = 0.6."""
+    from scipy.integrate import solve_ivp
+
+    system, q0, v0 = chain(0.6)
+    exact = event_driven(system, q0, v0, 2.0)
+    K = np.asarray(system.stiffness)
+
+    def rate(_: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[3:], np.linalg.solve(system.mass_matrix, system.force - K @ x[:3])])
+
+    gaps = [lambda t, x, k=k: system.gap(x[:3])[k] for k in range(4)]
+    for gap in gaps:
+        gap.terminal, gap.direction = True, -1  # type: ignore[attr-defined]
+    for k in range(4):
+        found = solve_ivp(rate, (exact.event_time[k], 2.0), [*exact.q[k], *exact.v[k]], "DOP853", events=gaps,
+                          rtol=1e-12, atol=1e-13)  # fmt: skip
+        assert found.t[-1] == pytest.approx(exact.event_time[k + 1], abs=1e-10)
+        assert found.y[:3, -1] == pytest.approx(exact.q[k + 1], abs=1e-9)
+
+
+def test_springs_of_no_stiffness_are_none() -> None:
+    for name, (system, q, v, duration) in SCENES.items():
+        plain = event_driven(system, q, v, duration)
+        sprung = event_driven(replace(system, stiffness=np.zeros_like(system.mass_matrix)), q, v, duration)
+        times = np.linspace(0.0, min(plain.end, sprung.end), 50)[1:-1]
+        assert plain.state(times)[0] == pytest.approx(sprung.state(times)[0], abs=1e-9), name
+
+
+@pytest.mark.parametrize("stiffness", [[[1.0]], [[1.0, 0.5], [0.0, 1.0]], [[1.0, 0.0], [0.0, -1.0]]])
+def test_a_stiffness_that_is_none_is_refused(stiffness: list[list[float]]) -> None:
+    with pytest.raises(ArgumentError, match="stiffness"):
+        LinearSystem(np.eye(2), [0.0, 0.0], [[1.0, 0.0]], [0.0], 0.0, stiffness)
+
+
 def moreau(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
     stepped = moreau_jean(system, q, v, dt, steps)
     return stepped.q, stepped.v

@@ -1,4 +1,4 @@
-"""Nonsmooth block Gauss-Seidel (NSGS): sweep the contacts, each projected on its cone.
+"""Nonsmooth block Gauss-Seidel (NSGS): sweep the contacts, each projected on its cone, and the joints, which have none.
 
 p_k <- proj_K(p_k − rho_k (u_k + shift_k)), shift = mu |u_T| of Coulomb's law (none where relaxed), rho_k one over
 the largest eigenvalue of the contact's own block of W, a few times per contact and sweep.
@@ -41,7 +41,7 @@ def _project(p, mu):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, fastmath=False)
-def _sweep_until_still(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
+def _sweep_until_still(w, b, mu, joints, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
     """Sweep in place; return the number of sweeps done, or -1 where the limit came first."""
     size = len(trial)
     for sweep in range(sweeps):
@@ -55,11 +55,12 @@ def _sweep_until_still(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still): 
                         u[i] += w[first + i, j] * p[j]
                     if i > 0:
                         slip += u[i] * u[i]
-                if not relaxed:
+                if not relaxed and not joints[k]:
                     u[0] += mu[k] * math.sqrt(slip)
                 for i in range(size):
                     trial[i] = p[first + i] - u[i] / inertia[k]
-                _project(trial, mu[k])
+                if not joints[k]:
+                    _project(trial, mu[k])
                 for i in range(size):
                     largest = max(largest, abs(trial[i] - p[first + i]) * inertia[k])
                     p[first + i] = trial[i]
@@ -76,7 +77,7 @@ def solve(problem: ImpactProblem) -> Answer:
     inertia[inertia == 0.0] = 1.0
     p = np.zeros(problem.size)
     done = _sweep_until_still(
-        np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero, inertia,
-        problem.relaxed, p, np.zeros(size), np.zeros(size), _SWEEPS, _STILL * velocity_scale(problem),
+        np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero, problem.two_sided,
+        inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), _SWEEPS, _STILL * velocity_scale(problem),
     )  # fmt: skip
     return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {_SWEEPS} sweeps")

@@ -1,7 +1,8 @@
 """cvxpy with Clarabel: friction as a second-order cone program, Coulomb's law by a fixed point on it.
 
 The relaxed law is  min ½|Aᵀp|² + bᵀp  over Coulomb's cones. Coulomb's own law is that program with mu |u_T|
-added to the normal part of b, which depends on the solution: repeat until it stops changing (it need not).
+added to the normal part of b, which depends on the solution: repeat until it stops changing (it need not). The
+impulses of joints are free.
 Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary, Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
 """
 
@@ -51,19 +52,22 @@ def _program(problem: ImpactProblem, rows: Floats) -> tuple[Any, Any, Any]:
     """The scaled program with its variable and its offset, which is a parameter so that rounds are cheap."""
     import cvxpy as cp
 
-    size, mu = problem.contact_size, problem.friction_or_zero
     root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
     p, offset = cp.Variable(problem.size), cp.Parameter(problem.size)
-    cones = [
-        cp.SOC(mu[k] * p[k * size], p[k * size + 1 : (k + 1) * size]) if mu[k] > 0.0 else p[k * size] >= 0.0
-        for k in range(problem.contacts)
-    ]
-    still = [p[k * size + 1 : (k + 1) * size] == 0.0 for k in np.flatnonzero(mu == 0.0)]
+    blocks = cp.reshape(p, (problem.contact_size, problem.contacts), order="F")
+    contacts = ~problem.two_sided
+    rough = np.flatnonzero(contacts & (problem.friction_or_zero > 0.0))
+    smooth = np.flatnonzero(contacts & (problem.friction_or_zero == 0.0))
+    cones: list[Any] = []
+    if len(rough):
+        cones.append(cp.SOC(cp.multiply(problem.friction_or_zero[rough], blocks[0, rough]), blocks[1:, rough]))
+    if len(smooth):
+        cones += [blocks[0, smooth] >= 0.0, blocks[1:, smooth] == 0.0]
     objective = cp.Minimize(0.5 * cp.sum_squares((rows.T / root) @ p) + offset @ p)
-    return cp.Problem(objective, cones + still), p, offset
+    return cp.Problem(objective, cones), p, offset
 
 
 def _shift(problem: ImpactProblem, impulse: Floats) -> Floats:
     """mu |u_T| per contact (k,) [m/s]."""
     u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
-    return problem.friction_or_zero * np.linalg.norm(u[:, 1:], axis=1)
+    return np.where(problem.two_sided, 0.0, problem.friction_or_zero * np.linalg.norm(u[:, 1:], axis=1))

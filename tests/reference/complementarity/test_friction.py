@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,8 +16,13 @@ from reference.complementarity.solution import (
     distance_to_dual_cone,
     project_on_cone,
 )
+from reference.datasets import problem_files, read_problem
+from reference.one_thread import one_thread
 
-CONE_SOLVERS = ("nsgs", "cvxpy_socp", "pinocchio_pgs", "pinocchio_admm")
+PROBLEMS = Path(__file__).parents[4] / "shared" / "problems"
+
+CONE_SOLVERS = ("nsgs", "newton_cones", "cvxpy_socp", "pinocchio_pgs", "pinocchio_admm")
+JOINT_SOLVERS = ("nsgs", "newton_cones", "cvxpy_socp")
 
 
 def mass_on_a_plane(v: list[float], mu: float, relaxed: bool = False) -> ImpactProblem:
@@ -33,7 +40,7 @@ def test_a_mass_sticks_or_slides_as_coulomb_says(solver: str) -> None:
     assert slides.velocity_plus == pytest.approx([0.0, 2.7, 3.6], abs=1e-6)
 
 
-RELAXED_SOLVERS = ("nsgs", "cvxpy_socp", "pinocchio_admm")
+RELAXED_SOLVERS = ("nsgs", "newton_cones", "cvxpy_socp", "pinocchio_admm")
 
 
 @pytest.mark.parametrize("solver", RELAXED_SOLVERS)
@@ -92,3 +99,129 @@ def test_projection_obeys_moreau(x: list[float], mu: float) -> None:
     assert distance_to_cone(inside, friction)[0] <= 1e-12
     assert abs((inside * rest).sum()) <= 1e-12
     assert distance_to_dual_cone(rest, friction)[0] <= 1e-12
+
+
+# --- joints beside contacts with friction (mixed problems) ---------------------------------------------------------
+def welded_masses(v: list[list[float]], e: float, mu: float, planar: bool = True) -> ImpactProblem:
+    """Masses of 1 and 2 kg, welded to one another; the second strikes the floor. Frames (normal, tangents)."""
+    d = 2 if planar else 3
+    joint, floor = np.hstack([np.eye(d), -np.eye(d)]), np.hstack([np.zeros((d, d)), np.eye(d)])
+    mass = np.diag([1.0] * d + [2.0] * d)
+    velocity = np.array(v)[:, :d].ravel()
+    return ImpactProblem.from_impact(mass, np.vstack([joint, floor]), velocity, e, mu, contact_size=d,
+                                     bilateral=[True, False])  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", JOINT_SOLVERS)
+@pytest.mark.parametrize("planar", [True, False])
+def test_joints_and_friction_by_hand(solver: str, planar: bool) -> None:
+    """The weld makes 3 kg with (−1/3, 1, 0) m/s of (−1, 3, 0) and none: p_n = 1 N s, and friction takes at most μ."""
+    struck = [[-1.0, 3.0, 0.0], [0.0, 0.0, 0.0]]
+    slides = solve(welded_masses(struck, 0.0, 0.5, planar), solver)
+    sticks = solve(welded_masses(struck, 0.0, 4.0, planar), solver)
+    d = 2 if planar else 3
+    assert slides.solved(1e-8), (slides.note, slides.residuals)
+    assert slides.velocity_plus.reshape(2, d)[:, :2] == pytest.approx(np.array([[0.0, 5 / 6]] * 2), abs=1e-8)
+    assert slides.answer().reshape(2, d)[:, :2] == pytest.approx(np.array([[1.0, -13 / 6], [1.0, -0.5]]), abs=1e-7)
+    assert sticks.solved(1e-8) and np.abs(sticks.velocity_plus).max() <= 1e-8
+    assert sticks.answer().reshape(2, d)[:, :2] == pytest.approx(np.array([[1.0, -3.0], [1.0, -3.0]]), abs=1e-7)
+
+
+@pytest.mark.parametrize("solver", JOINT_SOLVERS)
+def test_contacts_bounce_and_joints_do_not(solver: str) -> None:
+    """Both fall at 1 m/s, e = 1/2: both rise with 1/2; the weld carries 3/2 N s for the mass above."""
+    falls = solve(welded_masses([[-1.0, 0.0], [-1.0, 0.0]], 0.5, 0.3), solver)
+    assert falls.solved(1e-8)
+    assert falls.velocity_plus == pytest.approx([0.5, 0.0, 0.5, 0.0], abs=1e-8)
+    assert falls.answer() == pytest.approx([1.5, 0.0, 4.5, 0.0], abs=1e-7)
+    assert not Solution(falls.problem, np.array([1.5, 0.1, 4.5, 0.0])).solved(1e-3)  # planted: the joint slips
+    assert not Solution(falls.problem, np.zeros(4)).solved(1e-3)
+
+
+@pytest.mark.parametrize("relaxed", [True, False])
+def test_joints_are_as_if_their_coordinates_were_eliminated(relaxed: bool) -> None:
+    """Twelve coordinates tied by five joint rows: the same motion as contacts on the seven that are left."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        root, rows, joint = rng.normal(size=(12, 12)), rng.normal(size=(9, 12)), np.zeros((6, 12))
+        joint[:5] = rng.normal(size=(5, 12))  # the sixth component is not there
+        mass, free = root @ root.T + np.eye(12), np.linalg.svd(joint)[2][5:].T
+        velocity = free @ rng.normal(size=7)
+        problem = ImpactProblem.from_impact(mass, np.vstack([joint, rows]), velocity, 0.2, 0.4, relaxed=relaxed,
+                                            bilateral=[True, True, False, False, False])  # fmt: skip
+        reduced = ImpactProblem.from_impact(free.T @ mass @ free, rows @ free, free.T @ velocity, 0.2, 0.4,
+                                            relaxed=relaxed)  # fmt: skip
+        for solver in JOINT_SOLVERS:
+            solution = solve(problem, solver)
+            assert solution.solved(1e-6), (seed, solver, solution.note, solution.residuals)
+            if relaxed:
+                expected = free @ solve(reduced, "newton_cones").velocity_plus
+                assert solution.velocity_plus == pytest.approx(expected, abs=1e-5)
+            lifted = Solution(reduced, solution.answer()[6:])  # Coulomb's law may have several answers: all are judged
+            assert lifted.solved(1e-5)
+        for other in ("pinocchio_admm", "pinocchio_pgs"):
+            assert solve(problem, other).verdict() == "refused"
+
+
+# --- large hyperstatic problems -----------------------------------------------------------------------------------
+def brick_wall(layers: int = 5, bricks: int = 8, mu: float = 0.8, seed: int = 2) -> ImpactProblem:
+    """A wall of bricks 2 x 1 x 1 in running bond, masses over two decades, one step of gravity: four corners a face.
+
+    Eight and seven bricks by turns make 256 contacts (768 unknowns) of rank 228, as the stacks and towers of FCLIB.
+    """
+    size, rng = np.array([2.0, 1.0, 1.0]), np.random.default_rng(seed)
+    layer = np.array([k for k in range(layers) for _ in range(bricks - k % 2)])
+    middle = np.array([[2.0 * i + k % 2, 0.0, k + 0.5] for k in range(layers) for i in range(bricks - k % 2)])
+    count, rows = len(layer), []
+    for a in range(count):
+        below = [b for b in range(count) if layer[b] == layer[a] - 1 and abs(middle[b, 0] - middle[a, 0]) < 2.0]
+        for b in below or [-1]:
+            other = middle[b, 0] if b >= 0 else middle[a, 0]
+            for x in (max(middle[a, 0], other) - 1.0, min(middle[a, 0], other) + 1.0):
+                for y in (-0.5, 0.5):
+                    for way in np.roll(np.eye(3), 1, axis=0):  # up, then along the wall and across
+                        row, point = np.zeros((count, 6)), np.array([x, y, float(layer[a])])
+                        for body, sign in ((a, 1.0), (b, -1.0)):
+                            if body >= 0:
+                                row[body] = sign * np.concatenate([way, np.cross(point - middle[body], way)])
+                        rows.append(row.ravel())
+    mass = 2.0 * 10.0 ** rng.uniform(-1.0, 1.0, count)
+    inertia = np.array([size[1] ** 2 + size[2] ** 2, size[0] ** 2 + size[2] ** 2, size[0] ** 2 + size[1] ** 2]) / 12.0
+    diagonal = np.concatenate([m * np.concatenate([np.ones(3), inertia]) for m in mass])
+    velocity = np.tile([0.0, 0.0, -0.0981, 0.0, 0.0, 0.0], count)
+    return ImpactProblem.from_impact(np.diag(diagonal), np.array(rows), velocity, 0.0, mu, name="brick wall")
+
+
+def test_a_wall_of_768_unknowns_is_solved_by_two() -> None:
+    """A wall of bricks stands: Newton and ADMM say so to rounding, the interior point to the root of its accuracy."""
+    problem = brick_wall()
+    assert (problem.size, np.linalg.matrix_rank(problem.delassus)) == (768, 228)
+    with one_thread():
+        newton, admm, cone = (solve(problem, name) for name in ("newton_cones", "pinocchio_admm", "cvxpy_socp"))
+    assert newton.solved(1e-9), (newton.note, newton.residuals)
+    assert admm.solved(1e-9), (admm.note, admm.residuals)
+    assert cone.solved(1e-4), (cone.note, cone.residuals)
+    for solution in (newton, admm, cone):
+        assert np.abs(solution.velocity_plus).max() <= 1e-4 * 0.0981
+
+
+LARGE = 700  # unknowns of the stored problems that one solver alone had solved
+
+
+def test_large_stored_problems_are_solved_to_rounding() -> None:
+    """Files of FCLIB with 768 and 858 unknowns, where they are at hand; smaller ones are in the comparison's table."""
+    files = problem_files(PROBLEMS) if PROBLEMS.exists() else []
+    stored = [read_problem(path).problem for path in files if path.suffix in (".hdf5", ".h5")]
+    large = [problem for problem in stored if problem.size >= LARGE]
+    if not large:
+        pytest.skip("no shared problem file of 700 unknowns or more is here")
+    with one_thread():
+        for problem in large:
+            solution = solve(problem, "newton_cones")
+            assert solution.solved(1e-8), (problem.name, solution.note, solution.residuals)
+
+
+@pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")
+def test_newton_solves_the_stored_problem_on_which_gauss_seidel_creeps() -> None:
+    problem = read_problem(PROBLEMS / "fclib" / "fclib__local_problem_test.hdf5").problem
+    assert not solve(problem, "nsgs").solved() and solve(problem, "newton_cones").solved(1e-11)

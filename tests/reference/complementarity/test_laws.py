@@ -226,3 +226,15 @@ def test_rows_that_separate_stay_apart_or_the_status_says_so(seed: int, e: float
 def test_every_law_says_what_it_is() -> None:
     for name, law in LAWS.items():
         assert law.name == name and law.statement and law.source and law.hypotheses
+
+
+def test_poissons_law_on_dependent_rows_of_both_signs() -> None:
+    """What compression stops leaves rounding in opposed rows, which no solver can meet: it is judged by the speeds."""
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        rows = rng.integers(-2, 3, size=(60, 3)).astype(float) @ rng.integers(-2, 3, size=(3, 5))
+        v, e = rng.normal(size=5), (0.0, 0.5, 1.0)[seed % 3]
+        outcome = poisson(ImpactProblem.from_impact(np.eye(5), rows, v, e))
+        assert outcome.residual <= 1e-12
+        assert outcome.velocity @ outcome.velocity <= v @ v * (1.0 + 1e-12)
+        assert np.min(rows @ outcome.velocity) >= -1e-12

@@ -1,0 +1,157 @@
+"""Semismooth Newton on Coulomb's cones, from where ADMM leads: contacts with friction, and joints beside them.
+
+ADMM splits  ½ pᵀWp + (b + s)ᵀp  over the cones, with the shift s = mu |u_T| of Coulomb's law from the iterate before
+(none where relaxed). One eigendecomposition of W serves every penalty rho, which follows the residuals. Newton's steps
+are on the natural map F(p) = p − proj_K(p − w), in which a joint has F = w, by least squares of least norm: W is
+singular where contacts are redundant. The answer of either that leaves the smaller F is returned.
+Source: Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991); Carpentier, Montaut, Le Lidec, RSS (2024).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import SolverError
+from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
+from reference.complementarity.solution import Answer, de_saxce_shift, project_on_cone, velocity_scale
+
+Floats = NDArray[np.float64]
+
+_ITERATIONS = 20_000  # of ADMM
+_TRIED = 250  # iterations after which Newton is tried first; then each time twice as many
+_NEWTON_STEPS = 30
+_BALANCE = 10.0  # ratio of ADMM's two residuals above which rho is changed, by its root
+_BALANCED_EVERY = 20
+_SOLVED = 1e-12  # largest |F| at unit W and b; Newton's last step leaves some hundred roundings
+_SHORTEST = 2.0**-12  # of Newton's step in the line search
+_DEPENDENT = 1e-11  # share of the largest singular value of F' below which a direction counts as none
+
+
+def solve(problem: ImpactProblem) -> Answer:
+    """Return the impulse, converged or not: the residuals tell."""
+    if problem.asymmetry > SYMMETRY_TOLERANCE:
+        raise SolverError(f"refused: W is asymmetric (relative {problem.asymmetry:.1e})")
+    unit = _in_units(problem)
+    p, said = _admm(unit)
+    return Answer(p.ravel() * unit.length, said)
+
+
+class _Unit(NamedTuple):
+    """The problem at unit blocks of W and unit b: p = length * (unit p), contact by contact."""
+
+    W: Floats
+    b: Floats
+    mu: Floats
+    joints: NDArray[np.bool_]
+    relaxed: bool
+    length: Floats
+
+    def velocity(self, p: Floats) -> Floats:
+        """W p + b with Coulomb's shift (k, m)."""
+        w = (self.W @ p.ravel() + self.b).reshape(p.shape)
+        return w if self.relaxed else de_saxce_shift(w, self.mu)
+
+    def project(self, p: Floats) -> Floats:
+        """On the cones; a joint's p is free."""
+        return np.where(self.joints[:, None], p, project_on_cone(p, self.mu))
+
+    def natural_map(self, p: Floats) -> Floats:
+        """F (k, m)."""
+        w = self.velocity(p)
+        return np.where(self.joints[:, None], w, p - project_on_cone(p - w, self.mu))
+
+
+def _in_units(problem: ImpactProblem) -> _Unit:
+    k, m = problem.contacts, problem.contact_size
+    blocks = problem.delassus.reshape(k, m, k, m)[np.arange(k), :, np.arange(k)]
+    inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
+    scale = np.repeat(1.0 / np.sqrt(np.where(inertia > 0.0, inertia, 1.0)), m)
+    speed = float(np.abs(scale * problem.offset).max()) or velocity_scale(problem)
+    W = scale[:, None] * problem.delassus * scale
+    mu = np.where(problem.two_sided, 0.0, problem.friction_or_zero)
+    return _Unit(0.5 * (W + W.T), scale * problem.offset / speed, mu, problem.two_sided, problem.relaxed, scale * speed)
+
+
+def _admm(unit: _Unit) -> tuple[Floats, str]:
+    """p (k, m) and how it was found; Newton is tried now and then."""
+    shape = (len(unit.mu), -1)
+    values, vectors = np.linalg.eigh(unit.W)
+    values = np.clip(values, 0.0, None)
+    rho = float(np.sqrt(values.max() * max(values[values > _DEPENDENT * values.max()].min(initial=1.0), 1e-6)))
+    z, y, shift = np.zeros_like(unit.b), np.zeros_like(unit.b), np.zeros_like(unit.b)
+    best, least, tried = z.reshape(shape), np.inf, _TRIED
+    for done in range(1, _ITERATIONS + 1):
+        right = rho * z - y - unit.b - shift
+        x = vectors @ ((vectors.T @ right) / (values + rho))
+        if not unit.relaxed:  # the velocity of x is what is left of the right side
+            slip = (right - rho * x + unit.b).reshape(shape)[:, 1:]
+            shift.reshape(shape)[:, 0] = unit.mu * np.linalg.norm(slip, axis=1)
+        before, z = z, unit.project((x + y / rho).reshape(shape)).ravel()
+        y += rho * (x - z)
+        if done % _BALANCED_EVERY == 0:
+            primal, dual = np.abs(x - z).max(), rho * np.abs(z - before).max()
+            if primal > _BALANCE * dual or dual > _BALANCE * primal:
+                rho *= float(np.clip(np.sqrt(primal / max(dual, 1e-300)), 0.1, 10.0))
+        if done == tried:
+            tried *= 2
+            p, left, steps = _newton(unit, z.reshape(shape))
+            if left < least:
+                best, least = p, left
+            if least <= _SOLVED:
+                return best, f"{steps} Newton steps after {done} iterations of ADMM"
+    return best, f"natural map {least:.1e} after {_ITERATIONS} iterations of ADMM"
+
+
+def _newton(unit: _Unit, p: Floats) -> tuple[Floats, float, int]:
+    """p, largest |F| and the steps taken, until F vanishes or no step makes it smaller."""
+    from scipy.linalg import lstsq
+
+    F = unit.natural_map(p)
+    for step in range(_NEWTON_STEPS):
+        if np.abs(F).max() <= _SOLVED:
+            return p, float(np.abs(F).max()), step
+        change = lstsq(_derivative(unit, p), -F.ravel(), _DEPENDENT, lapack_driver="gelsy")[0].reshape(p.shape)
+        share = 1.0
+        while share >= _SHORTEST:
+            tried = unit.natural_map(p + share * change)
+            if np.linalg.norm(tried) < (1.0 - 1e-4 * share) * np.linalg.norm(F):
+                break
+            share *= 0.5
+        else:
+            break
+        p, F = p + share * change, tried
+    return p, float(np.abs(F).max()), _NEWTON_STEPS
+
+
+def _derivative(unit: _Unit, p: Floats) -> Floats:
+    """A generalized derivative of F at p (n, n)."""
+    k, m = p.shape
+    w = (unit.W @ p.ravel() + unit.b).reshape(k, m)
+    G = unit.W.reshape(k, m, k * m).copy()  # derivative of the shifted velocity
+    if not unit.relaxed:
+        slip = np.linalg.norm(w[:, 1:], axis=1)
+        along = np.divide(w[:, 1:], slip[:, None], out=np.zeros_like(w[:, 1:]), where=slip[:, None] > 0.0)
+        G[:, 0] += unit.mu[:, None] * np.einsum("kt,ktn->kn", along, G[:, 1:])
+    D = _projection_derivative(p - (w if unit.relaxed else de_saxce_shift(w, unit.mu)), unit.mu)
+    moved = np.eye(k * m).reshape(k, m, k * m)
+    J = moved - np.einsum("kij,kjn->kin", D, moved - G)
+    J[unit.joints] = G[unit.joints]
+    return np.asarray(J.reshape(k * m, k * m))
+
+
+def _projection_derivative(x: Floats, mu: Floats) -> Floats:
+    """Derivative of the projection on each cone (k, m, m)."""
+    k, m = x.shape
+    tangent = np.linalg.norm(x[:, 1:], axis=1)
+    inside = (x[:, 0] >= 0.0) & (tangent <= mu * x[:, 0])
+    outside = ~inside & (mu * tangent <= -x[:, 0])
+    along = np.divide(x[:, 1:], tangent[:, None], out=np.zeros_like(x[:, 1:]), where=tangent[:, None] > 0.0)
+    normal = np.concatenate([np.ones((k, 1)), mu[:, None] * along], axis=1)  # gradient of the height, times 1 + mu²
+    D = normal[:, :, None] * normal[:, None, :] / (1.0 + mu**2)[:, None, None]
+    bend = np.divide(mu * (x[:, 0] + mu * tangent) / (1.0 + mu**2), tangent, out=np.zeros(k), where=tangent > 0.0)
+    D[:, 1:, 1:] += bend[:, None, None] * (np.eye(m - 1) - along[:, :, None] * along[:, None, :])
+    D[inside], D[outside] = np.eye(m), 0.0
+    return D
