@@ -3,8 +3,8 @@
 All are explicit, start a step from (q, v) alone (an impulse may have changed v just before), and evaluate the
 acceleration at given stages: stage i stands `fraction[i]` of the step after its start, on the line that the
 stage before it points along, and carries the weight `weight[i]`. The compiled step reads these numbers;
-`Integrator.step` is a Python step for any acceleration. With vector coordinates the two do the same; where rotations do
-not commute, the step of four stages here is a commutator-free method of fourth order, the compiled one is of second.
+`Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python alone: it keeps
+its fourth order where rotations do not commute.
 
 On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
@@ -28,8 +28,8 @@ Acceleration = Callable[[Floats, Floats], Floats]  # q, v -> dv/dt
 class Integrator(NamedTuple):
     """An explicit integrator.
 
-    `order`: the error after a given time falls as dt^order. `group_order` is the same for the compiled step,
-    which combines the stages' velocities into one displacement, where rotations do not commute.
+    `order`: the error after a given time falls as dt^order. `group_order` is the same where rotations do not commute:
+    the step combines the stages' velocities into one displacement.
     """
 
     name: str
@@ -42,9 +42,7 @@ class Integrator(NamedTuple):
     def step(
         self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
     ) -> tuple[Floats, Floats]:
-        """Return (q, v) after one step of dt [s], at the declared order on every configuration space."""
-        if len(self.weight) == 4:
-            return _commutator_free_4(integrate, acceleration, q, v, dt)
+        """Return (q, v) after one step of dt [s]."""
         rate, change = v, acceleration(q, v)
         mean_rate, mean_change = self.weight[0] * rate, self.weight[0] * change
         for fraction, weight in zip(self.fraction[1:], self.weight[1:], strict=True):
@@ -56,33 +54,41 @@ class Integrator(NamedTuple):
         return integrate(q, v_next if self.semi_implicit else mean_rate, dt), v_next
 
 
-def _commutator_free_4(
-    integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
-) -> tuple[Floats, Floats]:
-    """Commutator-free fourth-order method (Celledoni, Marthinsen and Owren, 2003).
+class _CommutatorFree4(Integrator):
+    """Commutator-free method of fourth order (Celledoni, Marthinsen and Owren, 2003).
 
     On vector coordinates it is the classical Runge-Kutta method.
     """
-    v1, a1 = v, acceleration(q, v)
-    q2, v2 = integrate(q, v1, 0.5 * dt), v + 0.5 * dt * a1
-    a2 = acceleration(q2, v2)
-    q3, v3 = integrate(q, v2, 0.5 * dt), v + 0.5 * dt * a2
-    a3 = acceleration(q3, v3)
-    q4, v4 = integrate(q2, v3 - 0.5 * v1, dt), v + dt * a3
-    a4 = acceleration(q4, v4)
-    q_half = integrate(q, (3.0 * v1 + 2.0 * v2 + 2.0 * v3 - v4) / 12.0, dt)
-    q_next = integrate(q_half, (3.0 * v4 + 2.0 * v3 + 2.0 * v2 - v1) / 12.0, dt)
-    return q_next, v + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+
+    __slots__ = ()
+
+    def step(
+        self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
+    ) -> tuple[Floats, Floats]:
+        """Return (q, v) after one step of dt [s], at fourth order on every configuration space."""
+        v1, a1 = v, acceleration(q, v)
+        q2, v2 = integrate(q, v1, 0.5 * dt), v + 0.5 * dt * a1
+        a2 = acceleration(q2, v2)
+        q3, v3 = integrate(q, v2, 0.5 * dt), v + 0.5 * dt * a2
+        a3 = acceleration(q3, v3)
+        q4, v4 = integrate(q2, v3 - 0.5 * v1, dt), v + dt * a3
+        a4 = acceleration(q4, v4)
+        q_half = integrate(q, (3.0 * v1 + 2.0 * v2 + 2.0 * v3 - v4) / 12.0, dt)
+        q_next = integrate(q_half, (3.0 * v4 + 2.0 * v3 + 2.0 * v2 - v1) / 12.0, dt)
+        return q_next, v + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
 
 
+_STAGES_4 = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+# Those that a contact law may name.
 INTEGRATORS: dict[str, Integrator] = {
     method.name: method
     for method in (
         Integrator("semi_implicit_euler", 1, 1, (0.0,), (1.0,), semi_implicit=True),
         Integrator("midpoint", 2, 2, (0.0, 0.5), (0.0, 1.0)),
-        Integrator("runge_kutta_4", 4, 2, (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+        Integrator("runge_kutta_4", 4, 2, *_STAGES_4),
     )
 }
+COMMUTATOR_FREE_4 = _CommutatorFree4("commutator_free_4", 4, 4, *_STAGES_4)
 
 
 def integrator(name: str) -> Integrator:

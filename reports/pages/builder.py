@@ -79,7 +79,7 @@ def map_of(claim: Finding) -> Figure | None:
 def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
     """Return the figure that plays a run, by the run's name among the inputs."""
     drawn = [figure for group in figures.values() for figure in group if isinstance(figure, Figure)]
-    return {name: figure.key for figure in drawn if figure.panels[0].film for name in figure.inputs}
+    return {name: figure.key for figure in drawn if figure.panels and figure.panels[0].film for name in figure.inputs}
 
 
 def badge_words(topic: Finding) -> str:

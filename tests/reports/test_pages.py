@@ -209,6 +209,11 @@ def test_a_hard_case_without_its_files_says_so() -> None:
     assert "Skipped: needs bowl.lcp." in page
 
 
+def test_a_figure_of_an_empty_table_has_no_panels_and_costs_nothing_else() -> None:
+    page = build_report(Evidence(topics=(on_hard_cases(()),)))
+    assert "stable on 0 of 0 hard cases" in page
+
+
 def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
     stable = _hard_case(("IAPB", "stable", 0.0))
     found = on_hard_cases((stable, _hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))

@@ -1,7 +1,6 @@
 """A free body tumbles: each integrator against the closed form, its drifts, and its order measured.
 
-Two forms of each integrator: `Integrator.step`, which keeps its `order` on rotations, and the compiled step of the
-simulation, which combines its stages in one displacement and declares a `group_order`.
+The compiled step of the simulation by every integrator, and the method of fourth order that only Python has.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.laws import Penalty
-from iapb.mechanics.integrators import INTEGRATORS, Integrator
+from iapb.mechanics.integrators import COMMUTATOR_FREE_4, INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
@@ -38,6 +37,7 @@ COARSEST = {
     "semi_implicit_euler": 800,
     "midpoint": 200,
     "runge_kutta_4": 100,
+    "commutator_free_4": 100,
 }  # steps: small enough to show the order
 HALVINGS = {"quick": 4, "full": 6}
 ORDER_TOLERANCE = 0.15  # what the next error term adds at these steps
@@ -46,7 +46,6 @@ ROUNDING = 1e-10  # errors below this feel the rounding of some thousand steps (
 COLUMNS = (
     Column("motion", condition=True),
     Column("integrator", condition=True),
-    Column("form", condition=True),
     Column("step", "s", condition=True),
     Column("attitude error", "rad"),
     Column("rate error", "rad/s"),
@@ -60,7 +59,6 @@ COLUMNS = (
 )
 DRIFT_ORDERS = ("energy order", "momentum order")
 ORDERS = ("order", *DRIFT_ORDERS)
-PYTHON, COMPILED = "Integrator.step", "compiled step"
 
 
 class Tumble(NamedTuple):
@@ -76,27 +74,23 @@ class Tumble(NamedTuple):
 
 
 def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Measure every integrator in both forms on both motions, over a row of halved steps."""
+    """Measure every integrator on both motions, over a row of halved steps."""
     check_depth(depth)
 
-    def rows_of(case: tuple[str, Integrator, int]) -> Iterator[dict[str, Any]]:
-        motion, method, which = case
-        form, path, order = _forms(method)[which]
-        head = {"motion": motion, "integrator": method.name, "form": form, "declared order": order}
+    def rows_of(case: tuple[str, Integrator]) -> Iterator[dict[str, Any]]:
+        motion, method = case
+        path = path_by_python if method is COMMUTATOR_FREE_4 else path_compiled
+        head = {"motion": motion, "integrator": method.name, "declared order": method.group_order}
         return (head | row for row in _halved(MOTIONS[motion], method, path, HALVINGS[depth]))
 
-    rows = of_each(product(MOTIONS, INTEGRATORS.values(), (0, 1)), rows_of, failures,
-                   lambda case: f"{case[0]}, {case[1].name}")  # fmt: skip
+    cases = product(MOTIONS, (*INTEGRATORS.values(), COMMUTATOR_FREE_4))
+    rows = of_each(cases, rows_of, failures, lambda case: f"{case[0]}, {case[1].name}")
     statement = (
         "Attitude and rate converge to the closed form with the order that the integrator declares; the drifts of "
         "energy and angular momentum fall at least as fast."
     )
     tolerance = f"order within {ORDER_TOLERANCE} of the declared one, by the two finest steps above rounding"
     return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
-
-
-def _forms(method: Integrator) -> tuple[tuple[str, Callable[..., Tumble], int], ...]:
-    return (PYTHON, path_by_python, method.order), (COMPILED, path_compiled, method.group_order)
 
 
 def exact(body: TorqueFreeBody, time: float) -> Tumble:
@@ -179,7 +173,7 @@ def judged(table: Table) -> Table:
     series: dict[Any, list[int]] = {}
     records = table.records()
     for k, row in enumerate(records):
-        series.setdefault((row["motion"], row["integrator"], row["form"]), []).append(k)
+        series.setdefault((row["motion"], row["integrator"]), []).append(k)
     outcomes: list[bool | None] = [None] * len(records)
     for places in series.values():
         shown = [k for k in places if records[k]["order"] is not None]
@@ -197,11 +191,11 @@ def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
 
 
 def convergence(table: Table) -> Part:
-    """The orders found for each integrator and form."""
+    """The orders found for each integrator."""
     judges = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
     series = "; ".join(
-        f"{words(name)}, {form}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
-        for (name, form), rows in by(judges, "integrator", "form").items()
+        f"{words(name)}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
+        for (name,), rows in by(judges, "integrator").items()
     )
     return Part("A free tumbling body converges to the closed form with the declared order, and its energy and angular "
                 f"momentum converge no slower: {series}.", verdict_of_law(table.holds))  # fmt: skip
