@@ -31,6 +31,7 @@ class ImpactCase:
     translations : (k, d) motions z with J z = 0 exactly.
     unequal : (c,) restitutions, each in [0, 1], that take the place of e.
     touching : (k, d) rows of contacts that touch and do not approach.
+    tangents, friction : (c, m, d) rows of m tangents of each contact, and (c,) Coulomb's μ; both, or neither.
     rank : the first `rank` rows are independent, the others depend on them.
     mass_condition, closeness : κ(M), and the distance of nearly dependent rows (1 = generic) it was made with.
     """
@@ -43,6 +44,8 @@ class ImpactCase:
     translations: Floats | None = None
     unequal: Floats | None = None
     touching: Floats | None = None
+    tangents: Floats | None = None
+    friction: Floats | None = None
     rank: int | None = None
     mass_condition: float = np.nan
     closeness: float = np.nan
@@ -80,6 +83,14 @@ class ImpactCase:
     def given_restitution(self) -> Any:
         """What a resolver gets: the scalar e, or a copy of the unequal ones."""
         return self.restitution if self.unequal is None else self.unequal.copy()
+
+    def given(self) -> tuple[Any, ...]:
+        """Copies of what a resolver is called with: M, J, v and e; with friction M, J, T, v, e and μ."""
+        e = self.given_restitution()
+        if self.tangents is None or self.friction is None:
+            return self.mass_matrix.copy(), self.contact_jacobian.copy(), self.velocity.copy(), e
+        return (self.mass_matrix.copy(), self.contact_jacobian.copy(), self.tangents.copy(), self.velocity.copy(), e,
+                self.friction.copy())
 
     @cached_property
     def condition(self) -> float:
@@ -194,10 +205,10 @@ def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: flo
 
 def draw_case(
     rng: np.random.Generator, largest_condition: float = 1e8, coordinates: int | None = None,
-    contacts: int | None = None,
+    contacts: int | None = None, row_kinds: tuple[str, ...] = ROW_KINDS,
 ) -> ImpactCase:  # fmt: skip
     """Return one random impact with κ(M) up to `largest_condition`; unless given d is up to 10, c up to 2 d + 1."""
-    rows_kind = _one_of(rng, ROW_KINDS)
+    rows_kind = _one_of(rng, row_kinds)
     d = int(rng.integers(1, 11)) if coordinates is None else coordinates
     condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
     mass_kind = "diagonal" if rows_kind == "cradle" else _one_of(rng, MASS_KINDS)
@@ -306,6 +317,86 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
         along = unseen.T @ (unseen @ v)
         return along + (1e-9 * v if kind == "grazing" else 0.0)
     return v
+
+
+# Impacts for one-sided contacts and for friction. A textbook method goes through W = J M⁻¹ Jᵀ, which squares the
+# closeness of rows, so nearly dependent rows are left out; exact copies and sums, as a face on a floor has, are not.
+ONE_SIDED_ROW_KINDS = ("generic", "kinetic", "dependent", "copies", "zeros", "none", "cradle")
+ONE_SIDED_COORDINATES, ONE_SIDED_CONTACTS = 6, 6
+ONE_SIDED_POWERS = 10  # of two, about ±3 decades, in M and v: absolute thresholds show
+SIGNS = ("approaching", "approaching", "mixed")
+FRICTIONAL_KINDS = ("body in the plane", "two bodies in the plane", "body in space", "generic")
+
+
+def draw_one_sided_case(rng: np.random.Generator, number: int, largest_condition: float = 1e4) -> ImpactCase:
+    """Return an impact of one-sided contacts, e in [0, 1]; in two of three every contact approaches."""
+    d, c = int(rng.integers(1, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, ONE_SIDED_CONTACTS + 1))
+    if rng.random() < 0.2:
+        case = _standing_box(rng, c)
+    else:
+        case = draw_case(rng, largest_condition, coordinates=d, contacts=c, row_kinds=ONE_SIDED_ROW_KINDS)
+    return _signed(rng, replace(case, restitution=_push_restitution(rng)))
+
+
+def draw_frictional_case(rng: np.random.Generator, number: int, largest_condition: float = 1e2) -> ImpactCase:
+    """Return an impact with tangents and μ in [0, 2]: bodies in the plane and in space, and generic rows."""
+    kind = FRICTIONAL_KINDS[number % len(FRICTIONAL_KINDS)]
+    if kind == "generic":
+        d, c = int(rng.integers(2, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, 4))
+        m = int(rng.integers(1, min(3, d)))
+        mass = draw_mass_matrix(rng, _one_of(rng, MASS_KINDS), d, 10.0 ** rng.uniform(0.0, np.log10(largest_condition)))
+        drawn, translations = rng.normal(size=(c, 1 + m, d)), None
+        rows = drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
+    else:
+        mass, rows, translations = _bodies(rng, kind)
+    c = len(rows)
+    friction = rng.choice([0.0, 0.3, 1.0, float(rng.uniform(0.0, 2.0))], size=c)
+    velocity = draw_velocity(rng, _one_of(rng, ("normal", "kinetic normal")), mass, rows[:, 0])
+    case = ImpactCase(mass, rows[:, 0], velocity, _push_restitution(rng), f"{kind}, {c} contacts with friction",
+                      translations, tangents=rows[:, 1:], friction=friction)
+    return _signed(rng, case)
+
+
+def _push_restitution(rng: np.random.Generator) -> float:
+    return float(rng.choice([0.0, 0.0, 0.5, 1.0, float(rng.uniform(0.0, 1.0))]))
+
+
+def _standing_box(rng: np.random.Generator, contacts: int) -> ImpactCase:
+    """A body in the plane whose face meets the floor at several points: two independent rows at most."""
+    rows = np.column_stack([np.zeros(contacts), np.ones(contacts), rng.uniform(-0.5, 0.5, size=contacts)])
+    mass = np.diag([1.0, 1.0, float(rng.uniform(0.02, 1.0))])
+    return ImpactCase(mass, rows, rng.normal(size=3), 0.0, f"a face on the floor at {contacts} points")
+
+
+def _signed(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
+    """The case in other units of M and v, with normals turned so that every contact approaches, or left as drawn."""
+    signs = _one_of(rng, SIGNS)
+    rows = case.contact_jacobian
+    if signs == "approaching":
+        rows = np.where((rows @ case.velocity > 0.0)[:, None], -rows, rows)
+    m, s = np.ldexp(1.0, rng.integers(-ONE_SIDED_POWERS, ONE_SIDED_POWERS + 1, size=2) * (rng.random() < 0.5))
+    return replace(case, mass_matrix=m * case.mass_matrix, contact_jacobian=rows, velocity=s * case.velocity,
+                   family=f"{case.family}, {signs}")
+
+
+def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats | None]:
+    """M, rows (c, 1 + m, d) of normals and tangents, and translations, of one or two rigid bodies."""
+    inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
+    if kind == "body in space":
+        frames = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(int(rng.integers(1, 4)))]
+        arms = rng.uniform(-0.5, 0.5, size=(len(frames), 3))
+        rows = np.array([[[*n, *np.cross(r, n)] for n in frame] for r, frame in zip(arms, frames, strict=True)])
+        return np.diag([1.0, 1.0, 1.0, *inertia[:3]]), rows, None
+    count = int(rng.integers(1, 4))
+    angles, arms = rng.uniform(0.0, 2.0 * np.pi, size=count), rng.uniform(-0.5, 0.5, size=(2, count, 2))
+    axes = [np.column_stack([np.cos(turned), np.sin(turned)]) for turned in (angles + 0.5 * np.pi, angles)]
+    one, other = (np.stack([np.column_stack([axis, arm[:, 0] * axis[:, 1] - arm[:, 1] * axis[:, 0]])
+                            for axis in axes], 1) for arm in arms)
+    if kind == "body in the plane":
+        return np.diag([1.0, 1.0, inertia[0]]), one, None
+    heavier = 10.0 ** rng.uniform(-1.0, 1.0)
+    mass = np.diag([1.0, 1.0, inertia[0], heavier, heavier, heavier * inertia[1]])
+    return mass, np.concatenate([one, -other], axis=2), np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]])
 
 
 # Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are small whole numbers,

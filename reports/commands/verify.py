@@ -17,6 +17,7 @@ from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_co
 from verification import check_passivity
 from verification.engines import SETTINGS, compare_engines, sentence, verdict
 from verification.engines.record import EngineRecord
+from verification.laws import CONTRACTS
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
 from verification.laws.kit import LawCount
@@ -27,8 +28,12 @@ _SHOWN = 20  # counterexamples listed; all are in their folder
 
 def verify(
     resolver: Annotated[str, typer.Option(
-        help="package.module:function, called as (mass_matrix, contact_jacobian, velocity, restitution).")]
+        help="package.module:function, called as (mass_matrix, contact_jacobian, velocity, restitution); with "
+             "--contract frictional as (mass_matrix, contact_jacobian, tangents, velocity, restitution, friction).")]
     = ENGINE,
+    contract: Annotated[str, typer.Option(help=f"What it is taken for: {', '.join(CONTRACTS)}.")] = "equality",
+    laws: Annotated[list[str] | None, typer.Option(
+        help="Only these laws, by name: kinetic_energy,pushing; may be repeated.")] = None,
     impacts: Annotated[int | None, typer.Option(min=1, help="Random impacts; default 5000, with --full 1,000,000.")]
     = None,
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the draw.")] = 0,
@@ -49,6 +54,8 @@ def verify(
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
     if scene and not simulator:
         raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
+    if (contract != "equality" or laws) and (full or simulator or recheck is not None):
+        raise typer.BadParameter("not with --full, --simulator or --recheck", param_hint="--contract, --laws")
     if simulator:
         verify_simulators(simulator, scene or ())
         return
@@ -57,15 +64,17 @@ def verify(
     elif full:
         passed = verify_full(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
     else:
-        passed = _kit(resolver, impacts, seed, unequal)
+        named = [name for given in laws or () for name in given.split(",") if name]
+        passed = _kit(resolver, contract, named if laws else None, impacts, seed, unequal)
     if not passed:
         raise typer.Exit(1)
 
 
-def _kit(resolver: str, impacts: int | None, seed: int, unequal: bool) -> bool:
+def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | None, seed: int, unequal: bool) -> bool:
     tested = function_named("--resolver", resolver)
     with stage_progress() as progress:
-        report = check_passivity(tested, impacts=impacts or KIT_IMPACTS, seed=seed, unequal_restitution=unequal,
+        report = check_passivity(tested, contract=contract, laws=laws, impacts=impacts or KIT_IMPACTS, seed=seed,
+                                 unequal_restitution=unequal,
                                  progress=lambda done, total: progress("impacts", done, total))
     print(report)
     return report.passed

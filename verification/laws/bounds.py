@@ -42,6 +42,7 @@ class Bounds:
     factor, power, ceiling : relative energy gain at most min(ceiling, factor · d · ε · κ(M)^power).
     restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
     bitwise_scaling : powers of two in row scale must change no bit.
+    least : no tolerance is smaller: the accuracy, relative to |u|, of a solver that iterates or goes through J M⁻¹ Jᵀ.
     """
 
     factor: float
@@ -49,10 +50,11 @@ class Bounds:
     ceiling: float
     restitution: float
     bitwise_scaling: bool
+    least: float = 0.0
 
     def energy_gain(self, case: ImpactCase) -> float:
         """Largest relative gain (KE⁺ − KE⁻)/KE⁻ that rounding excuses."""
-        return min(self.ceiling, self.factor * case.coordinates * EPS * case.condition**self.power)
+        return max(self.least, min(self.ceiling, self.factor * case.coordinates * EPS * case.condition**self.power))
 
     def comparison(self, case: ImpactCase) -> float:
         """Largest distance, relative to |u|, of two velocities that ought to be equal.
@@ -62,10 +64,13 @@ class Bounds:
         """
         root = np.sqrt(case.condition)
         rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / case.smallest_motion))
-        return rounding + 4.0 * float(np.sqrt(max(case.contacts, 1))) * case.largest_noise / case.smallest_motion
+        noise = 4.0 * float(np.sqrt(max(case.contacts, 1))) * case.largest_noise / case.smallest_motion
+        return max(self.least, rounding + noise)
 
 
 # Any sound resolver written with plain numpy (Cholesky, then an SVD of unit rows) keeps these.
 KIT = Bounds(factor=100.0, power=1.0, ceiling=1e-7, restitution=1e-8, bitwise_scaling=False)
 # What `factored` with its clamp promises (docstring of resolve_impact), on any κ(M) that Cholesky accepts.
 FACTORED = Bounds(factor=10.0, power=0.5, ceiling=np.inf, restitution=1e-8, bitwise_scaling=True)
+# One-sided contacts: a textbook solver of the complementarity problem keeps these, by pivoting or by sweeps.
+ONE_SIDED = Bounds(factor=100.0, power=1.0, ceiling=1e-7, restitution=1e-7, bitwise_scaling=False, least=1e-7)

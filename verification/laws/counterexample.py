@@ -11,18 +11,22 @@ from typing import Any
 import numpy as np
 
 from verification.impacts import Floats, ImpactCase
-from verification.laws.bounds import FACTORED, KIT, Bounds
+from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
+from verification.laws.contracts import CONTRACTS
 from verification.laws.engine_laws import ENGINE_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
-from verification.laws.strategies import impact_cases, unequal_cases
+from verification.laws.strategies import SEARCHED, tangents_are_independent
 
 _DIGITS = (0, 1, 2, 4, 8)
 
 
 def search_counterexample(
-    fails: Callable[[ImpactCase], bool], examples: int, seed: int, unequal: bool = False
+    fails: Callable[[ImpactCase], bool], examples: int, seed: int, kind: str = "equality"
 ) -> ImpactCase | None:
-    """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing."""
+    """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing.
+
+    kind : a contract, or ``unequal``, one of `strategies.SEARCHED`
+    """
     import random
 
     from hypothesis import HealthCheck, Phase, find, settings
@@ -36,7 +40,7 @@ def search_counterexample(
         suppress_health_check=list(HealthCheck),
     )
     try:
-        return find(unequal_cases() if unequal else impact_cases(), fails, settings=profile, random=random.Random(seed))
+        return find(SEARCHED[kind](), fails, settings=profile, random=random.Random(seed))
     except NoSuchExample:
         return None
 
@@ -61,8 +65,11 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
     if case.translations is not None:
         yield replace(case, translations=None)
     for i in range(case.contacts):
-        unequal = None if case.unequal is None else np.delete(case.unequal, i)
-        yield replace(case, contact_jacobian=np.delete(case.contact_jacobian, i, axis=0), unequal=unequal)
+        fewer: dict[str, Any] = {}
+        for name in ("contact_jacobian", "tangents", "friction", "unequal"):
+            array = getattr(case, name)
+            fewer[name] = None if array is None else np.delete(array, i, axis=0)
+        yield replace(case, **fewer)
     if case.coordinates > 1 and case.translations is None:
         for k in range(case.coordinates):
             yield _without_coordinate(case, k)
@@ -70,7 +77,7 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
         if case.unequal is None and case.restitution not in (1.0, e):
             yield replace(case, restitution=e)
     for digits in _DIGITS:
-        for name in ("velocity", "contact_jacobian", "mass_matrix", "unequal"):
+        for name in ("velocity", "contact_jacobian", "tangents", "mass_matrix", "friction", "unequal"):
             yield from _rounded(case, name, digits)
 
 
@@ -79,6 +86,7 @@ def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
         case,
         mass_matrix=np.delete(np.delete(case.mass_matrix, k, axis=0), k, axis=1),
         contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
+        tangents=None if case.tangents is None else np.delete(case.tangents, k, axis=2),
         velocity=np.delete(case.velocity, k),
     )
 
@@ -108,22 +116,22 @@ def _is_valid(case: ImpactCase) -> bool:
         for row in rows[k + 1 :]:
             factor = row[k] / pivot_row[k]
             row[k:] = [x - factor * y for x, y in zip(row[k:], pivot_row[k:], strict=True)]
-    return True
+    return tangents_are_independent(case)
 
 
 # A counterexample as the source of a test that can be pasted beside the resolver it breaks.
 
-_BY_NAME = {"KIT": KIT, "FACTORED": FACTORED}
+_BY_NAME = {"KIT": KIT, "FACTORED": FACTORED, "ONE_SIDED": ONE_SIDED}
 
 
-def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None) -> str:
+def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None, contract: str = "equality") -> str:
     """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap.
 
     A law of the engine's own (a budget, extreme inputs) is put to the engine, whatever the resolver and the bounds.
     """
     if law in ENGINE_LAWS:
         return _test_of_the_engine(case, law)
-    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else "LAWS"
+    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else CONTRACTS[contract].table
     name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
     imports = ["import numpy as np", f"from verification.laws import {table}, ImpactCase"]
     imports.append(f"from verification.laws.bounds import {name or 'Bounds'}")
@@ -150,7 +158,7 @@ def _test_of_the_engine(case: ImpactCase, law: str) -> str:
 
 def _test_of(case: ImpactCase, law: str) -> list[str]:
     """The head of the test, and its case."""
-    optional = {"translations": case.translations, "unequal": case.unequal}
+    optional = {name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")}
     arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
     arrays |= {name: array for name, array in optional.items() if array is not None}
     more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from iapb.errors import ArgumentError
+from iapb.names import one_of
 from reference.one_thread import one_thread
 from verification.impacts import (
-    ADVERSE,
     LARGE_CONTACTS,
     LARGE_COORDINATES,
     LARGE_EVERY,
+    Floats,
     ImpactCase,
-    adverse_cases,
-    draw_wide_case,
     with_unequal_restitution,
 )
 from verification.laws.bounds import KIT, Bounds, LawResidual
+from verification.laws.contracts import CONTRACTS, Contract
 from verification.laws.counterexample import as_test, name_of, search_counterexample, shrink
-from verification.laws.impact_laws import LAWS, OF_ONE_CALL, UNEQUAL_LAWS, Law
-from verification.laws.resolver import Answer, Resolver, ResolverFault, Watched
+from verification.laws.impact_laws import OF_ONE_CALL, UNEQUAL_LAWS, Law
+from verification.laws.resolver import Answer, Resolver, ResolverFault, Watched, own_outcome
 
 
 @dataclass(frozen=True)
@@ -64,15 +65,17 @@ class LawVerdict:
         return f"{line}\n         {self.fault}" if self.fault else line
 
 
-@dataclass(frozen=True)
-class PassivityReport:
-    """Verdict of `check_passivity`.
+@dataclass(frozen=True, eq=False)
+class PassivityReport(str):
+    """Verdict of `check_passivity`. It is a string, its own text: pytest shortens any other message of an assert.
 
     Attributes
     ----------
-    impacts : random impacts that every law was tried on, after `families.ADVERSE` adverse ones.
+    impacts : random impacts that every law was tried on, after the contract's own first ones.
     unfinished : why these are fewer than were asked for; empty if they are not.
     counterexample, counterexample_law : the smallest one found, of the first broken law; None if there is none.
+    returned : (d,) v⁺ that the resolver gave for it, or what is wrong with its answer.
+    contract : what the resolver was taken for; `verification.laws.contracts`.
     tested : the resolver, for the import line of the pasted test.
     """
 
@@ -85,6 +88,20 @@ class PassivityReport:
     unfinished: str = ""
     bounds: Bounds = KIT
     tested: Any = None
+    contract: str = "equality"
+    returned: Floats | str = ""
+
+    def __new__(cls, *fields: Any, **named: Any) -> PassivityReport:
+        """The text is that of the fields."""
+        draft = str.__new__(cls)
+        draft.__init__(*fields, **named)  # type: ignore[misc]
+        return str.__new__(cls, draft._text())
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        """What makes the same report again in another process."""
+        return tuple(getattr(self, one.name) for one in fields(self))
+
+    __repr__ = __str__ = str.__str__
 
     @property
     def passed(self) -> bool:
@@ -105,20 +122,28 @@ class PassivityReport:
         """The verdict on the law of that name."""
         return next(verdict for verdict in self.verdicts if verdict.law == law)
 
+    def raise_if_broken(self) -> None:
+        """Raise the report as an error unless it passed: M, J, v, e and what was returned are in the message.
+
+        Raises
+        ------
+        AssertionError
+            A law is broken, or there was no time to try every impact.
+        """
+        if not self.passed:
+            raise AssertionError(str(self))
+
     @property
     def counterexample_test(self) -> str:
         """The counterexample as a test to paste, or an empty text."""
         if self.counterexample is None:
             return ""
-        return as_test(self.counterexample, self.counterexample_law, self.bounds, self.tested)
+        return as_test(self.counterexample, self.counterexample_law, self.bounds, self.tested, self.contract)
 
-    def __repr__(self) -> str:
-        """The same text: pytest shows the repr of what stands behind an `assert ..., report`."""
-        return str(self)
-
-    def __str__(self) -> str:
+    def _text(self) -> str:
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
-        lines = [f"{self.resolver}: {word} on {self.impacts} impacts"]
+        kind = "" if self.contract == "equality" else f", contract {self.contract}"
+        lines = [f"{self.resolver}: {word} on {self.impacts} impacts{kind}"]
         if self.unfinished:
             lines.append(f"  {self.unfinished}")
         lines += [str(verdict) for verdict in self.verdicts]
@@ -127,8 +152,18 @@ class PassivityReport:
             family = worst.worst_case.family or "an impact"
             lines.append(f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}")
         if self.counterexample is not None:
-            lines += ["", f"counterexample to {self.counterexample_law}, as a test:", "", self.counterexample_test]
+            lines += ["", f"counterexample to {self.counterexample_law}:", *_shown(self.counterexample, self.returned)]
+            lines += ["", "as a test:", "", self.counterexample_test]
         return "\n".join(lines)
+
+
+def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
+    """Lines with every argument of the case, and what came back."""
+    names = ("M", "J", "v", "e") if case.tangents is None else ("M", "J", "T", "v", "e", "μ")
+    for name, value in (*zip(names, case.given(), strict=True), ("returned", returned)):
+        text = value if isinstance(value, str) else np.array2string(np.asarray(value), precision=9, threshold=400)
+        lead = f"  {name} = "
+        yield lead + text.replace("\n", "\n" + " " * len(lead))
 
 
 @dataclass
@@ -229,9 +264,7 @@ def residual_count(residuals: Iterable[LawResidual]) -> LawCount:
     return total.count("")
 
 
-
 NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
-LARGEST_CONDITION = 1e8  # κ(M) of the default families; beyond it plain Cholesky loses what the laws compare
 IMPACTS = 5000  # by default: about a minute for a resolver of 50 µs a call
 PATIENCE = 600.0  # [s] ten times that
 
@@ -239,29 +272,37 @@ PATIENCE = 600.0  # [s] ten times that
 def check_passivity(
     resolver: Resolver,
     *,
+    contract: str = "equality",
+    laws: Sequence[str] | None = None,
     impacts: int = IMPACTS,
     seed: int = 0,
     search: int = 200,
-    bounds: Bounds = KIT,
-    largest_condition: float = LARGEST_CONDITION,
+    bounds: Bounds | None = None,
+    largest_condition: float | None = None,
     unequal_restitution: bool = False,
     patience: float = PATIENCE,
     progress: Callable[[int, int], None] | None = None,
 ) -> PassivityReport:
-    """Run every law against `resolver` and return the report.
+    """Run the laws of a contract against `resolver` and return the report.
 
     Parameters
     ----------
     resolver : called as resolver(mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution) with
-        float64 arrays (copies; c = 0 included) and one e in [−1, 1] for all rows, each an equality; returns v⁺
-        as an array, a list of numbers, or an object with `.velocity`.
-    impacts : random impacts drawn by numpy, up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
+        float64 arrays (copies; c = 0 included) and one e for all rows; returns v⁺ as an array, a list of numbers, or an
+        object with `.velocity`.
+    contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only push, e in [0, 1].
+        ``frictional``: also Coulomb's friction; called as resolver(mass_matrix, contact_jacobian, tangents (c, m, d),
+        velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
+    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract that are not optional
+        (``maximal_dissipation`` is).
+    impacts : random impacts. ``equality``: up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
         fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
-        `impacts.ADVERSE` more come first: elastic ones on nearly equal rows.
+        `impacts.ADVERSE` more come first: elastic ones on nearly equal rows. The other contracts: up to 6 coordinates
+        and 6 contacts, no nearly dependent rows.
     seed : of the draw; the same seed gives the same impacts.
     search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
-    bounds : tolerances; `verification.laws.bounds`.
-    largest_condition : largest κ(M) drawn.
+    bounds : tolerances; default: the contract's, of `verification.laws.bounds`.
+    largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2 (``frictional``).
     unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and ask
         what holds for any law of them: no energy, M(v⁺ − v⁻) in range(Jᵀ), momentum, the same bits, own arguments.
     patience : seconds after which no further impact is tried; then the report is not passed, and says so.
@@ -271,6 +312,11 @@ def check_passivity(
     -------
     PassivityReport
         `passed`, each law with its worst case, and the smallest counterexample found, as a test to paste.
+
+    Raises
+    ------
+    ArgumentError
+        No impacts, an unknown contract or law, or unequal restitution with friction.
 
     Notes
     -----
@@ -282,21 +328,62 @@ def check_passivity(
     Examples
     --------
     >>> def test_my_resolver():
-    ...     report = check_passivity(my_resolver)
-    ...     assert report.passed, report
+    ...     check_passivity(my_resolver, contract="unilateral").raise_if_broken()
     """
-    ends = time.monotonic() + patience
-    tallies = {name: Tally(name, law) for name, law in LAWS.items()}
-    if unequal_restitution:
-        tallies |= {name: Tally(name, law) for name, law in UNEQUAL_LAWS.items()}
+    ends, terms = time.monotonic() + patience, _contract(contract, unequal_restitution)
+    chosen = choose_laws(contract, laws, unequal_restitution)
+    if isinstance(impacts, bool) or not isinstance(impacts, int | np.integer) or impacts < 1:
+        raise ArgumentError("impacts", impacts, "a whole number, 1 or more")
+    bounds = terms.bounds if bounds is None else bounds
+    condition = terms.largest_condition if largest_condition is None else largest_condition
+    tallies = {name: Tally(name, law) for name, law in chosen.items()}
     with one_thread():
-        done = _try_all(tallies, resolver, bounds, _Draw(impacts, seed, largest_condition), ends, progress)
+        done = _try_all(tallies, resolver, bounds, _Draw(int(impacts), seed, condition, terms), ends, progress)
         verdicts = tuple(tally.verdict() for tally in tallies.values())
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
-        example = None if broken is None else _counterexample(broken, resolver, bounds, search, seed, ends)
+        example = None if broken is None else _counterexample(
+            chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract)
+        returned = "" if example is None else _returned(resolver, example)
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
     law = broken.law if broken else ""
-    return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver)
+    return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver, contract,
+                           returned)
+
+
+def _contract(name: str, unequal_restitution: bool) -> Contract:
+    if name not in CONTRACTS:
+        raise ArgumentError("contract", name, one_of(name, CONTRACTS))
+    if unequal_restitution and name == "frictional":
+        raise ArgumentError("unequal_restitution", True, "False with contract 'frictional'")
+    return CONTRACTS[name]
+
+
+def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: bool = False) -> dict[str, Law]:
+    """Return the laws of a contract by name, all but the optional ones unless `laws` names some.
+
+    Raises
+    ------
+    ArgumentError
+        The contract has no law of that name; the message lists those it has.
+    """
+    terms = _contract(contract, unequal_restitution)
+    known = terms.laws | (UNEQUAL_LAWS if unequal_restitution else {})
+    if laws is None:
+        return {name: law for name, law in known.items() if name not in terms.optional}
+    names = [laws] if isinstance(laws, str) else list(laws)
+    for name in names:
+        if name not in known:
+            raise ArgumentError("laws", name, one_of(name, known))
+    if not names:
+        raise ArgumentError("laws", laws, one_of("", known, "at least one of "))
+    return {name: law for name, law in known.items() if name in names}
+
+
+def _returned(resolver: Resolver, case: ImpactCase) -> Floats | str:
+    try:
+        return own_outcome(resolver, case)
+    except ResolverFault as fault:
+        return str(fault)
 
 
 @dataclass(frozen=True)
@@ -304,13 +391,14 @@ class _Draw:
     impacts: int
     seed: int
     largest_condition: float
+    contract: Contract
 
 
 def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
     """Put every impact to its laws; return for how many random ones there was time."""
     watched = Watched(resolver)
-    for done, (case, mixed) in enumerate(_drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)), 1 - ADVERSE):
+    for done, case, mixed in _drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)):
         for name in _laws_for(case, done, tuple(tallies)):
             if time.monotonic() > ends:
                 return max(0, done - 1)
@@ -344,24 +432,27 @@ def _judge_energy(
         tallies[name].add(own, resolver, bounds)
 
 
-def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[ImpactCase, ImpactCase]]:
-    """Yield the adverse impacts, then the random ones: each with one e, and with unequal ones if that is asked for."""
+def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
+    """Yield the contract's first impacts, numbered up to 0, then the random ones from 1: each with one e, and with
+    unequal ones if that is asked for.
+    """
     rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
-    for case in adverse_cases(adverse):
-        yield case, with_unequal_restitution(adverse, case) if unequal else case
+    first = draw.contract.first(adverse)
+    for case in first:
+        yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
     for number in range(draw.impacts):
-        case = draw_wide_case(rng, number, draw.largest_condition)
-        yield case, with_unequal_restitution(other, case) if unequal else case
+        case = draw.contract.draw(rng, number, draw.largest_condition)
+        yield number + 1, case, with_unequal_restitution(other, case) if unequal else case
 
 
 def _counterexample(
-    broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float
+    law: Law, broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float, contract: str
 ) -> ImpactCase | None:
     """The smallest one found: by hypothesis, else the largest failure drawn, shrunk as far as there is time."""
-    unequal = broken.law in UNEQUAL_LAWS
+    kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
     for least in (NOTABLE, 0.0):
-        fails = partial(_fails, broken.law, resolver, bounds, least, ends)
-        found = search_counterexample(fails, search, seed, unequal) if search and time.monotonic() < ends else None
+        fails = partial(_fails, law, resolver, bounds, least, ends)
+        found = search_counterexample(fails, search, seed, kind) if search and time.monotonic() < ends else None
         if found is None and broken.largest_case is not None and fails(broken.largest_case):
             found = broken.largest_case
         if found is not None:
@@ -369,9 +460,9 @@ def _counterexample(
     return None
 
 
-def _fails(name: str, resolver: Resolver, bounds: Bounds, least: float, ends: float, case: ImpactCase) -> bool:
+def _fails(law: Law, resolver: Resolver, bounds: Bounds, least: float, ends: float, case: ImpactCase) -> bool:
     """Whether the law is broken, by at least `least`; never when the time is over."""
     if time.monotonic() > ends:
         return False
-    residual, _ = residual_of((LAWS | UNEQUAL_LAWS)[name], case, resolver, bounds)
+    residual, _ = residual_of(law, case, resolver, bounds)
     return residual is not None and not residual.passed and not residual.value < least

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from hypothesis import assume
 from hypothesis import strategies as st
 
+from reference.exact import independent_rows
 from verification.impacts import Floats, ImpactCase, cradle_rows
 from verification.laws.scenes import SceneCase, Values
 
@@ -69,6 +71,42 @@ def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int =
         )
     mass, rows = draw(mass_matrices(d, largest_exponent)), draw(contact_jacobians(d))
     return ImpactCase(mass, rows, draw(velocities(mass)), draw(restitutions()), "whole numbers")
+
+
+@st.composite
+def one_sided_cases(draw: st.DrawFn) -> ImpactCase:
+    """An impact whose contacts only push, e in [0, 1]; as often as not every contact approaches."""
+    case = draw(impact_cases(largest_exponent=2))
+    rows = case.contact_jacobian
+    if draw(st.booleans()):
+        rows = np.where((rows @ case.velocity > 0.0)[:, None], -rows, rows)
+    return replace(case, contact_jacobian=rows, restitution=draw(st.sampled_from([1.0, 0.0, 0.5])))
+
+
+@st.composite
+def frictional_cases(draw: st.DrawFn) -> ImpactCase:
+    """The same with one or two tangents a contact, whole numbers too, and μ."""
+    case = draw(one_sided_cases())
+    shape = case.contacts, draw(st.integers(1, 2)), case.coordinates
+    entries = draw(st.lists(st.integers(-2, 2), min_size=int(np.prod(shape)), max_size=int(np.prod(shape))))
+    friction = draw(st.lists(st.sampled_from([1.0, 0.0, 0.5]), min_size=case.contacts, max_size=case.contacts))
+    case = replace(case, tangents=np.reshape(entries, shape).astype(float), friction=np.array(friction, dtype=float),
+                   translations=None)
+    assume(tangents_are_independent(case))
+    return case
+
+
+def tangents_are_independent(case: ImpactCase) -> bool:
+    """Whether no tangent of a contact depends on its normal and the others; without friction, yes."""
+    if case.tangents is None:
+        return True
+    blocks = np.concatenate([case.contact_jacobian[:, None], case.tangents], axis=1)
+    return all(len(independent_rows(block)) == len(block) for block in blocks)
+
+
+# Impacts to search for a counterexample: by contract, or with a restitution per row.
+SEARCHED = {"equality": impact_cases, "unequal": unequal_cases, "unilateral": one_sided_cases,
+            "frictional": frictional_cases}
 
 
 @st.composite

@@ -1,0 +1,124 @@
+"""Contracts of resolvers whose contacts only push: textbook ones pass, each planted bug fails by its law's name."""
+
+from __future__ import annotations
+
+import pickle
+from functools import partial
+
+import numpy as np
+import pytest
+
+from iapb import resolve_frictional_impact, resolve_impact
+from iapb.errors import ArgumentError
+from verification import check_passivity
+from verification.impacts import Floats, ImpactCase, draw_frictional_case
+from verification.laws import CONTRACTS
+from verification.laws.bounds import ONE_SIDED
+from verification.laws.contracts import distance_from_cone, sliding_dissipates_most
+from verification.laws.planted_contracts import PLANTED, SOUND, moreau, newton
+
+SOUND_ONES = [(contract, resolver) for contract, resolvers in SOUND.items() for resolver in resolvers]
+SOUND_ONES.append(("unilateral", partial(resolve_impact, method="poisson")))
+BUGS = [(contract, name) for contract, bugs in PLANTED.items() for name in bugs]
+
+
+@pytest.mark.parametrize(("contract", "resolver"), SOUND_ONES)
+def test_textbook_resolvers_keep_all_laws_of_their_contract(contract: str, resolver: object) -> None:
+    report = check_passivity(resolver, contract=contract, laws=list(CONTRACTS[contract].laws), impacts=150)
+    assert report.passed, report
+    assert all(verdict.checked > 0 for verdict in report.verdicts)
+
+
+@pytest.mark.parametrize(("contract", "name"), BUGS)
+def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> None:
+    bug = PLANTED[contract][name]
+    report = check_passivity(bug.make(), contract=contract, laws=[bug.caught_by], impacts=80, search=10)
+    assert report.broken_laws == (bug.caught_by,)
+    scope: dict[str, object] = {"resolver": bug.make()}
+    with pytest.raises(AssertionError, match=bug.caught_by):
+        exec(report.counterexample_test + f"\n\ntest_{bug.caught_by}()", scope)
+
+
+def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
+    """`resolve_frictional_impact` takes every normal as an equality, so it may pull and holds what separates."""
+    kept = [name for name in CONTRACTS["frictional"].laws if name not in ("cone", "separating")]
+    assert check_passivity(resolve_frictional_impact, contract="frictional", laws=kept, impacts=100).passed
+    report = check_passivity(resolve_frictional_impact, contract="frictional", impacts=20, search=0)
+    assert set(report.broken_laws) == {"cone", "separating"}
+
+
+def test_the_distance_from_the_cones_is_known_for_one_contact_in_space() -> None:
+    """M = 1, normal along x: (|t| − μ n)/√(1 + μ²) outside the cone of μ = 1/2, in any direction."""
+    case = ImpactCase(np.eye(3), np.eye(3)[:1], np.ones(3), tangents=np.eye(3)[None, 1:], friction=np.array([0.5]))
+    for angle in np.linspace(0.0, 6.0, 13):
+        tangential = np.array([np.cos(angle), np.sin(angle)])
+        inside, outside = np.array([1.0, *(0.49999 * tangential)]), np.array([1.0, *(2.0 * tangential)])
+        assert distance_from_cone(case, inside) < 1e-9
+        assert distance_from_cone(case, outside) == pytest.approx(1.5 / np.sqrt(1.25), rel=1e-6)
+    assert distance_from_cone(case, np.array([-1.0, 0.0, 0.0])) == pytest.approx(1.0)
+
+
+def test_maximal_dissipation_is_asked_for_by_name() -> None:
+    weak = PLANTED["frictional"]["weak_friction"].make()
+    assert "maximal_dissipation" not in check_passivity(weak, contract="frictional", impacts=10, search=0).broken_laws
+    report = check_passivity(weak, contract="frictional", laws=["maximal_dissipation"], impacts=40, search=0)
+    assert report.broken_laws == ("maximal_dissipation",)
+
+
+def test_laws_are_chosen_by_name_in_the_contracts_order() -> None:
+    report = check_passivity(newton, contract="unilateral", laws=["pushing", "kinetic_energy"], impacts=5)
+    assert [verdict.law for verdict in report.verdicts] == ["kinetic_energy", "pushing"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
+        ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
+        ({"laws": ["pushing"]}, "expected one of kinetic_energy, restitution, "),
+        ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
+        ({"laws": []}, "at least one of kinetic_energy"),
+        ({"contract": "frictional", "unequal_restitution": True}, "False with contract 'frictional'"),
+    ],
+)
+def test_what_would_judge_nothing_is_refused(options: dict[str, object], message: str) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        check_passivity(newton, **options)
+    assert message in str(caught.value)
+
+
+def _pulling(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    return PLANTED["unilateral"]["pulls"].make()(M, J, v, e)
+
+
+def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
+    report = check_passivity(_pulling, contract="unilateral", laws=["pushing"], impacts=30, search=30)
+    with pytest.raises(AssertionError) as caught:
+        report.raise_if_broken()
+    text = str(caught.value)
+    for line in ("  M = [[", "  J = [[", "  v = [", "  e = ", "  returned = [", "def test_pushing():"):
+        assert line in text
+    assert str(report) == repr(report) == text and isinstance(report, str)
+    check_passivity(newton, contract="unilateral", impacts=3).raise_if_broken()
+
+
+def test_a_report_travels_between_processes() -> None:
+    report = check_passivity(newton, contract="unilateral", impacts=3)
+    again = pickle.loads(pickle.dumps(report))
+    assert again == report and again.passed and again.verdicts[0].checked == 3
+
+
+def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
+    report = check_passivity(PLANTED["frictional"]["no_friction"].make(), contract="frictional", laws=["sticking"],
+                             impacts=60, search=60)  # fmt: skip
+    case = report.counterexample
+    assert case.contacts == 1 and case.tangents.shape == (1, 1, case.coordinates) and case.coordinates == 2
+    assert "  T = [[[" in report and "  μ = [" in report
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_sliding_is_at_the_limit_of_coulombs_law(number: int) -> None:
+    """The optional law on the sound resolver by itself: 0 to rounding, and not for half of the friction."""
+    case = draw_frictional_case(np.random.default_rng(number), number)
+    found = sliding_dissipates_most(case, moreau, ONE_SIDED)
+    assert found is None or found.passed
