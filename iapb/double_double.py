@@ -6,6 +6,8 @@ leaves the range of doubles; callers scale first (`iapb.contact.impact`).
 
 from __future__ import annotations
 
+import math
+
 from iapb.compiled import kernel
 
 _SPLITTER = 134217729.0  # 2^27 + 1: halves a 53-bit significand (Dekker)
@@ -44,17 +46,65 @@ def add_product(hi, lo, a_hi, a_lo, b):
 
 
 @kernel
+def symmetric_entry(matrix, i, j):
+    """Entry of ½ (M + Mᵀ) as an exact pair: M[i, j] and 0 where M is symmetric."""
+    entry, mirrored = matrix[i, j], matrix[j, i]
+    if entry == mirrored:
+        return entry, 0.0
+    return two_sum(0.5 * entry, 0.5 * mirrored)
+
+
+@kernel
 def quadratic_forms(mass_matrix, v, change):
-    """Return vᵀ M Δv and Δvᵀ M Δv, each evaluated in double-double and rounded once."""
+    """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and rounded once."""
+    return _scaled_forms(mass_matrix, v, change, 1.0, 1.0)
+
+
+@kernel
+def _scaled_forms(mass_matrix, v, change, v_unit, change_unit):
+    """The forms of v and Δv times these powers of two."""
     d = v.shape[0]
     cross_hi = cross_lo = square_hi = square_lo = 0.0
     for i in range(d):
         row_hi = row_lo = 0.0
         for j in range(d):
-            row_hi, row_lo = add_product(row_hi, row_lo, mass_matrix[i, j], 0.0, change[j])
-        cross_hi, cross_lo = add_product(cross_hi, cross_lo, row_hi, row_lo, v[i])
-        square_hi, square_lo = add_product(square_hi, square_lo, row_hi, row_lo, change[i])
+            entry_hi, entry_lo = symmetric_entry(mass_matrix, i, j)
+            row_hi, row_lo = add_product(row_hi, row_lo, entry_hi, entry_lo, change_unit * change[j])
+        cross_hi, cross_lo = add_product(cross_hi, cross_lo, row_hi, row_lo, v_unit * v[i])
+        square_hi, square_lo = add_product(square_hi, square_lo, row_hi, row_lo, change_unit * change[i])
     return cross_hi + cross_lo, square_hi + square_lo
+
+
+@kernel
+def unit_of(vector):
+    """The power of two that brings the largest entry into [½, 1), or near it at the ends of range."""
+    largest = 0.0
+    for k in range(vector.shape[0]):
+        largest = max(largest, abs(vector[k]))
+    return math.ldexp(1.0, min(1000, max(-1000, -math.frexp(largest)[1])))
+
+
+@kernel
+def in_range(cross, square):
+    """Whether the forms are those of a step that loses energy at first, and nothing under- or overflowed in them."""
+    return 2.0**-900 < square < 2.0**900 and -(2.0**900) < cross < -(2.0**-900)
+
+
+@kernel
+def passive_range(mass_matrix, v, change):
+    """Return the α where v + α Δv loses most energy, and the largest one without a gain: −x/y and −2x/y.
+
+    x = vᵀMΔv, y = ΔvᵀMΔv. Both 0 where every step gains. Vectors whose squares under- or overflow are scaled first.
+    """
+    cross, square = quadratic_forms(mass_matrix, v, change)
+    scale = 1.0
+    if not in_range(cross, square):
+        v_unit, change_unit = unit_of(v), unit_of(change)
+        cross, square = _scaled_forms(mass_matrix, v, change, v_unit, change_unit)
+        scale = change_unit / v_unit
+    if not square > 0.0 or cross >= 0.0:
+        return 0.0, 0.0
+    return -cross / square * scale, -2.0 * cross / square * scale
 
 
 @kernel

@@ -22,10 +22,10 @@ from iapb.contact.impact_methods import (
     factored,
     gram_cholesky,
     gram_pinv,
+    outcome,
     poisson,
     svd,
 )
-from iapb.double_double import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
 from iapb.names import one_of
 
@@ -55,9 +55,13 @@ class Impact:
         scaled by powers of two to like size).
     rank : rows found independent and used; Poisson's law: contacts that push.
     energy_change : KE⁺ − KE⁻ [J], of the rounded velocities, evaluated in double-double.
+    energy_interval : (lower, upper) [J]: KE⁺ − KE⁻ in real arithmetic, of M, v⁻ and v⁺ as they are, lies between them.
+        The upper end is never above 0 where the clamp is on.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
     status : ``"complete"``; ``"budget"`` when the row budget ended the work early; ``"not solved"`` where Poisson's law
-        left a contact closing, as rows that nearly oppose each other can (the energy does not rise then either).
+        left a contact closing, as rows that nearly oppose each other can (the energy does not rise then either);
+        ``"cancelled"`` where no step that gains nothing was found, so that v⁺ = v⁻, or where entries of v are so far
+        apart (2^1000) that the smallest are lost.
     method, law : how it was computed, and which restitution law it obeys.
     rows_used : the row budget that was in force (None = unlimited); a replay with it is exact.
     """
@@ -67,6 +71,7 @@ class Impact:
     impulses: Floats
     rank: int
     energy_change: float
+    energy_interval: tuple[float, float]
     clamp: float
     status: str
     method: str
@@ -96,8 +101,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
         contacts only push, where the others take every row as an equality (Newton's LCP where every row approaches
         and e in [0, 1] is one).
     budget : at most this many rows are used, the most violated first (``factored`` only). Passive at any value.
-    clamp : scale Δv so that energy cannot rise by rounding either. Default: on for ``factored``, ``damped``,
-        ``svd`` and Poisson's law, off for the two ``gram`` methods.
+    clamp : scale Δv so that energy cannot rise by rounding either, in real arithmetic. Default: on for ``factored``,
+        ``damped``, ``svd`` and Poisson's law, off for the two ``gram`` methods.
     rank_tolerance : rows closer than this to the span of the others (unit rows, kinetic metric) are not used.
         Default: 1e-10, or 8 d ε κ(L) where rounding of the rows is larger.
 
@@ -117,7 +122,9 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     -----
     KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2 with its missing ½). In floating point the relative gain of
     ``factored`` stays below 10 d ε √κ(M): Cholesky's error d ε κ(M) is refined
-    away, then the energy is clamped. Source: Constantinescu, Salcudean, Croft (2005), section V.
+    away, then the energy is clamped. With the clamp no impact gains energy, not in the last bit: a v⁺ is accepted only
+    with a bound that shows it, for M as given (`iapb.contact.kernels.passive`).
+    Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)
@@ -135,8 +142,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     else:
         law = "Newton, equality"
     answer = solve(problem, limit, clamped, rank_tolerance)
-    return _as_impact(problem, answer, method=method, law=law, status=answer.status,
-                      rows_used=None if budget is None else limit)
+    return _as_impact(problem, answer, clamped, method=method, law=law, rows_used=None if budget is None else limit)
 
 
 def _method(method: Any) -> tuple[Any, bool]:
@@ -156,18 +162,20 @@ def _check_options(method: str, budget: Any, tolerance: Any, problem: ImpactInpu
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
 
 
-def _as_impact(problem: ImpactInput, answer: Whitened, *, method: str, law: str, status: str,
+def _as_impact(problem: ImpactInput, answer: Whitened, clamped: bool, *, method: str, law: str,
                rows_used: int | None) -> Impact:
     """Undo the power-of-two scaling and report the energy of what is really returned."""
-    velocity = problem.unscale_velocity(answer.v_plus)
+    found = outcome(problem, answer.v_plus, clamped)
     momentum = problem.unscale_momentum(answer.momentum)
     impulses = problem.unscale_impulses(answer.impulses)
-    for quantity, array in (("velocity", velocity), ("generalized_impulse", momentum), ("impulses", impulses)):
+    if found.factor != 1.0:
+        momentum, impulses = found.factor * momentum, found.factor * impulses
+    for quantity, array in (("velocity", found.velocity), ("generalized_impulse", momentum), ("impulses", impulses)):
         if not np.isfinite(array).all():
             raise RangeError(quantity, f"the {method} impact of these magnitudes is above 1.8e308")
-    _, change = kinetic_energies(problem.mass_matrix, problem.velocity, answer.v_plus)
-    energy_change = problem.unscale_energy(change)
-    if not math.isfinite(energy_change):
+    if not math.isfinite(found.energy_change):
         raise RangeError("energy_change", "the kinetic energy of these magnitudes is above 1.8e308")
-    return Impact(velocity, momentum, impulses, answer.rank, energy_change, answer.clamp, status, method, law,
-                  rows_used)
+    clamp = answer.clamp * found.factor
+    status = "cancelled" if clamp == 0.0 or problem.underflows and problem.contacts else answer.status
+    return Impact(found.velocity, momentum, impulses, answer.rank, found.energy_change, found.energy_interval, clamp,
+                  status, method, law, rows_used)

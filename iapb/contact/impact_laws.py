@@ -21,11 +21,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.impact_methods import ImpactInput, check_input
+from iapb.contact.impact_methods import ImpactInput, check_input, outcome
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction, make_friction_work
 from iapb.contact.kernels.unilateral import make_push_work
-from iapb.double_double import kinetic_energies
 from iapb.errors import ArgumentError, RangeError
 
 Floats = NDArray[np.float64]
@@ -40,13 +39,13 @@ class FrictionalImpact:
     velocity : (d,) v⁺; generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp + Tᵀp_t.
     impulses : (c,) p along the normals [N s]: non-negative where some non-negative choice gives the motion.
     tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the others.
-    energy_change : KE⁺ − KE⁻ [J], never positive beyond rounding.
+    energy_change : KE⁺ − KE⁻ [J]; energy_interval : (lower, upper) that hold it in real arithmetic, upper ≤ 0.
     friction_share : factor in [0, 1] by which friction was reduced so that no energy is gained and (status
         ``"reduced"``) every contact stays in its cone; 1 = not at all.
     clamp : factor of the final clamps against rounding.
     status : ``"complete"``: p_t obeys Coulomb's law, but for that factor. ``"reduced"``: no p_t that does was found
         (there may be none); it is then the one that dissipates most under the limits of the impact without friction,
-        within its cones, passivity and restitution as ever.
+        within its cones, passivity and restitution as ever. ``"cancelled"``: as of `resolve_impact`.
     """
 
     velocity: Floats
@@ -54,6 +53,7 @@ class FrictionalImpact:
     impulses: Floats
     tangential_impulses: Floats
     energy_change: float
+    energy_interval: tuple[float, float]
     friction_share: float
     clamp: float
     status: str
@@ -112,11 +112,13 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
                clamp: float, met: bool) -> FrictionalImpact:
     """Undo the scaling by powers of two, and refuse what overflows."""
     problem = given.problem
-    scale = np.ldexp(1.0, problem.velocity_exponent)
-    _, energy = kinetic_energies(problem.mass_matrix, problem.velocity, v_plus)
+    out = outcome(problem, v_plus, clamped=True)
+    scale = np.ldexp(1.0, problem.velocity_exponent) * out.factor
+    clamp *= out.factor
+    status = "complete" if met else "reduced"
     found = FrictionalImpact(
-        problem.unscale_velocity(v_plus), problem.unscale_momentum(momentum), scale * impulses, scale * p_t,
-        problem.unscale_energy(energy), share, clamp, "complete" if met else "reduced",
+        out.velocity, problem.unscale_momentum(momentum) * out.factor, scale * impulses, scale * p_t,
+        out.energy_change, out.energy_interval, share, clamp, "cancelled" if clamp == 0.0 else status,
     )
     for name in ("velocity", "generalized_impulse", "impulses", "tangential_impulses"):
         if not np.all(np.isfinite(getattr(found, name))):

@@ -24,25 +24,29 @@ from iapb.contact.kernels.impact import (
     make_impact_work,
     rank_tolerance,
 )
+from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, unit_columns
 from iapb.contact.kernels.unilateral import make_push_work, poisson_impact
 from iapb.dense import product, solve
+from iapb.double_double import kinetic_energies
 from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.kernels.cholesky import cholesky, to_whitened, whiten_columns
 
 Floats = NDArray[np.float64]
 Exponents = NDArray[np.int32]
 
-# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) is rounding of whoever computed M, and the symmetric part is used.
+# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) is rounding of whoever computed M: energies are those of M as given, in
+# which the skew part cancels; the factor is that of the symmetric part.
 _SYMMETRY_TOLERANCE = 1e-9
 _LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
+_EXACT = 1000  # binary exponents that an entry may lie below the largest and still be scaled exactly
 
 
 @dataclass(frozen=True)
 class ImpactInput:
     """A checked impact in scaled coordinates v' = 2^−(s + k) v, M' = 2^(s + s) M, rows J' = 2^(s + r) J."""
 
-    mass_matrix: Floats  # (d, d) scaled
+    mass_matrix: Floats  # (d, d) scaled, symmetric to rounding
     lower: Floats  # (d, d) its Cholesky factor
     contact_jacobian: Floats  # (c, d) scaled
     velocity: Floats  # (d,) scaled
@@ -51,6 +55,9 @@ class ImpactInput:
     coordinate_exponent: Exponents  # s (d,)
     row_exponent: Exponents  # r (c,)
     velocity_exponent: int  # k
+    given_mass: Floats  # (d, d) M and
+    given_velocity: Floats  # (d,) v in the caller's units
+    underflows: bool  # entries of v are so far apart that scaling rounds the small ones
 
     @property
     def coordinates(self) -> int:
@@ -66,6 +73,10 @@ class ImpactInput:
         """Velocity in the caller's units."""
         return _ldexp(v, self.coordinate_exponent + self.velocity_exponent)
 
+    def scale_velocity(self, v: Floats) -> Floats:
+        """Velocity in scaled coordinates."""
+        return _ldexp(v, -(self.coordinate_exponent + self.velocity_exponent))
+
     def unscale_momentum(self, momentum: Floats) -> Floats:
         """Generalized impulse in the caller's units."""
         return _ldexp(momentum, self.velocity_exponent - self.coordinate_exponent)
@@ -76,10 +87,7 @@ class ImpactInput:
 
     def unscale_energy(self, energy: float) -> float:
         """Energy in the caller's units."""
-        try:
-            return math.ldexp(energy, 2 * self.velocity_exponent)
-        except OverflowError:
-            return math.copysign(math.inf, energy)
+        return _times_power(energy, 2 * self.velocity_exponent)
 
 
 def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
@@ -97,6 +105,46 @@ def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: A
         raise ArgumentError("contact_jacobian", J.shape, f"shape (contacts, {d})")
     e, unequal = _checked_restitution(restitution, len(J))
     return _scaled(M, J, v, e, unequal)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """An impact in the caller's units, exactly passive where it is clamped."""
+
+    velocity: Floats
+    energy_change: float
+    energy_interval: tuple[float, float]
+    factor: float  # of the impulses: below 1 where rounding in the caller's units needed a further step
+
+
+def outcome(problem: ImpactInput, v_plus: Floats, clamped: bool) -> Outcome:
+    """Velocity and energy in the caller's units; the last step again where scaling back rounded v⁺ the wrong way."""
+    M, v, factor = np.ascontiguousarray(problem.given_mass), problem.given_velocity, 1.0
+    velocity = problem.unscale_velocity(v_plus)
+    if not np.isfinite(velocity).all():
+        return Outcome(velocity, math.nan, (math.nan, math.nan), factor)
+    lower, upper, exponent = gain_enclosure(M, v, velocity)
+    if clamped and not upper <= 0.0:
+        candidate = velocity - v
+        factor = passive_step(M, v, candidate, 1.0, velocity)
+        v_plus = problem.scale_velocity(velocity)
+        lower, upper, exponent = gain_enclosure(M, v, velocity)
+    _, change = kinetic_energies(problem.mass_matrix, problem.velocity, v_plus)
+    interval = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
+    return Outcome(velocity, min(max(problem.unscale_energy(change), interval[0]), interval[1]), interval, factor)
+
+
+def _outward(value: float, exponent: int, towards: float) -> float:
+    """value · 2^exponent, one step outwards for what rounding took; a bound of no gain or no loss stays one."""
+    bound = math.nextafter(_times_power(value, exponent), towards)
+    return min(bound, 0.0) if value <= 0.0 < towards else max(bound, 0.0) if value >= 0.0 > towards else bound
+
+
+def _times_power(value: float, exponent: int) -> float:
+    try:
+        return math.ldexp(value, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def _is_empty(rows: ArrayLike) -> bool:
@@ -180,21 +228,24 @@ def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -
         raise ArgumentError(f"mass_matrix[{k}, {k}]", float(diagonal[k]), "a positive diagonal entry")
     s = -(np.frexp(diagonal)[1] // 2)
     mass, lower = _factored(M, _ldexp(M, s[:, None] + s))
-    k = int((_exponents(v) - s).max(initial=_LOWEST_EXPONENT))
+    size = _exponents(v) - s
+    k = int(size.max(initial=_LOWEST_EXPONENT))
     k = 0 if k <= _LOWEST_EXPONENT // 2 else k
+    underflows = bool(((size < k - _EXACT) & (size > _LOWEST_EXPONENT // 2)).any())
     row = -(_exponents(J) + s).max(axis=1, initial=_LOWEST_EXPONENT)
     row[np.abs(row) > abs(_LOWEST_EXPONENT) // 2] = 0  # a row of zeros
     return ImpactInput(
         mass_matrix=mass, lower=lower, contact_jacobian=_ldexp(J, row[:, None] + s), velocity=_ldexp(v, -(s + k)),
-        restitution=e, unequal=unequal, coordinate_exponent=s, row_exponent=row, velocity_exponent=k)
+        restitution=e, unequal=unequal, coordinate_exponent=s, row_exponent=row, velocity_exponent=k,
+        given_mass=M, given_velocity=v, underflows=underflows)
 
 
 def _factored(M: Floats, scaled: Floats) -> tuple[Floats, Floats]:
-    """The symmetric part of the scaled M and its Cholesky factor; M as given is for messages."""
+    """The scaled M and the Cholesky factor of its symmetric part; M as given is for messages."""
     if not (scaled.max() <= 2.0 and scaled.min() >= -2.0):  # |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
         i, j = np.unravel_index(int(np.argmax(np.abs(scaled))), M.shape)
         raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]), "a positive definite matrix")
-    symmetric = np.ascontiguousarray(scaled)
+    mass = symmetric = np.ascontiguousarray(scaled)
     if not (scaled == scaled.T).all():
         skew = np.abs(scaled - scaled.T)
         if skew.max() > _SYMMETRY_TOLERANCE:
@@ -206,7 +257,7 @@ def _factored(M: Floats, scaled: Floats) -> tuple[Floats, Floats]:
     pivot = cholesky(symmetric, lower)
     if pivot:
         raise ArgumentError("mass_matrix", M, f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)")
-    return symmetric, lower
+    return mass, lower
 
 
 

@@ -8,6 +8,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import find_islands
 from iapb.contact.kernels.impact import factored_impact, project_impact, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction
+from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import body_row, contact_row, direction_row, tangent_of
 from iapb.contact.kernels.unilateral import poisson_impact
@@ -115,19 +116,29 @@ def largest_share(impulse, dofs, size, dt, force_limit):
 
 @kernel
 def apply_group(world, state, size, share):
-    """Write the group's new velocity and impulse back; return the kinetic energy it lost [J].
+    """Write the group's new velocity and impulse back; return the kinetic energy it lost [J] and the share applied.
 
+    That is `share` unless the velocity so rounded would gain energy (`iapb.contact.kernels.passive`).
     With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
     """
+    mass, v, change = state.group_mass[:size, :size], state.group_v[:size], state.work.v_change[:size]
+    after = state.work.shifted[:size]
+    for i in range(size):
+        change[i] = state.group_v_plus[i] - v[i]
+    write_step(v, change, share, after)
+    certain = share == 1.0  # the velocity that the resolver let through
+    for i in range(size):
+        certain = certain and after[i] == state.group_v_plus[i]
+    if not certain and not plainly_loses(mass, v, after):
+        share = passive_step(mass, v, change, share, after)
     lost = 0.0
     for i in range(size):
         k = state.dofs[i]
-        change = share * (state.group_v_plus[i] - state.group_v[i])
         impulse = share * state.group_impulse[i]
-        lost -= (state.group_v[i] + 0.5 * change) * impulse
-        state.v[k] = state.group_v[i] + change
+        lost -= (v[i] + 0.5 * (share * change[i])) * impulse
+        state.v[k] = after[i]
         state.impulse[k] = impulse
-    return lost
+    return lost, share
 
 
 @kernel
@@ -227,12 +238,15 @@ def resolve_island(world, state, island):
         for t in range(world.tree_start.shape[0]):
             if state.island_of_tree[t] == island:
                 state.spreading[t] = share < 1.0
-    lost = apply_group(world, state, size, share)
-    approaching = count_approaching(world, state.work, size, count, share)
+    lost, applied = apply_group(world, state, size, share)
+    if applied < share:
+        clamp *= applied / share
+    approaching = count_approaching(world, state.work, size, count, applied)
     for r in range(count):
         if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
-            state.contact_impulse[state.rows[r]] = share * state.row_impulse[r]
-    log_impact(state, island, count, rank, share, clamp, friction_share, solved, approaching, lost, size)
+            state.contact_impulse[state.rows[r]] = applied * state.row_impulse[r]
+    log_impact(state, island, count, rank, share, clamp, friction_share, solved and clamp > 0.0, approaching, lost,
+               size)
 
 
 @kernel

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.compiled import kernel
+from iapb.contact.kernels.passive import clamped_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
-from iapb.double_double import add_product, quadratic_forms
+from iapb.double_double import add_product, symmetric_entry
 from iapb.mechanics.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -55,18 +56,6 @@ def rank_tolerance(lower):
         largest = max(largest, lower[k, k])
         smallest = min(smallest, lower[k, k])
     return max(RANK_TOLERANCE, _NOISE_FACTOR * d * UNIT_ROUNDOFF * largest / smallest)
-
-
-@kernel
-def energy_clamp(mass_matrix, v, change):
-    """Largest factor α in [0, 1] for which v + α Δv has no more kinetic energy than v, for M itself.
-
-    ΔKE(α) = α vᵀMΔv + ½ α² ΔvᵀMΔv (design: energy clamp), evaluated in double-double.
-    """
-    cross, square = quadratic_forms(mass_matrix, v, change)
-    if not square > 0.0 or cross >= 0.0:
-        return 0.0
-    return min(1.0, -2.0 * cross / square)
 
 
 @kernel
@@ -127,17 +116,20 @@ def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
 
 @kernel
 def _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum):
-    """v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change. Returns α."""
+    """v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change. Returns α.
+
+    Where it is clamped, v⁺ has no more kinetic energy than v, in real arithmetic; α = 0 is the last resort.
+    """
     d = v.shape[0]
     alpha = 1.0
     moved = False
     for k in range(d):
         moved = moved or work.v_change[k] != 0.0
-    if clamped and moved:
-        alpha = energy_clamp(mass_matrix, v, work.v_change)
+    write_step(v, work.v_change, alpha, v_plus)
+    if clamped and moved and not plainly_loses(mass_matrix, v, v_plus):
+        alpha = clamped_step(mass_matrix, v, work.v_change[:d], v_plus, work.deviation, work.along, work.shifted)
     for k in range(d):
         work.change[k] *= alpha
-        v_plus[k] = v[k] + alpha * work.v_change[k]
     to_momentum(lower, work.change[:d], momentum)
     return alpha
 
@@ -188,7 +180,8 @@ def _deviation(mass_matrix, lower, v_change, shifted, deviation):
     for i in range(d):
         high = low = 0.0
         for j in range(d):
-            high, low = add_product(high, low, mass_matrix[i, j], 0.0, v_change[j])
+            entry, rest = symmetric_entry(mass_matrix, i, j)
+            high, low = add_product(high, low, entry, rest, v_change[j])
         total = high + low
         for j in range(i):
             total -= lower[i, j] * (deviation[j] + shifted[j])

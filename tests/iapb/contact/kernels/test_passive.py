@@ -1,0 +1,204 @@
+"""No impact gains energy in real arithmetic, and the bounds that show it hold: against rationals, at all magnitudes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb import resolve_frictional_impact, resolve_impact
+from iapb.compiled import block
+from iapb.contact.kernels.impact import make_impact_work
+from iapb.contact.kernels.passive import (
+    clamped_step,
+    gain,
+    gain_enclosure,
+    passive_step,
+    plainly_loses,
+    wide_gain,
+)
+from iapb.double_double import passive_range
+
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def gamma(mass: np.ndarray, v: np.ndarray, w: np.ndarray) -> Fraction:
+    """2 (wᵀMw − vᵀMv), exactly."""
+    a, b = ([Fraction(float(x)) for x in vector] for vector in (v, w))
+    terms = (Fraction(float(m)) * (b[i] * b[j] - a[i] * a[j]) for (i, j), m in np.ndenumerate(mass))
+    return 2 * sum(terms, Fraction(0))
+
+
+def mass_of(rng: np.random.Generator, d: int, decades: float) -> np.ndarray:
+    """Mass matrix of condition 10^decades, asymmetric in the last bit in half of the draws."""
+    basis = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass: np.ndarray = basis * np.logspace(0.0, -decades, d) @ basis.T
+    return mass if rng.random() < 0.5 else 0.5 * (mass + mass.T)
+
+
+def impact(rng: np.random.Generator, largest: float = 12.0) -> Arrays:
+    """An impact of a hard family: light directions, rows dependent but for 1e-8, an entry of v far below the others."""
+    d, c = int(rng.integers(1, 8)), int(rng.integers(1, 6))
+    mass = mass_of(rng, d, rng.uniform(0.0, largest))
+    v = rng.normal(size=d)
+    if rng.random() < 0.5:
+        v = np.linalg.eigh(0.5 * (mass + mass.T))[1][:, 0]
+    rows = rng.normal(size=(c, d))
+    if rng.random() < 0.3:
+        rows = rows[:1] + 1e-8 * rows
+    if rng.random() < 0.3:
+        v[rng.integers(d)] *= 10.0 ** -rng.uniform(0.0, 200.0)
+    return mass, rows, v
+
+
+def scaled(rng: np.random.Generator, decades: float, arrays: Arrays) -> Arrays:
+    """The same in other units; its energy is up to the given number of decades away."""
+    mass, rows, v = arrays
+    units = 10.0 ** rng.uniform(-decades / 4, decades / 4, 3)
+    return mass * units[0], rows * units[1], v * units[2] ** 1.5
+
+
+@pytest.mark.parametrize("decades", [0.0, 30.0, 300.0, 600.0])
+def test_enclosures_hold_what_they_enclose(decades: float) -> None:
+    """Γ of a step and of neighbours of −v, where all but rounding cancels; any magnitudes."""
+    rng, narrow, signs = np.random.default_rng(int(decades)), 0, 0
+    with np.errstate(all="ignore"):
+        for _ in range(400):
+            d = int(rng.integers(1, 7))
+            spread = 10.0 ** rng.uniform(-decades / 2, decades / 2, (3, d))
+            mass = rng.normal(size=(d, d)) * 10.0 ** rng.uniform(-decades / 2, decades / 2)
+            mass = mass + mass.T * rng.choice([1.0, 1.0 + 2.0**-52])
+            v, w = rng.normal(size=(2, d)) * spread[:2]
+            if rng.random() < 0.5:
+                w = -np.nextafter(v, rng.choice([-np.inf, np.inf], d))
+            if not np.isfinite(np.concatenate((v, w, mass.ravel()))).all():
+                continue
+            exact = gamma(mass, v, w)
+            high, low, radius, exponent = wide_gain(mass, v, w)
+            unit = Fraction(2) ** exponent
+            assert abs(exact / unit - (Fraction(high) + Fraction(low))) <= Fraction(radius)
+            high, low, radius, underflow = gain(mass, v, w)
+            if np.isfinite(radius):
+                assert abs(exact - (Fraction(high) + Fraction(low))) <= Fraction(radius) + Fraction(underflow)
+            lower, upper, exponent = gain_enclosure(mass, v, w)
+            unit = Fraction(2) ** exponent
+            slack = Fraction(2) ** -50 * abs(exact)
+            assert Fraction(lower) * unit - slack <= exact <= Fraction(upper) * unit + slack
+            assert not (upper <= 0.0 < exact) and not (lower >= 0.0 > exact)
+            assert not (plainly_loses(mass, v, w) and exact > 0)
+            narrow += upper - lower <= 2.0**-30 * abs(upper)
+            signs += (upper < 0.0) - (lower > 0.0) != 0
+    assert narrow > 100 and signs > 200
+
+
+def test_a_clear_loss_leaves_the_change_as_it_is() -> None:
+    """Where `plainly_loses` accepts, the clamp is 1: bits do not depend on which test accepted."""
+    rng, seen = np.random.default_rng(1), 0
+    for _ in range(2000):
+        mass, _, v = impact(rng, 6.0)
+        change = rng.normal(size=len(v)) * 10.0 ** -rng.uniform(0.0, 12.0)
+        if plainly_loses(mass, v, v + change):
+            seen += 1
+            assert passive_range(mass, v, change)[1] >= 1.0
+    assert seen > 300
+
+
+def steps(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, v and the change of an elastic impact on one row: to rounding as much energy as before."""
+    mass, rows, v = impact(rng)
+    direction = np.linalg.solve(mass, rows[0])
+    return mass, v, -2.0 * (rows[0] @ v) / (rows[0] @ direction) * direction
+
+
+def test_both_last_steps_are_passive_where_the_plain_one_is_not() -> None:
+    """Elastic changes: v + α change gains in some cases, what `clamped_step` and `passive_step` write never does."""
+    rng, plain = np.random.default_rng(2), 0
+    for _ in range(400):
+        mass, v, change = steps(rng)
+        d = len(v)
+        w, first, second, third = np.empty((4, d))
+        alpha = min(1.0, passive_range(mass, v, change)[1])
+        plain += gamma(mass, v, v + alpha * change) > 0
+        factor = clamped_step(mass, v, change, w, first, second, third)
+        assert gamma(mass, v, w) <= 0 and 0.0 <= factor <= alpha
+        factor = passive_step(mass, v, change, alpha, w)
+        assert gamma(mass, v, w) <= 0 and 0.0 <= factor <= alpha
+    assert plain > 40
+
+
+def test_the_last_resort_is_no_impact() -> None:
+    """A heavy direction moves 1e300 times as fast as what is struck, and is coupled to it: nothing can be done."""
+    mass, v = np.array([[1.0, 0.5], [0.5, 1.0]]), np.array([-1e-300, 1e300])
+    w = np.empty(2)
+    assert passive_step(mass, v, np.array([1.5e-300, 0.0]), 1.0, w) == 0.0
+    assert np.array_equal(w, v)
+
+
+METHODS = ("factored", "gram_pinv", "damped", "svd", "poisson")
+
+
+@pytest.mark.parametrize("decades", [0.0, 300.0])
+@pytest.mark.parametrize("method", METHODS)
+def test_no_method_gains_in_the_last_bit(method: str, decades: float) -> None:
+    """½ v⁺ᵀMv⁺ ≤ ½ vᵀMv in rationals; the interval holds the change; e in [−1, 1]."""
+    rng, cancelled = np.random.default_rng(3), 0
+    for _ in range(60):
+        mass, rows, v = scaled(rng, decades, impact(rng, 10.0))
+        e = float(rng.choice([1.0, 1.0, rng.uniform(0.0 if method == "poisson" else -1.0, 1.0)]))
+        found = resolve_impact(mass, rows, v, e, method=method, clamp=True)
+        change = gamma(mass, v, found.velocity) / 4
+        assert change <= 0
+        assert Fraction(found.energy_interval[0]) <= change <= Fraction(found.energy_interval[1]) <= 0
+        assert found.energy_interval[0] <= found.energy_change <= found.energy_interval[1]
+        cancelled += found.status == "cancelled"
+    assert cancelled <= (20 if method == "gram_pinv" else 0)
+
+
+def test_a_mass_matrix_asymmetric_in_the_last_bit_is_taken_as_it_is() -> None:
+    """Both orders of M: no gain, and a loss within 10 d ε √κ; without the last step some gain."""
+    rng, gains, d = np.random.default_rng(4), 0, 2
+    for _ in range(200):
+        kappa = 10.0 ** rng.uniform(6.0, 12.0)
+        angle = rng.uniform(0.0, np.pi)
+        basis = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        mass = basis * [1.0, 1.0 / kappa] @ basis.T
+        mass[0, 1] = np.nextafter(mass[1, 0], np.inf)
+        v, rows = basis[:, 1].copy(), rng.normal(size=(1, 2)) @ np.linalg.cholesky(mass).T
+        before = -gamma(mass, v, np.zeros(2))
+        loss = -gamma(mass, v, resolve_impact(mass, rows, v, 1.0).velocity) / before
+        assert 0 <= loss <= 10 * d * 2.0**-52 * kappa**0.5
+        gains += gamma(mass, v, resolve_impact(mass, rows, v, 1.0, clamp=False).velocity) > 0
+    assert gains > 20
+
+
+def test_an_impact_far_below_the_rest_is_resolved_or_named() -> None:
+    """1e-162 underflows when squared; 1e-400 of the rest does not fit in doubles at all."""
+    small = resolve_impact(np.eye(2), [[1.0, 0.0]], [-1e-162, 1.0], 0.5)
+    assert small.status == "complete" and small.velocity == pytest.approx([0.5e-162, 1.0], rel=1e-15)
+    lost = resolve_impact(np.eye(2), [[1.0, 0.0]], [-1e-300, 1e100], 0.5)
+    assert lost.status == "cancelled" and gamma(np.eye(2), np.array([-1e-300, 1e100]), lost.velocity) <= 0
+    subnormal = resolve_impact(np.eye(2), [[1.0, 0.3]], [-1.5e-323, 2e-323], 1.0)
+    assert gamma(np.eye(2), np.array([-1.5e-323, 2e-323]), subnormal.velocity) <= 0
+
+
+@pytest.mark.parametrize("decades", [0.0, 200.0])
+def test_friction_and_unequal_restitution_gain_nothing_either(decades: float) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        mass, rows, v = scaled(rng, decades, impact(rng, 8.0))
+        e = rng.uniform(0.0, 1.0, len(rows))
+        assert gamma(mass, v, resolve_impact(mass, rows, v, e).velocity) <= 0
+        tangents = rng.normal(size=rows.shape) * np.abs(rows).max()
+        rubbed = resolve_frictional_impact(mass, rows, tangents, v, 1.0, 0.4)
+        assert gamma(mass, v, rubbed.velocity) <= 0 and rubbed.energy_interval[1] <= 0.0
+
+
+def test_scratch_beyond_the_group_is_left_alone() -> None:
+    work: Any = block(make_impact_work(5, 1))
+    work.deviation[3:] = work.along[3:] = work.shifted[3:] = 7.0
+    w = np.empty(3)
+    clamped_step(np.eye(3), np.array([-1.0, 0.3, 0.1]), np.array([2.0, 0.0, 0.0]), w, work.deviation, work.along,
+                 work.shifted)
+    assert (work.deviation[3:] == 7.0).all() and (work.along[3:] == 7.0).all() and (work.shifted[3:] == 7.0).all()
