@@ -31,6 +31,8 @@ from verification.finding import (
     table_of,
 )
 from verification.proofs.checking import checked
+from verification.proofs.second_tool import CERTIFIED, second_opinion
+from verification.proofs.statement import YES
 
 if TYPE_CHECKING:
     from verification.proofs.statement import ProofRecord, Statement
@@ -88,15 +90,26 @@ def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> 
         progress(done, len(names))
         records.append(attempt(name, partial(check, name), failures))
     progress(len(names), len(names))
-    return tuple(record for record in records if record is not None)
+    return tuple(_with_coq(record) for record in records if record is not None)
+
+
+def _with_coq(record: ProofRecord) -> ProofRecord:
+    """The record with Coq's answer, for the theorems that are written out for it."""
+    if record.name not in CERTIFIED:
+        return record
+    opinion = second_opinion(load(record.name))
+    return replace(record, coq="coqc is not installed" if opinion.verdict == "skipped" else opinion.answer)
 
 
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = ()) -> Finding:
     """How many statements are proved, and how many wrong twins refuted."""
-    rows = [{"statement": one.name, "holds": one.holds, "wrong twins": len(one.twins)} for one in records]
-    table = table_of((Column("statement"), Column("holds"), Column("wrong twins")), rows)
+    rows = [{"statement": one.name, "holds": one.holds, "SymPy": one.sympy, "Coq": one.coq,
+             "wrong twins": len(one.twins)} for one in records]  # fmt: skip
+    columns = Column("statement"), Column("holds"), Column("SymPy"), Column("Coq"), Column("wrong twins")
+    table = table_of(columns, rows)
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     sentence = (f"{proved} of {len(rows)} statements are proved by certificates that a machine expanded; "
+                f"SymPy expands those of {sum(one.sympy == YES for one in records)} to the same end; "
                 f"{twins} wrong twins are refuted by exact counterexamples.")
     parts = (Part(sentence, REPRODUCED if proved == len(rows) else REFUTED),)
     return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, parts, {"statements": table},

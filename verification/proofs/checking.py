@@ -9,6 +9,7 @@ from verification.proofs.exact import FlintBackend, Instance, SympyBackend, all_
 from verification.proofs.notation import case_lines, fact_line, step_claim, step_lines
 from verification.proofs.statement import ProofRecord, Refutation, Statement, StepRecord, Twin, Without
 from verification.proofs.steps import Exact, Known, Refused, Step
+from verification.proofs.sympy_kernel import sympy_opinion
 
 
 def checked(statement: Statement, started: float | None = None) -> ProofRecord:
@@ -21,9 +22,11 @@ def checked(statement: Statement, started: float | None = None) -> ProofRecord:
     steps = tuple(_checked_step(step, known) for step in statement.steps)
     needed = tuple(_needed(without, statement) for without in statement.needed)
     twins = tuple(_twin(twin, statement) for twin in statement.twins)
+    second = sympy_opinion(statement)
     problems = tuple(
         [f"step refused: {step.refusal}" for step in steps if not step.accepted]
         + [f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted]
+        + ([f"SymPy refuses a certificate: {second.words}"] if second.verdict == "refused" else [])
         + _loose_ends(statement, known)
     )
     return ProofRecord(
@@ -43,6 +46,7 @@ def checked(statement: Statement, started: float | None = None) -> ProofRecord:
         verdict="not proved" if problems else "proved",
         problems=problems,
         seconds=time.perf_counter() - started,
+        sympy=second.answer,
     )
 
 

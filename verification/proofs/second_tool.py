@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 
 from verification.proofs.algebra import Equation, Expression, expression, transposed, word_expression
 from verification.proofs.second_tool_prelude import PRELUDE, NotExportable, in_coq, spelled
-from verification.proofs.statement import Statement
+from verification.proofs.statement import NO, NOT_APPLICABLE, YES, Statement
 from verification.proofs.steps import (
     Cancelling,
     Cofactor,
@@ -51,6 +51,11 @@ class SecondOpinion:
     verdict: str
     words: str
     seconds: float = 0.0
+
+    @property
+    def answer(self) -> str:
+        """In a table: yes, no, or not applicable."""
+        return {"accepted": YES, "refused": NO}.get(self.verdict, NOT_APPLICABLE)
 
 
 def second_opinion(statement: Statement) -> SecondOpinion:

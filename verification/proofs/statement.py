@@ -71,6 +71,9 @@ class Statement:
         return tuple(s.claim for s in self.steps if s.claim is not None and s.claim.name in self.concludes)
 
 
+YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
+
+
 @dataclass(frozen=True)
 class Line:
     """One line of a printed proof: its words and, where there is one, its formula as text and as LaTeX."""
@@ -122,6 +125,8 @@ class ProofRecord:
     verdict: str
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
+    sympy: str = NOT_APPLICABLE  # whether SymPy and Coq expand the certificates too: YES, NO, or why there is no answer
+    coq: str = NOT_APPLICABLE
 
     @property
     def holds(self) -> bool:
