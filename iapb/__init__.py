@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from iapb.certificate import Certificate as Certificate
+    from iapb.certificate import certify as certify
+    from iapb.certificate import certify_impacts as certify_impacts
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
@@ -37,6 +40,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
+    "iapb.certificate": ("Certificate", "certify", "certify_impacts"),
     "iapb.contact.impact": ("Impact", "resolve_impact"),
     "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
     "iapb.effects": ("Effect", "decide_effects"),

@@ -22,6 +22,7 @@ COMMANDS = {
     "live": "Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable.",
     "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
     "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
+    "certify": "Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit.",
     "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
     "prove": "Check every machine-checked statement, or print the proof of one.",
     "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "

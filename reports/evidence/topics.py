@@ -20,6 +20,7 @@ TOPICS: dict[str, str] = {
     "engines": "verification.engines.verdict:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",
+    "exact-energy": "reports.evidence.exact_energy:compute",  # last: it certifies the runs of all others
 }
 
 

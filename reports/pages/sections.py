@@ -45,6 +45,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("couplings", "Device and tool", _always),
     Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
     Section("properties", "Properties", _has("properties"), tables=("properties", "counterexamples", "energy-gains")),
+    _topic("exact-energy", "Exact energy"),
     _topic("cross-checks", "Cross-checks"),
     _topic("mechanics", "Linkages and free bodies"),
     _topic("scene-ledger", "The scenes"),

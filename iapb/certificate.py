@@ -1,0 +1,251 @@
+"""Certify recorded impacts: did any of them gain kinetic energy, in real arithmetic? Judged anew, from M, v⁻ and v⁺.
+
+Every double is an integer times a power of two, so that wᵀMw ≤ vᵀMv is a question about integers, and has an answer.
+A proved bound in double-double (`iapb.contact.kernels.passive`) answers it for almost every impact. Integers decide
+where the bound leaves the sign open, and confirm the bound for one impact in a hundred. The energies that the recorder
+wrote are not used, so another engine's impacts are judged alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iapb.contact.kernels.passive import gain_signs
+from iapb.errors import ArgumentError, IapbError
+from iapb.mechanics.mechanism import Mechanism
+from iapb.run import Run
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from iapb.scene.model import Scene, scene_kind
+
+Floats = NDArray[np.float64]
+
+_CHECKED = 100  # of so many impacts that a bound decides, one is judged by integers as well
+_BATCH = 4096  # impacts whose mass matrices are at hand at once
+# M (v⁺ − v⁻) and the recorded impulse, or Jᵀp of the recorded contacts, agree to rounding of a well-built record.
+MOMENTUM_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What the exact judge found in recorded impacts.
+
+    Attributes
+    ----------
+    impacts : how many were judged.  gains : how many of them gained kinetic energy, however little.
+    by_integers : how many the bound left open, so that integers decided.  checked : bounds confirmed by integers.
+    first_gain : index of the first impact that gained, −1 = none.
+    largest_gain : largest relative gain (KE⁺ − KE⁻)/KE⁻, 0 where none gained.
+    momentum : largest |M(v⁺ − v⁻) − recorded impulse|, of the sum of |M||v⁺ − v⁻|; NaN where none is recorded.
+    span : largest |Jᵀp − recorded impulse| with the recorded contacts' normals and impulses, of the sum of sizes: the
+        distance of the impulse from range(Jᵀ). NaN where friction or per-body rows leave it open.
+    restitution : largest |J v⁺ + e J v⁻| of pushed contacts, of |J||v⁻|; NaN where the law is not that equality.
+    counterexample : Python source that shows the first gain in rationals, to paste; empty without one.
+    """
+
+    impacts: int
+    gains: int
+    by_integers: int
+    checked: int
+    first_gain: int
+    largest_gain: float
+    momentum: float
+    span: float
+    restitution: float
+    counterexample: str
+
+    @property
+    def passed(self) -> bool:
+        """No impact gained energy, and the recorded impulses are those of the recorded velocities."""
+        fits = all(not value > MOMENTUM_TOLERANCE for value in (self.momentum, self.span))
+        return self.gains == 0 and fits
+
+    def words(self) -> str:
+        """The verdict in one line."""
+        if not self.impacts:
+            return "no impact: nothing to certify"
+        energy = f"{self.gains} of {self.impacts} impacts gained energy" if self.gains else \
+            f"none of {self.impacts} impacts gained energy, not in the last bit"
+        fits = "" if self.passed or self.gains else "; recorded impulses do not fit the recorded velocities"
+        return f"{energy} (exact{fits})"
+
+
+def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
+    """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""
+    mass, before, after = (np.asarray(x, np.float64) for x in (mass_matrix, v_minus, v_plus))
+    entries, unit = _integers(mass.ravel())
+    speeds, speed_unit = _integers(np.concatenate((before, after)))
+    d, total = len(before), 0
+    for i in range(d):
+        for j in range(d):
+            if entries[i * d + j]:
+                change = speeds[d + i] * speeds[d + j] - speeds[i] * speeds[j]
+                total += entries[i * d + j] * change
+    return Fraction(total) * Fraction(2) ** (unit + 2 * speed_unit - 1)
+
+
+def _integers(values: Floats) -> tuple[list[int], int]:
+    """Integers and one exponent of two: values = integers · 2^exponent, exactly."""
+    if not np.isfinite(values).all():
+        raise ArgumentError("velocity or mass_matrix", "a number that is not finite", "finite numbers")
+    mantissas, exponents = np.frexp(values)
+    whole = (mantissas * 2.0**53).astype(np.int64)
+    present = whole != 0
+    least = int(exponents[present].min()) if present.any() else 0
+    shifts = np.where(present, exponents - least, 0)
+    return [int(m) << int(s) for m, s in zip(whole, shifts, strict=True)], least - 53
+
+
+@dataclass(frozen=True)
+class Judged:
+    """`gained` (n,) of each impact, exactly, and how many integers decided or confirmed."""
+
+    gained: NDArray[np.bool_]
+    by_integers: int
+    checked: int
+
+
+def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Judged:
+    """Say of each of n impacts whether it gained kinetic energy: M (d, d) or (n, d, d), v⁻ and v⁺ (n, d).
+
+    Raises
+    ------
+    IapbError
+        The bound and the integers disagree: a fault of this program or of the processor.
+    """
+    before, after = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, np.float64))) for v in (v_minus, v_plus))
+    masses = np.ascontiguousarray(np.asarray(mass_matrix, np.float64))
+    masses = masses[None] if masses.ndim == 2 else masses
+    n, d = before.shape
+    if after.shape != (n, d):
+        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
+    if masses.shape not in ((1, d, d), (n, d, d)):
+        raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
+    finite = np.isfinite(before).all() and np.isfinite(after).all() and np.isfinite(masses).all()
+    if not finite:
+        raise ArgumentError("v_minus, v_plus or mass_matrix", "a number that is not finite", "finite numbers")
+    signs = np.empty(n, np.int64)
+    gain_signs(masses, before, after, signs)
+    gained, unsure = signs > 0, np.flatnonzero(signs == 0)
+    for k in unsure:
+        gained[k] = exact_gain(masses[k % len(masses)], before[k], after[k]) > 0
+    checked = np.flatnonzero(signs != 0)[::_CHECKED]
+    for k in checked:
+        if gained[k] != (exact_gain(masses[k % len(masses)], before[k], after[k]) > 0):
+            raise IapbError(f"impact {k}: integers and the bound in double-double disagree on its energy")
+    return Judged(gained, len(unsure), len(checked))
+
+
+def certify(run: Run) -> Certificate:
+    """Judge every impact of a run exactly: energy, and whether impulses, velocities and contacts belong together.
+
+    M is made again at the recorded configuration by the engine's kernels, which give the same bits on every x86-64
+    processor; the recorded generalized impulses, which must be M(v⁺ − v⁻), show that it is the one of the impact.
+
+    Returns
+    -------
+    Certificate
+    """
+    table = run.impacts
+    if not len(table.step):
+        return certify_impacts(np.zeros((1, 1)), np.zeros((0, 1)), np.zeros((0, 1)))
+    scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
+    mechanism = mechanism_of(scene)
+    parts = []
+    for start in range(0, len(table.step), _BATCH):
+        chosen = slice(start, start + _BATCH)
+        masses = mechanism.mass_matrices(run.q[table.step[chosen]])
+        parts.append(certify_impacts(masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]))
+    span, restitution = _contacts(run, scene, mechanism)
+    return replace(_joined(parts), span=span, restitution=restitution)
+
+
+def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike,
+                    impulse: ArrayLike | None = None) -> Certificate:
+    """Judge n impacts of any engine: M (d, d) or (n, d, d), v⁻, v⁺ and, where known, M(v⁺ − v⁻) as recorded (n, d)."""
+    judged = judge_gains(mass_matrix, v_minus, v_plus)
+    masses, before, after = (np.asarray(x, np.float64) for x in (mass_matrix, v_minus, v_plus))
+    masses = masses if masses.ndim == 3 else masses[None]
+    gains = np.flatnonzero(judged.gained)
+    first = int(gains[0]) if len(gains) else -1
+    largest = max((_relative_gain(masses[k % len(masses)], before[k], after[k]) for k in gains), default=0.0)
+    momentum = np.nan
+    if impulse is not None and len(before):
+        change, recorded = after - before, np.asarray(impulse, np.float64)
+        size = np.matmul(np.abs(masses), np.abs(change)[:, :, None])[:, :, 0].sum(axis=1)
+        error = np.abs(np.matmul(masses, change[:, :, None])[:, :, 0] - recorded).sum(axis=1)
+        momentum = _largest_share(error, size + np.abs(recorded).sum(axis=1))
+    shown = "" if first < 0 else _shown(masses[first % len(masses)], before[first], after[first])
+    return Certificate(len(before), len(gains), judged.by_integers, judged.checked, first, largest, momentum, np.nan,
+                       np.nan, shown)
+
+
+def _largest_share(error: Floats, size: Floats) -> float:
+    """Largest error / size; 0 where both are."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.where(error == 0.0, 0.0, error / size).max(initial=0.0))
+
+
+def _relative_gain(mass: Floats, before: Floats, after: Floats) -> float:
+    energy = -exact_gain(mass, before, np.zeros_like(before))
+    return float(exact_gain(mass, before, after) / energy) if energy else np.inf
+
+
+def _shown(mass: Floats, before: Floats, after: Floats) -> str:
+    """Source of a check by rationals alone."""
+    return f"""from fractions import Fraction
+M = {[[float(x) for x in row] for row in mass]!r}
+v_minus = {[float(x) for x in before]!r}
+v_plus = {[float(x) for x in after]!r}
+def twice_energy(v):
+    v = [Fraction(x) for x in v]
+    return sum(Fraction(m) * v[i] * v[j] for i, row in enumerate(M) for j, m in enumerate(row))
+print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gained energy
+"""
+
+
+def _joined(parts: list[Certificate]) -> Certificate:
+    """One certificate of all batches, in order."""
+    first, counterexample, before = -1, "", 0
+    for part in parts:
+        if first < 0 <= part.first_gain:
+            first, counterexample = before + part.first_gain, part.counterexample
+        before += part.impacts
+    return Certificate(
+        before, sum(p.gains for p in parts), sum(p.by_integers for p in parts), sum(p.checked for p in parts), first,
+        max(p.largest_gain for p in parts), max(p.momentum for p in parts), np.nan, np.nan, counterexample)
+
+
+def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:
+    """The impulse against Jᵀp of the step's contacts, and restitution at those that were struck; NaN where open."""
+    table, impacts = run.contacts, run.impacts
+    frictionless = not (run.law_settings.get("friction_in_impacts") and scene.contact.friction > 0.0)
+    if not frictionless or scene.contact.self_collision_rows == "per_body" or not table.impulse.any():
+        return np.nan, np.nan
+    values = restitution_by_pair(scene, pairs_of(scene, shapes_of(scene)))
+    equality = len(np.unique(values)) == 1 and not run.law_settings.get("pushing")
+    span = residual = 0.0
+    for step in np.unique(impacts.step):
+        of_step = np.flatnonzero(impacts.step == step)
+        struck = [m for m in range(table.offsets[step], table.offsets[step + 1]) if table.impulse[m] != 0.0]
+        rows = np.array([_row(run, mechanism, int(step), m) for m in struck]).reshape(-1, mechanism.nv)
+        p, recorded = table.impulse[struck], run.impulse[step]
+        size = np.abs(rows).T @ np.abs(p) + np.abs(recorded)
+        span = max(span, _largest_share(np.abs(rows.T @ p - recorded).sum(keepdims=True), size.sum(keepdims=True)))
+        before, after = impacts.v_minus[of_step[0]], impacts.v_plus[of_step[-1]]
+        if equality and (impacts.scale[of_step] == 1.0).all() and len(rows):
+            off = np.abs(rows @ after + float(values[0]) * (rows @ before))
+            residual = max(residual, _largest_share(off, np.abs(rows) @ np.abs(before)))
+    return span, residual if equality else np.nan
+
+
+def _row(run: Run, mechanism: Mechanism, step: int, m: int) -> Floats:
+    """(11), (12): nᵀ(J_a − J_b) of contact m of the record."""
+    table, q = run.contacts, run.q[step]
+    row = table.normal[m] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
+    if table.body_b[m] >= 0:
+        row = row - table.normal[m] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
+    return np.asarray(row, np.float64)

@@ -1,0 +1,63 @@
+"""`iapb certify RUN…`: every recorded impact judged exactly: did it gain energy, do impulse and velocity fit?"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from iapb import Certificate, certify_impacts
+from iapb import certify as certify_run
+from iapb.errors import RunFileError
+from reports.store.runs import read_run
+
+_GIVEN = ("mass_matrix", "v_minus", "v_plus")
+
+
+def certify(
+    files: Annotated[list[Path], typer.Argument(
+        metavar="RUN...", help="Run files (.h5), folders of them, or impacts of another engine (.npz).")],
+) -> None:
+    """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
+    found = {path: certificate_of(path) for given in files for path in _files(given)}
+    table = Table(title="Impacts, judged in real arithmetic")
+    for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "restitution"):
+        table.add_column(heading, justify="left" if heading == "file" else "right")
+    for path, one in found.items():
+        sizes = ("–" if np.isnan(x) else f"{x:.1e}" for x in (one.momentum, one.span, one.restitution))
+        table.add_row(path.name, str(one.impacts), str(one.gains), str(one.by_integers + one.checked), *sizes)
+    Console().print(table)
+    failed = [path for path, one in found.items() if not one.passed]
+    impacts, gains = sum(one.impacts for one in found.values()), sum(one.gains for one in found.values())
+    print(f"{impacts} impacts of {len(found)} files: {gains} gained energy (exact).")
+    for path in failed:
+        print(f"{path}: {found[path].words()}")
+    for path in failed[:1]:
+        if found[path].counterexample:
+            print(f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}")
+    if failed:
+        raise typer.Exit(1)
+
+
+def certificate_of(path: Path) -> Certificate:
+    """Return the certificate of a run file, or of an archive of impacts of any engine."""
+    if path.suffix != ".npz":
+        return certify_run(read_run(path))
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in (*_GIVEN, "impulse") if name in archive.files}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise RunFileError(f"{path}: no archive of arrays: {error}") from None
+    missing = [name for name in _GIVEN if name not in arrays]
+    if missing:
+        raise RunFileError(f"{path}: {', '.join(missing)} missing; docs/report.md states the format")
+    return certify_impacts(**arrays)
+
+
+def _files(given: Path) -> list[Path]:
+    return sorted(given.rglob("*.h5")) if given.is_dir() else [given]

@@ -1,0 +1,77 @@
+"""Does any impact gain energy, in real arithmetic? Recorded impacts of the report, and many adverse ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iapb import Certificate, certify
+from iapb.contact.laws import ENGINE_LAWS
+from reports.runner import Runner
+from reports.store.runs import read_run
+from verification.finding import (
+    HOLDS,
+    Column,
+    Failure,
+    Finding,
+    Part,
+    attempt,
+    finding_of,
+    table_of,
+    verdict_of_law,
+)
+from verification.laws.exact_energy import FAMILIES, exact_energy
+
+_DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
+_RUNS = (Column("run"), Column("law"), Column("impacts"), Column("gains"), Column("largest gain"),
+         Column("M Δv − impulse"), Column("Jᵀp − impulse"), Column("restitution"), Column(HOLDS))  # fmt: skip
+_FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("cancelled"), Column("median loss"),
+             Column("largest loss"), Column(HOLDS))  # fmt: skip
+
+
+def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Certify every run that the report uses, and adverse impacts of the compiled resolver."""
+    failures: list[Failure] = []
+    files, rows = sorted(runner.used), []
+    for done, name in enumerate(files):
+        progress(done, len(files) + len(FAMILIES))
+        row = attempt(name, lambda name=name: _certified(runner, name), failures)  # type: ignore[misc]
+        if row is not None and row["impacts"]:
+            rows.append(row)
+    drawn = []
+    for done, family in enumerate(FAMILIES):
+        progress(len(files) + done, len(files) + len(FAMILIES))
+        one = exact_energy(family, _DRAWN[depth])
+        drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "cancelled": one.cancelled,
+                      "median loss": _known(one.loss[0]), "largest loss": _known(one.loss[2]), HOLDS: one.gains == 0})
+    engine = [row for row in rows if row["law"] in ENGINE_LAWS]
+    others = [row for row in rows if row["law"] not in ENGINE_LAWS]
+    worst = max((row["largest gain"] for row in others), default=0.0)
+    recorded = (f"{_sum(engine, 'impacts')} impacts of the {len(engine)} runs of the engine: "
+                f"{_sum(engine, 'gains')} gained energy (exact)")  # fmt: skip
+    adverse = f"{_sum(drawn, 'impacts')} adverse impacts: {_sum(drawn, 'gains')} gained energy (exact)"
+    parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in engine)),
+             Part(adverse, verdict_of_law(one["gains"] == 0 for one in drawn)))  # fmt: skip
+    answer = (f"{recorded}; {adverse}. Worlds without the engine's last step gain in {_sum(others, 'gains')} of "
+              f"{_sum(others, 'impacts')} impacts, by at most {worst:.1e} of the energy.")  # fmt: skip
+    tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn)}
+    question = "Does any impact gain energy, even in the last bit?"
+    return finding_of("exact-energy", "Exact energy", question, answer, parts, tables, failures)
+
+
+def _certified(runner: Runner, name: str) -> dict[str, Any]:
+    run = read_run(runner.store.folder / name)
+    one: Certificate = certify(run)
+    return {"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains, "largest gain": one.largest_gain,
+            "M Δv − impulse": _known(one.momentum), "Jᵀp − impulse": _known(one.span),
+            "restitution": _known(one.restitution), HOLDS: one.passed}  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def _sum(rows: list[dict[str, Any]], column: str) -> int:
+    return sum(row[column] for row in rows)

@@ -1,0 +1,126 @@
+"""The exact judge of recorded impacts finds every gain of one unit in the last place, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import iapb.certificate
+from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene, load_scene, simulate
+from iapb.certificate import exact_gain, judge_gains
+from iapb.contact.laws import ImpulseAugmented
+
+
+def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, v and the velocity after elastic impacts on one row each, rounded without any clamp: half of them gain."""
+    rng = np.random.default_rng(seed)
+    root, rows, v = rng.normal(size=(n, d, d)), rng.normal(size=(n, d)), rng.normal(size=(n, d))
+    mass = root @ root.transpose(0, 2, 1) + np.eye(d)
+    direction = np.linalg.solve(mass, rows[:, :, None])[:, :, 0]
+    share = 2.0 * (rows * v).sum(axis=1) / (rows * direction).sum(axis=1)
+    return mass, v, v - share[:, None] * direction
+
+
+def fractions_gain(mass: np.ndarray, before: np.ndarray, after: np.ndarray) -> Fraction:
+    """KE⁺ − KE⁻ by rationals, entry by entry."""
+    def energy(v: np.ndarray) -> Fraction:
+        x = [Fraction(float(entry)) for entry in v]
+        return sum((Fraction(float(m)) * x[i] * x[j] for (i, j), m in np.ndenumerate(mass)), Fraction(0)) / 2
+    return energy(after) - energy(before)
+
+
+@pytest.mark.parametrize("decades", [0, 250])
+def test_integers_give_what_rationals_give(decades: int) -> None:
+    mass, v, w = elastic(50, 3)
+    rng = np.random.default_rng(1)
+    scale = 10.0 ** rng.uniform(-decades, decades, (50, 1))
+    for m, before, after in zip(mass, v * scale, w * scale, strict=True):
+        assert exact_gain(m, before, after) == fractions_gain(m, before, after)
+    assert exact_gain(np.eye(2), [5e-324, 1e308], [1e308, 5e-324]) == 0
+    assert exact_gain(np.zeros((2, 2)), [1.0, 2.0], [3.0, 4.0]) == 0
+
+
+def test_every_impact_is_judged_as_rationals_judge_it() -> None:
+    mass, v, w = elastic(400, 3)
+    judged = judge_gains(mass, v, w)
+    truth = [fractions_gain(*one) > 0 for one in zip(mass, v, w, strict=True)]
+    assert judged.gained.tolist() == truth and 50 < sum(truth) < 350
+
+
+def test_planted_gains_of_one_unit_in_the_last_place_are_all_found() -> None:
+    """v⁺ = −v keeps the energy exactly; one unit in the last place along the momentum gains, the other way loses."""
+    mass, v, _ = elastic(2000, 3, seed=2)
+    w, rng = -v, np.random.default_rng(3)
+    momentum = np.einsum("nij,nj->ni", mass, w)
+    planted, widest = rng.choice(2000, 100, replace=False), np.abs(momentum).argmax(axis=1)
+    for k in range(2000):
+        towards = np.inf if (momentum[k, widest[k]] > 0.0) == (k in planted) else -np.inf
+        w[k, widest[k]] = np.nextafter(w[k, widest[k]], towards)
+    found = certify_impacts(mass, v, w)
+    assert np.flatnonzero(judge_gains(mass, v, w).gained).tolist() == sorted(planted.tolist())
+    assert found.gains == 100 and not found.passed and found.first_gain == min(planted)
+    space: dict[str, object] = {"print": lambda value: space.update(shown=value)}
+    exec(found.counterexample, space)
+    assert space["shown"] > 0  # type: ignore[operator]
+
+
+def test_gains_below_any_bound_are_left_to_integers() -> None:
+    """A gain of 2^-200 of the energy: no double-double sees it."""
+    mass, v = np.eye(2), np.array([[1.0, 2.0**-100]])
+    judged = judge_gains(mass, v, np.array([[-1.0, 2.0**-99]]))
+    assert judged.gained.tolist() == [True]
+    assert judge_gains(mass, v, np.array([[-1.0, 2.0**-101]])).gained.tolist() == [False]
+    cancelling = np.array([[1.0, 1.0], [1.0, 1.0]])
+    before, after = np.array([[1.0, 2.0**-80]]), np.array([[1.0 + 2.0**-52, -(2.0**-52)]])
+    assert judge_gains(cancelling, before, after).gained.tolist() == [exact_gain(cancelling, before[0], after[0]) > 0]
+
+
+def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(masses: np.ndarray, before: np.ndarray, after: np.ndarray, signs: np.ndarray) -> None:
+        signs[:] = 1
+    monkeypatch.setattr(iapb.certificate, "gain_signs", wrong)
+    with pytest.raises(IapbError, match="disagree"):
+        judge_gains(np.eye(2), [[1.0, 1.0]], [[0.5, 0.5]])
+
+
+@pytest.mark.parametrize(("change", "argument"), [
+    ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"), ({"mass_matrix": np.eye(3)}, "mass_matrix"),
+    ({"v_minus": [[np.nan, 1.0]]}, "not finite")])  # fmt: skip
+def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
+    good: dict[str, object] = {"mass_matrix": np.eye(2), "v_minus": [[1.0, 1.0]], "v_plus": [[0.5, 0.5]]}
+    with pytest.raises(ArgumentError, match=argument):
+        certify_impacts(**(good | change))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["newton_cradle", "two_link_arm_a"])
+def test_a_run_of_the_engine_is_certified_and_a_changed_one_is_not(name: str) -> None:
+    scene = load_scene(find_scene(name)).with_values({"contact.restitution": 1.0})
+    run = simulate(scene)
+    found = certify(run)
+    assert found.impacts == len(run.impacts.step) > 0
+    assert found.passed and found.gains == 0 and "not in the last bit" in found.words()
+    assert found.momentum < 1e-12 and found.span < 1e-12 and found.restitution < 1e-12
+    faster = run.impacts.v_plus.copy()
+    faster[0] *= 1.0 + 1e-9
+    assert certify(replace(run, impacts=replace(run.impacts, v_plus=faster))).gains == 1
+    impulse = run.impacts.impulse.copy()
+    impulse[0] *= 1.0 + 1e-6
+    changed = certify(replace(run, impacts=replace(run.impacts, impulse=impulse)))
+    assert changed.gains == 0 and not changed.passed and "do not fit" in changed.words()
+
+
+def test_a_run_without_impacts_has_nothing_to_certify() -> None:
+    run = simulate(load_scene(find_scene("wall_1d")), steps=1)
+    assert certify(run).impacts == 0 and certify(run).passed and "nothing" in certify(run).words()
+
+
+def test_a_group_scaled_to_a_device_gains_nothing() -> None:
+    """Elastic impacts under a force limit: shares of an impulse are certified as they are applied."""
+    scene = load_scene(find_scene("peg_corner"))
+    limited = scene.with_values({"contact.restitution": 1.0})
+    run = simulate(limited, ImpulseAugmented(rendering="scale"))
+    assert (run.impacts.scale < 1.0).any() or not scene.hand
+    assert certify(run).passed and certify(run).gains == 0

@@ -1,0 +1,44 @@
+"""`iapb certify` judges run files and archives of any engine, and ends with 1 where an impact gained energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb import find_scene, load_scene, simulate
+from reports.cli import main
+from reports.store.runs import write_run
+
+
+def archive(path: Path, gain: bool) -> Path:
+    """Two impacts of a recorder elsewhere; the second gains one unit in the last place."""
+    v = np.array([[1.0, -2.0], [0.3, 0.7]])
+    after = -v
+    if gain:
+        after[1, 0] = np.nextafter(after[1, 0], -np.inf)
+    np.savez(path, mass_matrix=np.diag([2.0, 3.0]), v_minus=v, v_plus=after)
+    return path
+
+
+def test_runs_and_archives_are_certified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run(tmp_path / "run.h5", simulate(load_scene(find_scene("wall_1d"))))
+    assert main(["certify", str(tmp_path), str(archive(tmp_path / "other.npz", False))]) == 0
+    said = capsys.readouterr().out
+    assert "of 2 files: 0 gained energy (exact)" in said and "run.h5" in said
+
+
+def test_a_gain_of_the_last_bit_is_shown_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["certify", str(archive(tmp_path / "other.npz", True))]) == 1
+    said = capsys.readouterr().out
+    assert "2 impacts of 1 files: 1 gained energy (exact)" in said
+    assert "Impact 1 of" in said and "Fraction" in said
+
+
+def test_what_holds_no_impacts_is_refused_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
+    (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
+    for name, reason in (("half.npz", "mass_matrix, v_plus missing"), ("text.npz", "no archive")):
+        assert main(["certify", str(tmp_path / name)]) == 1
+        assert reason in capsys.readouterr().err
