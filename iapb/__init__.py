@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from iapb.certificate import Certificate as Certificate
     from iapb.certificate import certify as certify
     from iapb.certificate import certify_impacts as certify_impacts
+    from iapb.checks import check_scene as check_scene
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "iapb.certificate": ("Certificate", "certify", "certify_impacts"),
+    "iapb.checks": ("check_scene",),
     "iapb.contact.impact": ("Impact", "resolve_impact"),
     "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
     "iapb.effects": ("Effect", "decide_effects"),

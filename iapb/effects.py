@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.checks import settled
 from iapb.contact.geometry import Shapes
 from iapb.contact.laws import (
     CLUSTERS,
@@ -432,6 +433,7 @@ def decide_effects(
     tuple of Effect
         every effect in a fixed order: `active`, the reason, and what leaving it out would change.
     """
+    scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
     return decide_for(scene, mechanism, shapes, pairs_of(scene, shapes), law, coupling, rendering)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any
 
-from iapb.errors import name_the_extra
+from iapb.errors import MissingDependencyError, name_the_extra
 
 
 def lazy_names(
@@ -36,3 +37,35 @@ def lazy_names(
         return sorted({*vars(sys.modules[package]), *homes})
 
     return load, names, sorted(homes)
+
+
+def needed(module: str, purpose: str) -> Any:
+    """Return an optional module, imported now; who lacks it gets one sentence that says how to install it."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        named = name_the_extra(error, purpose)
+        if named is not error:
+            raise named from error
+        package = module.partition(".")[0]
+        raise MissingDependencyError(package, purpose, f"pip install {package}") from error
+
+
+def extension(group: str, name: str) -> Any:
+    """Return what an installed package offers under an entry point: so packages above add to the ones below."""
+    for offered in entry_points(group=group, name=name):
+        return _loaded(offered, f"{group}: {name}")
+    raise MissingDependencyError("iapb[report]", f"{group}: {name}", "pip install 'iapb[report]'")
+
+
+def load_extensions(group: str) -> None:
+    """Import everything that installed packages offer in a group."""
+    for offered in entry_points(group=group):
+        _loaded(offered, group)
+
+
+def _loaded(offered: Any, purpose: str) -> Any:
+    try:
+        return offered.load()
+    except ModuleNotFoundError as error:
+        raise name_the_extra(error, purpose) from error

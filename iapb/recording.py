@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.checks import distrust_of
 from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
-from iapb.mechanics.energy import energy_of_run
+from iapb.mechanics.energy import FORCES, energy_of_run
 from iapb.mechanics.kernels.vectors import load, store
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities
 from iapb.system import System
@@ -40,6 +41,15 @@ class Record(NamedTuple):
 def chunk_steps(contacts: int, remaining: int) -> int:
     """Number of steps of the next chunk."""
     return max(1, min(remaining, _STEPS_PER_CHUNK, _CONTACT_ROWS_PER_CHUNK // max(1, contacts)))
+
+
+def bytes_per_step(simulation: Any) -> int:
+    """Bytes that each step adds to a run: its lines twice while chunks are joined, and the ledger; no contacts."""
+    mechanism, port = simulation.system.mechanism, simulation.port
+    lengths = {"time": 1, "step": 1, "coordinate": mechanism.nq, "velocity": mechanism.nv,
+               "device_coordinate": len(port.device_q), "device_velocity": len(port.device_v)}
+    lines = sum(array.nbytes for array in blank(_STATES + _STEPS, lengths).values())
+    return 2 * lines + 8 * len(FORCES) + 40
 
 
 def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
@@ -155,11 +165,13 @@ class Recorder:
     def run(self, world: str, stopped: str) -> Run:
         """Everything recorded so far as a Run; `stopped` says why it is not complete."""
         simulation, system = self.simulation, self.simulation.system
-        states = {each.name: np.concatenate([self.start[each.name][None], self.joined("steps", each.name)])
-                  for each in _STATES}
+        states: dict[str, Any] = {
+            each.name: np.concatenate([self.start[each.name][None], self.joined("steps", each.name)])
+            for each in _STATES}
         counts = [each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)]
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
         law, coupling = simulation.law, simulation.coupling
+        steps: dict[str, Any] = {each.name: self.joined("steps", each.name) for each in _STEPS}
         run = Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
@@ -169,15 +181,16 @@ class Recorder:
             velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
             body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
             time=np.arange(self.steps + 1, dtype=np.float64) * system.dt, **states,
-            **{each.name: self.joined("steps", each.name) for each in _STEPS},
+            **steps,
             contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in _CONTACTS}),
             impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in _IMPACTS}),
             energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
                                      for one in simulation.effects),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
-            kernel="compiled" if simulation.compiled else "python", stopped=stopped,
+            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks,
         )
-        return replace(run, energy=_energy(run, system))
+        run = replace(run, energy=_energy(run, system))
+        return replace(run, distrust=distrust_of(run))
 
 
 def _energy(run: Run, system: System) -> dict[str, Floats]:

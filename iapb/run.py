@@ -11,13 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from html import escape
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.lazy import extension, needed
+
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
 STATE_NAMES = ("free", "colliding", "resting")
+_SHOWN = 12  # coordinates that a plot or a table shows
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -119,7 +123,7 @@ class EffectRow:
     ignores: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """One simulation: scene, law, coupling and everything that came of it (SI units)."""
 
@@ -174,3 +178,119 @@ class Run:
     def steps(self) -> int:
         """Number of steps done."""
         return len(self.time) - 1
+
+    def __repr__(self) -> str:
+        """Say what was run and what came of it, in one line or two."""
+        return f"<Run of {self.summary}>" if not self.distrust else (
+            f"<Run of {self.summary}\n not to be trusted, because {self.distrust[0]}>")
+
+    @property
+    def summary(self) -> str:
+        """Scene, world, steps, collisions and penetration on one line."""
+        end = "" if self.complete else f", stopped: {self.stopped}"
+        deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
+        return (f"{self.scene_name} in {self.world}: {self.steps} steps of {1e3 * self.dt:.4g} ms{end}, "
+                f"{len(self.impacts.step)} collisions, at most {1e3 * deepest:.3g} mm deep")
+
+    def _repr_html_(self) -> str:
+        """The summary and the last state as a small table, for notebooks."""
+        rows = "".join(f"<tr><td>{escape(name)}</td><td>{value:.6g}</td><td>{unit}</td></tr>" for name, value, unit in
+                       list(zip(self.coordinate_names, self.q[-1], self.coordinate_units, strict=True))[:_SHOWN])
+        more = len(self.coordinate_names) - _SHOWN
+        rest = f"<p>and {more} more coordinates</p>" if more > 0 else ""
+        doubts = "".join(f"<p><b>Not to be trusted, because {escape(why)}.</b></p>" for why in self.distrust)
+        return (f"<p>{escape(self.summary)}</p>{doubts}<table><tr><th>at the end</th><th>value</th><th>unit</th></tr>"
+                f"{rows}</table>{rest}")
+
+    def to_xarray(self) -> Any:
+        """Return everything recorded as one `xarray.Dataset`, with units and labelled dimensions.
+
+        What belongs to contacts and impacts has the prefix ``contact_`` and ``impact_``, the ledger ``energy_``.
+        """
+        xarray = needed("xarray", "Run.to_xarray")
+        listed = [(record, prefix, each) for record, prefix in (
+            (self, ""), (self.contacts, "contact_"), (self.impacts, "impact_")) for each in quantities(type(record))]
+        variables = {prefix + each.name: (each.dimensions, getattr(record, each.name),
+                                          {"units": unit_of(each, self), "long_name": each.meaning})
+                     for record, prefix, each in listed}
+        variables |= {f"energy_{name}": ((energy_dimension(self, name),), values, {"units": "J"})
+                      for name, values in self.energy.items()}
+        sizes = {name: length for dimensions, values, _ in variables.values()
+                 for name, length in zip(dimensions, values.shape, strict=True)}
+        labels = {name: list(coordinates_of(self, name, length)[0]) for name, length in sizes.items()}
+        heading = {name: getattr(self, name) for name in ("scene_name", "world", "law", "coupling", "dt")}
+        return xarray.Dataset(variables, labels, {**heading, "distrust": "; ".join(self.distrust)})
+
+    def plot(self) -> Any:
+        """Draw coordinates, energy and the deepest contact over time; return the matplotlib figure."""
+        figure = needed("matplotlib.figure", "Run.plot").Figure(figsize=(8.0, 7.0), layout="constrained")
+        places, energy, depth = figure.subplots(3, 1, sharex=True)
+        for i, name in enumerate(self.coordinate_names[:_SHOWN]):
+            places.plot(self.time, self.q[:, i], label=f"{name} [{self.coordinate_units[i]}]")
+        for name in ("kinetic", "potential"):
+            if name in self.energy:
+                energy.plot(self.time, self.energy[name], label=name)
+        offsets = self.contacts.offsets
+        deepest = np.zeros(self.steps)
+        touching = np.flatnonzero(np.diff(offsets))
+        if len(touching):
+            deepest[touching] = np.maximum(-np.minimum.reduceat(self.contacts.gap, offsets[touching]), 0.0)
+        depth.plot(self.time[:-1], 1e3 * deepest, label="deepest contact")
+        for axes, label in ((places, "coordinates"), (energy, "energy [J]"), (depth, "penetration [mm]")):
+            axes.set_ylabel(label)
+            axes.legend(loc="best", fontsize="small")
+        depth.set_xlabel("time [s]")
+        figure.suptitle(f"{self.scene_name} in {self.world}" + (" (not to be trusted)" if self.distrust else ""))
+        return figure
+
+    def save(self, path: Any, *, replace: bool = False) -> Any:
+        """Write the run as one HDF5 file, as `iapb run` does; `reports.store.read_run` reads it back.
+
+        Parameters
+        ----------
+        path : of the file
+        replace : whether a file that is there is replaced; otherwise it stays as it is
+
+        Returns
+        -------
+        Path
+        """
+        return extension("iapb.files", "write")(path, self, replace=replace)
+
+
+# How the arrays of a run are labelled: by its file and by `Run.to_xarray`
+
+
+def energy_dimension(run: Run, name: str) -> str:
+    """Return the dimension of a ledger entry: ``time`` when it has n + 1 values, ``step`` when it has n."""
+    length = len(run.energy[name])
+    return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
+
+
+def unit_of(quantity: Quantity, run: Run) -> str:
+    """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
+    if isinstance(quantity.unit, str):
+        return quantity.unit
+    units = [quantity.unit[unit] for unit in _labels_along(run, quantity.dimensions[1])[1]]
+    return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
+
+
+def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] | tuple[str, ...], str]:
+    """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
+    if dimension == "time":
+        return np.asarray(run.time, np.float64), "s"
+    labels = ("x", "y", "z") if dimension == "axis" else _labels_along(run, dimension)[0]
+    if labels and len(labels) == length:
+        return labels, "1"
+    return np.arange(length, dtype=np.int64), "1"
+
+
+def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units along a dimension of generalized quantities; none along others."""
+    q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
+    return {
+        "coordinate": (run.coordinate_names, run.coordinate_units),
+        "velocity": (run.velocity_names, run.velocity_units),
+        "device_coordinate": (run.coordinate_names[q], run.coordinate_units[q]),
+        "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
+    }.get(dimension, ((), ()))

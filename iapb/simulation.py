@@ -12,6 +12,8 @@ itself, and is read).
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,16 +23,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Entry, kernel
+from iapb.compiling import compiling_told, to_stderr
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
-from iapb.recording import Record, Recorder, write_step
+from iapb.recording import Record, Recorder, bytes_per_step, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
-from iapb.scene import Scene, load_scene
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System
+from iapb.worlds import find_world
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
 FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
@@ -132,7 +136,7 @@ class Simulation:
 
     Parameters
     ----------
-    scene : Scene, or the path of a scene file.
+    scene : Scene, the path of a scene file, or the name of a scene that comes with the project.
     law : contact law; default `ImpulseAugmented()`.
     coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
     device : one that moves by itself (`iapb.haptics.device.Device`); default: the compiled device.
@@ -145,12 +149,12 @@ class Simulation:
 
     def __init__(self, scene: Scene | str | Path, law: ContactLaw | None = None,
                  coupling: Coupling | None = None, device: Device | None = None) -> None:
-        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         self.law: Any = ImpulseAugmented() if law is None else _checked_law(law)
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
             raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
-        self.system = System(self.scene)
+        self.system = System(scene if isinstance(scene, Scene) else load_scene(find_scene(scene)))
+        self.scene = self.system.scene
         self.state = self.system.make_state()
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.effects = self.system.decide(self.law, self.coupling)
@@ -282,17 +286,19 @@ def _is_frozen(law: Any) -> bool:
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
              world: str = "", steps: int | None = None,
              progress: Callable[[int, int], None] | None = None,
-             checkpoint: Checkpoint | None = None) -> Run:
-    """Simulate a scene under a contact law and a coupling and return the whole record.
+             checkpoint: Checkpoint | None = None, max_memory: float | None = None) -> Run:
+    """Simulate a scene under a contact law and a coupling, or in a world, and return the whole record.
 
     Parameters
     ----------
-    scene : Scene, or the path of a scene file.
+    scene : Scene, the path of a scene file, or the name of a scene that comes with the project.
     law, coupling : see `Simulation`.
-    world : name of the combination for the record, such as ``"IAPB"``; default: law and coupling.
+    world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`: selects the law, and the coupling with the scene's
+        gains. Beside a law of the caller's own it is any name for the record; default: law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
     progress : called as progress(steps done, steps in all) after every chunk.
     checkpoint : called with the run so far after a chunk, where its ``due`` is true.
+    max_memory : most bytes that the record may take, ``math.inf`` for any; default: half of the machine's memory.
 
     Returns
     -------
@@ -303,12 +309,25 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     Raises
     ------
     SceneError, ArgumentError
-        The scene or the arguments cannot be used.
+        The scene or the arguments cannot be used, or the record would not fit: before anything is allocated.
     IapbError, KeyboardInterrupt
         Stopped before the first step was done: there is nothing to return.
     """
+    if not isinstance(scene, Scene):
+        scene = load_scene(find_scene(scene))
+    if world and law is None:
+        chosen = find_world(world)
+        law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(scene, law, coupling)
     total = simulation.scene.steps if steps is None else _step_count(steps)
+    _fits(simulation, total, _half_of_memory() if max_memory is None else max_memory)
+    with compiling_told(to_stderr):
+        return _simulated(simulation, world, total, progress, checkpoint)
+
+
+def _simulated(simulation: Simulation, world: str, total: int, progress: Callable[[int, int], None] | None,
+               checkpoint: Checkpoint | None) -> Run:
+    """The loop of `simulate`, chunk by chunk."""
     recording = Recorder(simulation)
     stop: BaseException | None = None
     try:
@@ -330,3 +349,25 @@ def _step_count(steps: Any) -> int:
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
         raise ArgumentError("steps", steps, "a whole number >= 1")
     return int(steps)
+
+
+def _fits(simulation: Simulation, steps: int, most: float) -> None:
+    """Refuse a record that would not fit, with what it would take."""
+    each = bytes_per_step(simulation)
+    if steps * each > most:
+        raise ArgumentError("steps", steps, f"at most {int(most / each):,}: the record takes {each} bytes a step and "
+                            f"more with contacts, {_bytes(steps * each)} in all, of {_bytes(most)} that it may take. "
+                            "max_memory=math.inf takes the limit away; a lower rate or shorter parts take less")
+
+
+def _bytes(count: float) -> str:
+    power = min(int(math.log10(max(count, 1.0)) // 3), 6)
+    return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB', 'EB')[power]}"
+
+
+def _half_of_memory() -> float:
+    """Half of the machine's memory [bytes]; 4 GB where the system does not say."""
+    try:
+        return 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 4e9

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.checks import settled
 from iapb.compiled import Entry, block, columns
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
@@ -46,7 +47,8 @@ class System:
 
     Attributes
     ----------
-    scene : Scene
+    scene : Scene, with what `contact.auto` chooses
+    remarks : sentences on what it chose
     mechanism : Mechanism
     tool_tree : int, tree that the hand holds; −1 without a hand
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
@@ -55,7 +57,8 @@ class System:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+        self.scene, self.remarks = settled(scene)
+        scene = self.scene
         self.mechanism: Mechanism = mechanism_of(scene)
         self.shapes = shapes_of(scene)
         self.pairs = pairs_of(scene, self.shapes)

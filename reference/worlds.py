@@ -10,79 +10,33 @@
 | IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
 | IAPB-push | impulses that only push (two LCPs), and penalties | four-channel |
 
-The paper's rigid worlds, ideal and CBuc, have no friction: they ignore the scene's, and a run says so.
-Restitution that differs between bodies needs no world of its own: IAPB does as the scene says.
+The engine's are in `iapb.worlds`; this module adds the rigid ones. The paper's rigid worlds, ideal and CBuc, have no
+friction: they ignore the scene's, and a run says so. Restitution that differs between bodies needs no world of its own:
+IAPB does as the scene says.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
-from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.coupling import Coupling
-from iapb.names import one_of
+from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate
-from iapb.system import coupling_of
+from iapb.worlds import WORLDS, World, find_world
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 
-
-class World(NamedTuple):
-    """A named combination; the coupling's gains come from the scene."""
-
-    name: str
-    law: ContactLaw
-    coupling: str
-
-    def coupling_in(self, scene: Scene) -> Coupling:
-        """The coupling with the scene's gains; none where the scene has no hand or gives no gains at all."""
-        gains = scene.couplings
-        without = scene.hand is None or (gains.four_channel is None and gains.unilateral is None)
-        return coupling_of(scene, "none" if without else self.coupling)
-
-
-# name -> (how IAPB meets the device's limits) -> world; to add one: a line here
-WORLDS: dict[str, Callable[[str], World]] = {
+# to add a world: a line here
+WORLDS |= {
     "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
-    "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
-    "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
     "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
     "ideal-friction": lambda rendering: World(
         "ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"
     ),
-    "IAPB-friction": lambda rendering: World(
-        "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
-    ),
-    "IAPB-push": lambda rendering: World(
-        "IAPB-push", ImpulseAugmented(rendering=rendering, pushing=True), "four-channel"
-    ),
 }
-
-
-def find_world(name: str, rendering: str = "full") -> World:
-    """Return the world of that name.
-
-    Parameters
-    ----------
-    name : a key of `WORLDS`
-    rendering : how IAPB meets the device's limits: full (ignores them), saturate, scale or spread
-
-    Raises
-    ------
-    ArgumentError
-        There is no such world, or its law has no impulses that a rendering could fit.
-    """
-    if name not in WORLDS:
-        raise ArgumentError("world", name, one_of(name, WORLDS))
-    world = WORLDS[name](rendering)
-    if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
-        raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")
-    return world
 
 
 def run_world(

@@ -18,8 +18,8 @@ from multiprocessing import active_children, get_context
 from threading import Thread
 from typing import Any
 
+from iapb.compiling import tell_from_worker
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
-from reports.compiling import tell_from_worker
 
 # Called as scheduler(compute, parts); yields (part, result) as results come.
 Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Generator[tuple[Any, Any]]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from functools import wraps
 from importlib import import_module
+from importlib.metadata import version
 from typing import Any, cast
 
 import typer
@@ -19,6 +21,8 @@ from iapb.errors import ArgumentError, IapbError
 # where the command is the one that was given; `iapb --help` imports none.
 COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.",
+    "check": "Warn of what would make a run of SCENE worthless, each with its number and what to set; end with 3 then.",
+    "scenes": "List the scenes that come with the project: their names, and what they show.",
     "live": "Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable.",
     "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
     "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
@@ -37,25 +41,39 @@ COMMANDS = {
 }  # fmt: skip
 
 
+COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
+
+
 class _Options:
     """Options before the command."""
 
     debug = False
 
 
-def _before(debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error.")) -> None:
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"iapb {version('iapb')}")
+        raise typer.Exit
+
+
+def _before(
+    debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error."),
+    version_: bool = typer.Option(False, "--version", help="Print the version.", callback=_version, is_eager=True),
+) -> None:
     _Options.debug = debug
 
 
 def _app(given: list[str]) -> typer.Typer:
     """The command line with all commands, of which only the given one can be called."""
     app = typer.Typer(
-        name="iapb", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+        name="iapb", no_args_is_help=True, pretty_exceptions_enable=False,
         help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove "
              "and test passivity, compare with complementarity, regenerate the paper's figures.",
         epilog="Start with: iapb run peg_corner",
     )  # fmt: skip
     app.callback()(_before)
+    if COMPLETION in os.environ:  # the shell asks: the words so far stand in its own variable
+        given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
     wanted = next((word for word in given if not word.startswith("-")), "")
     for name, words in COMMANDS.items():
         command = getattr(import_module(f"reports.commands.{name}"), name) if name == wanted else _not_given
@@ -114,7 +132,8 @@ def harmless(text: str) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 130 interrupted."""
+    """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 3 a result that is
+    not to be trusted, 130 interrupted."""
     if arguments is None:
         signal.signal(signal.SIGTERM, _end_politely)
     out, err = cast(Any, Harmless(sys.stdout, _COLOUR)), cast(Any, Harmless(sys.stderr, _BARS))
@@ -128,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _main(given: list[str]) -> int:
     try:
         _refuse_empty(given)
-        status = _app(given)(args=given, standalone_mode=False)
+        status = _app(given)(args=given, prog_name="iapb", standalone_mode=False)
     except KeyboardInterrupt:
         print("iapb: stopped; what was finished is kept.", file=sys.stderr)
         status = 130

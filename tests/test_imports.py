@@ -142,3 +142,13 @@ def test_a_cycle_is_found() -> None:
     assert cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {frozenset("abc")}
     tree = ast.parse("if TYPE_CHECKING:\n    import x\ndef f():\n    from x import y, z\nimport x.y")
     assert set(_imported(tree, {"x", "x.y"}, False)) == {("x.y", True), ("x", True), ("x.y", False)}
+
+
+def test_what_packages_above_add_to_the_engine_is_there() -> None:
+    from importlib.metadata import EntryPoint
+
+    offered = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+    worlds = EntryPoint("reference", offered["iapb.worlds"]["reference"], "iapb.worlds").load()
+    assert {"IAPB", "PB", "ideal", "CBuc"} <= set(worlds) and worlds is import_module("iapb.worlds").WORLDS
+    write = EntryPoint("write", offered["iapb.files"]["write"], "iapb.files").load()
+    assert write is import_module("reports.store").write_run

@@ -37,12 +37,18 @@ MAX_WALLS = 2000
 MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
 MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a slip of the pen, and would not end
 MAX_DELAY = 1000  # steps; a longer delay is a broken line
+AUTO = ("stiffness", "damping", "coherence_distance")  # of a contact: what `auto` chooses where it is not given
 PerCoordinate = tuple[NonNegative, ...]
 
 
 class Contact(Part):
     """How contacts behave. The defaults are the paper's where it gives a number, ours where it does not."""
 
+    auto: Annotated[bool, Field(strict=True)] = Field(
+        False,
+        description="true: stiffness, damping and coherence_distance are chosen from masses, sizes, gravity and rate "
+        "where they are not given; contact: auto is short for it; default false",
+    )
     stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default 1000, the paper's walls")
     damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default 50, the paper's walls")
     penalty: Literal["clamped", "printed"] = Field(
@@ -166,6 +172,11 @@ class Scene(Part):
 
     _source_text: str = PrivateAttr("")
 
+    @field_validator("contact", mode="before")
+    @classmethod
+    def _spelt_out(cls, contact: Any) -> Any:
+        return {"auto": True} if contact == "auto" else contact
+
     @field_validator("duration")
     @classmethod
     def _ends(cls, duration: float, info: ValidationInfo) -> float:
@@ -194,8 +205,15 @@ class Scene(Part):
         return self._source_text
 
     def resolved(self) -> dict[str, Any]:
-        """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings."""
-        return self.model_dump(mode="json")
+        """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings.
+
+        What `contact.auto` is to choose has no value yet, and is left out.
+        """
+        plain = self.model_dump(mode="json")
+        for name in AUTO if self.contact.auto else ():
+            if name not in self.contact.model_fields_set:
+                del plain["contact"][name]
+        return plain
 
     def with_values(self, values: dict[str, Any]) -> Self:
         """Return a copy with some values changed, checked like a file.
@@ -303,6 +321,9 @@ def scene_schema() -> dict[str, Any]:
     """
     _, schema = models_json_schema([(model, "validation") for model in (Scene, SpatialScene, Robot)])
     parts = schema["$defs"]
+    for name in ("Scene", "SpatialScene"):
+        contact = parts[name]["properties"]["contact"]
+        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, {"const": "auto"}], **contact}
     parts["SpatialScene"] = _with_robots(parts["SpatialScene"])
     return {
         "$schema": DIALECT, "title": "Scene file", "type": "object",

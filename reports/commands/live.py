@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
+from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
 from iapb.simulation import INTERRUPTED, Simulation
 from reference.worlds import find_world
-from reports.commands.progress import to_log
 from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
-from reports.compiling import compiling_told
 from reports.live.budget import calibrated
 from reports.live.loop import LiveRun, Loop
 from reports.live.measure import Pace, live_simulation, summary
@@ -45,7 +44,7 @@ def live(
         raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
     source = scene_given(scene, set_)
     out.mkdir(parents=True, exist_ok=True)  # where it cannot be, that is said before and not after the run
-    with compiling_told(to_log):
+    with compiling_told(to_stderr):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)
         name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
         result = _held(simulation, round(seconds * rate), world, budget, port if view else None)

@@ -10,9 +10,10 @@ from threading import Event, Thread
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
-from reports.compiling import compiling_told
+from iapb.compiling import compiling_told, to_stderr
 
 SILENCE = 30.0  # [s] between two lines of a log
 
@@ -36,7 +37,7 @@ def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, 
     """Show stages; one that has `begun` before its first report is shown at once on a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:
-        with compiling_told(to_log), _reminded(StageLog(to_log, begun)) as log:
+        with compiling_told(to_stderr), _reminded(StageLog(to_stderr, begun)) as log:
             yield log
         return
     with _bars(console, transient) as bars, compiling_told(bars.console.print):
@@ -52,10 +53,18 @@ def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, 
 
 def _bars(console: Any, transient: bool) -> Progress:
     name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
-    number = TextColumn("{task.completed}/{task.total}")
+    number = _Number()
     # Only what goes to the same terminal is moved above the bars: a redirected stdout must not end up on stderr.
     return Progress(name, BarColumn(), number, TimeElapsedColumn(), console=console, transient=transient,
                     redirect_stdout=sys.stdout.isatty())
+
+
+class _Number(ProgressColumn):
+    """How many are done of how many, as soon as that is known."""
+
+    def render(self, task: Any) -> Text:
+        """Return the text beside the bar."""
+        return Text("starting" if task.total is None else f"{task.completed:,.0f}/{task.total:,.0f}")
 
 
 class StageLog:
@@ -101,8 +110,3 @@ def _reminded(log: StageLog) -> Iterator[StageLog]:
     finally:
         over.set()
         thread.join()
-
-
-def to_log(line: str) -> None:
-    """Write a line to stderr now."""
-    print(line, file=sys.stderr, flush=True)

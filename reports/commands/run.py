@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
+from iapb.checks import Caution, check_scene
 from iapb.effects import ignored_fields
 from iapb.run import Run
-from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import INTERRUPTED
+from reference.worlds import find_world
 from reports.commands.progress import step_progress
-from reports.runner import Runner
+from reports.runner import Fetched, Runner
 from reports.uses import parsed
 
-SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of a scene that comes with the project.")]
+SceneName = Annotated[str, typer.Argument(
+    help="A scene file, or the name of a scene that comes with the project: see iapb scenes.",
+    autocompletion=lambda incomplete: [name for name in scene_names() if name.startswith(incomplete)])]  # fmt: skip
 Rendering = Annotated[str, typer.Option(
     help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")]  # fmt: skip
 Values = Annotated[list[str] | None, typer.Option(
@@ -37,18 +43,44 @@ def run(
     rendering: Rendering = "full",
     set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
+    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")] = False,
 ) -> None:
-    """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again."""
+    """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.
+
+    Warnings about the scene come first, as of iapb check. Ends with 3 where the result is not to be trusted.
+    """
     source, runner = scene_given(scene, set_), Runner(out)
+    cautions = check_scene(source, find_world(world, rendering).law)
+    for caution in cautions:
+        print(f"Warning: {caution}.", file=sys.stderr)
     with step_progress(f"{source.name} in {world}") as runner.progress:
         fetched = runner.fetch(source, world, rendering)
     result = fetched.run
-    describe(result, fetched.existed)
-    if result.complete:
-        print(f"Stored in {fetched.place.path}")
+    if json_:
+        print(json.dumps(_as_json(result, fetched, cautions), indent=1, ensure_ascii=False))
     else:
-        print(f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {fetched.place.partial}")
+        describe(result, fetched.existed)
+        print(f"Stored in {fetched.place.path}" if result.complete else
+              f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {fetched.place.partial}")
+    if not result.complete:
         raise typer.Exit(130 if result.stopped == INTERRUPTED else 1)
+    if result.distrust:
+        raise typer.Exit(DISTRUSTED)
+
+
+DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
+
+
+def _as_json(run: Run, fetched: Fetched, cautions: tuple[Caution, ...]) -> dict[str, Any]:
+    """What happened, as plain values."""
+    return {
+        "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling, "steps": run.steps,
+        "dt": run.dt, "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
+        "deepest_penetration": max(0.0, -float(run.contacts.gap.min(initial=0.0))),
+        "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
+        "warnings": [caution._asdict() for caution in cautions], "remarks": run.remarks, "distrust": run.distrust,
+        "file": str(fetched.place.path if run.complete else fetched.place.partial),
+    }  # fmt: skip
 
 
 SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
@@ -73,6 +105,10 @@ def describe(run: Run, existed: bool) -> None:
     if len(run.contacts.gap):
         print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
     print(f"At the end: {_end_of(run)}.")
+    for remark in run.remarks:
+        print(f"{remark}.")
+    if run.distrust:
+        print(f"This result is not to be trusted, because {'; '.join(run.distrust)}.")
 
 
 def _end_of(run: Run) -> str:

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
+from iapb.compiling import compiling_told, to_stderr
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
-from reports.commands.progress import stage_progress, to_log
-from reports.compiling import compiling_told
+from reports.commands.progress import stage_progress
 from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
 from verification.engines import SETTINGS, compare_engines, sentence, verdict
@@ -128,7 +128,7 @@ def count_in_words(count: LawCount) -> str:
 def print_recheck(path: Path, allow_code: bool) -> bool:
     """Print every residual of a stored counterexample; return whether all laws are kept now."""
     kept = True
-    with compiling_told(to_log):
+    with compiling_told(to_stderr):
         judged = tuple(recheck(path, allow_code))
     for law, residual in judged:
         print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")

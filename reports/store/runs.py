@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
-from iapb.run import ContactTable, EffectRow, ImpactTable, Run
+from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, energy_dimension, unit_of
 from reports.provenance import collect_provenance
 from reports.store.io import (
     mark_plottable,
@@ -32,9 +32,6 @@ from reports.store.schema import (
     SENTENCES,
     STATE_ATTRIBUTES,
     TEXTS,
-    coordinates_of,
-    energy_dimension,
-    unit_of,
 )
 
 

@@ -19,7 +19,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Quantity, Run, quantities
 
@@ -56,38 +55,3 @@ STATE_ATTRIBUTES = {
     "flag_values": np.arange(len(STATE_NAMES), dtype=np.int8),
     "flag_meanings": " ".join(STATE_NAMES),
 }
-
-
-def energy_dimension(run: Run, name: str) -> str:
-    """Return the dimension of a ledger entry: ``time`` when it has n + 1 values, ``step`` when it has n."""
-    length = len(run.energy[name])
-    return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
-
-
-def unit_of(quantity: Quantity, run: Run) -> str:
-    """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
-    if isinstance(quantity.unit, str):
-        return quantity.unit
-    units = [quantity.unit[unit] for unit in _along(run, quantity.dimensions[1])[1]]
-    return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
-
-
-def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] | tuple[str, ...], str]:
-    """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
-    if dimension == "time":
-        return np.asarray(run.time, np.float64), "s"
-    labels = ("x", "y", "z") if dimension == "axis" else _along(run, dimension)[0]
-    if labels and len(labels) == length:
-        return labels, "1"
-    return np.arange(length, dtype=np.int64), "1"
-
-
-def _along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units along a dimension of generalized quantities; none along others."""
-    q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
-    return {
-        "coordinate": (run.coordinate_names, run.coordinate_units),
-        "velocity": (run.velocity_names, run.velocity_units),
-        "device_coordinate": (run.coordinate_names[q], run.coordinate_units[q]),
-        "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
-    }.get(dimension, ((), ()))

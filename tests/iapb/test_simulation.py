@@ -168,3 +168,53 @@ def test_a_hand_force_without_a_hand_is_refused():
 def test_without_a_coupling_no_device_moves():
     run = simulate(PEG, coupling=NoCoupling(), steps=20)
     assert run.coupling == "none" and np.array_equal(run.device_q, np.tile(run.device_q[0], (21, 1)))
+
+
+def test_a_scene_has_a_name_and_a_world_selects_the_law_and_its_coupling():
+    run = simulate("peg_corner", world="PB", steps=3)
+    assert (run.world, run.law, run.coupling) == ("PB", "penalty", "four-channel")
+    assert simulate(PEG, Penalty(), world="my own", steps=3).world == "my own"
+    assert simulate(PEG, world="PB", coupling=NoCoupling(), steps=3).coupling == "none"
+    assert simulate(load_scene(find_scene("two_discs")), world="IAPB-push", steps=3).coupling == "none"
+    with pytest.raises(ArgumentError, match=r"world = 'nonsense': expected one of IAPB, PB"):
+        simulate("peg_corner", world="nonsense")
+    with pytest.raises(ArgumentError, match="peg_corner"):
+        simulate("peg_korner")
+
+
+def test_a_record_that_would_not_fit_is_refused_with_its_size_before_it_is_allocated():
+    with pytest.raises(ArgumentError, match=r"bytes a step.*TB in all.*max_memory"):
+        simulate("peg_corner", steps=10**12)
+    each = recording.bytes_per_step(Simulation("peg_corner"))
+    assert simulate("peg_corner", steps=10, max_memory=10 * each).steps == 10
+    with pytest.raises(ArgumentError, match="at most 9:"):
+        simulate("peg_corner", steps=10, max_memory=10 * each - 1)
+
+
+def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
+    run = simulate("peg_corner", steps=STEPS)
+    assert repr(run).startswith("<Run of peg_corner in") and len(repr(run)) < 200 and "\n" not in repr(run)
+    assert "<table>" in run._repr_html_() and "peg.theta" in run._repr_html_()
+    data = run.to_xarray()
+    assert data.q.dims == ("time", "coordinate") and list(data.coordinate.values) == list(run.coordinate_names)
+    assert data.q.attrs["units"] == "m, m, rad" and data.contact_gap.attrs["units"] == "m"
+    assert np.array_equal(data.energy_kinetic.values, run.energy["kinetic"])
+    assert data.sizes["contact"] == len(run.contacts.gap) > 0
+    assert len(run.plot().axes) == 3
+
+
+def test_a_run_is_saved_by_what_an_installed_package_offers(monkeypatch):
+    from iapb import lazy
+    from iapb.errors import MissingDependencyError
+
+    run = simulate("peg_corner", steps=3)
+    monkeypatch.setattr(lazy, "entry_points", lambda **asked: [])
+    with pytest.raises(MissingDependencyError, match=r"iapb\[report\]"):
+        run.save("run.h5")
+
+    class Offered:
+        def load(self):
+            return lambda path, given, replace: (path, given is run, replace)
+
+    monkeypatch.setattr(lazy, "entry_points", lambda **asked: [Offered()])
+    assert run.save("run.h5", replace=True) == ("run.h5", True, True)

@@ -253,3 +253,34 @@ def test_extensions_of_the_law_run_by_name_and_say_so_in_the_file(arguments, law
     run = read_run(next(tmp_path.glob("*.h5")))
     assert run.law == law and run.law_settings["friction_in_impacts"] == (effect == "impact_friction")
     assert effect in {row.name for row in run.effects if row.active}
+
+
+def test_check_warns_with_a_number_and_ends_with_3(iapb):
+    status, out, _ = iapb("check", "peg_corner")
+    assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out and "Nothing wrong" in out
+    status, out, _ = iapb("check", "peg_corner", "--set", "contact.stiffness=1e9", "--json")
+    found = json.loads(out)
+    assert status == 3 and found["warnings"][0]["kind"] == "stiffness" and found["limits"]["contacts"] == 2
+
+
+def test_a_run_that_is_not_to_be_trusted_says_why_ends_with_3_and_stores_it(iapb, tmp_path):
+    wrong = ("run", "peg_corner", "--set", "duration=0.5", "--set", "contact.stiffness=1e8", "--out", tmp_path)
+    status, out, err = iapb(*wrong)
+    assert status == 3 and "Warning: contact.stiffness" in err
+    assert "This result is not to be trusted, because its energy is" in out
+    [file] = tmp_path.glob("*.h5")
+    again, out, _ = iapb(*wrong, "--json")
+    assert again == 3 and json.loads(out)["distrust"] and "not to be trusted" in iapb("inspect", file)[1]
+
+
+def test_version_scenes_and_completion(iapb, monkeypatch, capsys):
+    assert iapb("--version")[:2] == (0, f"iapb {import_module('iapb').__version__}\n")
+    assert json.loads(iapb("scenes", "--json")[1])["peg_corner"]
+    monkeypatch.setenv("_IAPB_COMPLETE", "complete_bash")
+    for words, place, expected in (("iapb run peg_c", 2, "peg_corner"), ("iapb che", 1, "check"),
+                                   ("iapb run --wor", 2, "--world")):
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(place))
+        with pytest.raises(SystemExit, match="0"):  # typer ends the process that a shell asks
+            iapb()
+        assert expected in capsys.readouterr().out.split()

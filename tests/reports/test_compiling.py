@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from iapb.compiled import Entry
+from iapb.compiling import BEGIN, compiling_told, tell_from_worker
 from iapb.scene import find_scene
 from iapb.simulation import Simulation, simulate
-from reports.compiling import BEGIN, compiling_told, tell_from_worker
 
 needs_compiler = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are interpreted")
 

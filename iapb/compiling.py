@@ -1,4 +1,4 @@
-"""Say it when kernels are compiled: nothing else keeps silent for a minute."""
+"""Say it when kernels are compiled: nothing else keeps silent for a minute. Nested listeners tell it once."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+_listening: list[bool] = []  # not empty: somebody tells already
 BEGIN = "Compiling kernels, the first time only; it takes half a minute or more ..."
 
 
@@ -19,13 +20,23 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
     """
     from numba.core import event
 
+    if _listening:
+        yield
+        return
     listener = _listener(lambda: say(BEGIN))
+    _listening.append(True)
     try:
         with event.install_listener("numba:compile", listener):
             yield
     finally:
+        _listening.pop()
         if listener.seconds:
             say(f"Compiling took {listener.seconds:.1f} s.")
+
+
+def to_stderr(line: str) -> None:
+    """Write a line to stderr now."""
+    print(line, file=sys.stderr, flush=True)
 
 
 def tell_from_worker(told: Any) -> None:
@@ -36,8 +47,9 @@ def tell_from_worker(told: Any) -> None:
         with told.get_lock():
             first, told.value = not told.value, True
         if first:
-            print(BEGIN, file=sys.stderr, flush=True)
+            to_stderr(BEGIN)
 
+    _listening.append(True)
     event.register("numba:compile", _listener(say_once))
 
 

@@ -1,0 +1,634 @@
+"""What makes a result worthless: looked for in a scene before its run, and in a run after it, each with its number.
+
+A contact that lasts swings on (5). With k = K Δt²/m and b = B Δt/m, m its effective mass 1/(J M⁻¹ Jᵀ), a step of the
+law's integrator maps (gap, velocity) linearly; the swing grows where that map has an eigenvalue beyond 1. For
+semi-implicit Euler this is k + 2 b > 4. Contacts that share a body swing together: 1/m is then the largest eigenvalue
+of J M⁻¹ Jᵀ over all of them. A new contact is stopped at a depth of up to v Δt, and its spring gives back up to k times
+the energy that the body came with: so k must not exceed 1 either. `contact.auto` chooses well below both limits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.geometry import (
+    BOX,
+    ENDLESS,
+    POLYGON,
+    ContactBuffer,
+    Shapes,
+    contact_capacity,
+    frame_along,
+    make_contact_buffer,
+)
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.laws import FRICTION, PENALTY, ContactLaw, ImpulseAugmented
+from iapb.mechanics.integrators import INTEGRATORS, Integrator
+from iapb.mechanics.mechanism import Mechanism
+from iapb.run import Run
+from iapb.scene import Scene, SpatialScene
+from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+
+Floats = NDArray[np.float64]
+
+NEAR = 0.02  # of the smaller shape: contacts closer than this at the start are taken to touch together
+DEEP = 0.02  # of the smaller shape: an overlap at the start that is no resting depth
+SAG = 0.1  # of the smaller shape: more static sag is no rigid contact
+THROWN = 1.0  # largest k = K Δt²/m at which a new contact gives back no more than it took
+ROUNDED = 1e-9  # share by which rounding may move a limit
+MANY_PAIRS = 2000  # with more, only pairs closer than the largest body are looked at
+UNACCOUNTED = 0.02  # share of the energy at hand that a first-order step may make up
+WILD = 10.0  # times the farthest that start, speed and acceleration can carry a body
+
+
+class Caution(NamedTuple):
+    """A warning about a scene: its kind, the things it is about, and a sentence with the number and what to set."""
+
+    kind: str
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """What the step can hold at the most critical contacts.
+
+    mass : smallest effective mass [kg]; contacts : how many swing together there; where : of which bodies
+    stiffness : largest stable K at the scene's damping [N/m]; damping : largest stable B at its stiffness [N s/m]
+    rate : smallest rate for both [Hz]
+    """
+
+    where: str
+    contacts: int
+    mass: float
+    stiffness: float
+    damping: float
+    rate: float
+
+
+class Start:
+    """A scene at its start: the contacts that touch or come next, their rows, masses and loads.
+
+    Parameters
+    ----------
+    scene : Scene
+    mechanism, shapes, pairs : of the scene where the caller has them already.
+    """
+
+    def __init__(self, scene: Scene, mechanism: Mechanism | None = None, shapes: Shapes | None = None,
+                 pairs: NDArray[np.int32] | None = None) -> None:
+        self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
+        self.mechanism = mechanism_of(scene) if mechanism is None else mechanism
+        self.shapes = shapes_of(scene) if shapes is None else shapes
+        self.pairs = pairs_of(scene, self.shapes) if pairs is None else pairs
+        self.q, self.v = start_of(scene)
+        self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
+        self.size = np.array([_smallest_extent(self.shapes, i) for i in range(len(self.shapes.kind))])
+        self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
+        self.found = self._contacts()
+        self.rows = np.array([self._row(i, self.found.normal[i]) for i in range(len(self.found.gap))]).reshape(
+            -1, self.mechanism.nv)
+        self.thickness = np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
+
+    def _contacts(self) -> ContactBuffer:
+        """Contacts of each pair with its closest features, near or far."""
+        finite = self.size[np.isfinite(self.size)]
+        few = len(self.pairs) <= MANY_PAIRS
+        buffer, count = make_contact_buffer(_room(self.shapes, self.pairs, few)), 0
+        if len(self.pairs):
+            margin = math.inf if few else float(finite.max(initial=0.0))
+            count = detect(self.shapes, self.pairs, *self.mechanism.placements(self.q), margin, buffer)
+        columns: list[Any] = [column[: max(int(count), 0)] for column in buffer]
+        return ContactBuffer(*columns)
+
+    def _row(self, i: int, direction: Floats) -> Floats:
+        """Row of contact i along a direction."""
+        row = np.zeros(self.mechanism.nv)
+        for body, sign in ((self.found.body_a[i], 1.0), (self.found.body_b[i], -1.0)):
+            if body >= 0:
+                row += sign * direction @ self.mechanism.point_jacobian(self.q, int(body), self.found.point[i])
+        return row
+
+    @cached_property
+    def blocks(self) -> list[tuple[slice, Floats]]:
+        """Dofs and inverse mass matrix of each tree."""
+        mass = self.mechanism.mass_matrix(self.q)
+        ranges = [slice(*dofs) for dofs in self.mechanism.tree_dofs if dofs[1] > dofs[0]]
+        return [(part, np.asarray(np.linalg.inv(mass[part, part]), np.float64)) for part in ranges]
+
+    def moved(self, rows: Floats) -> Floats:
+        """M⁻¹ Jᵀ (d, c) of rows J (c, d)."""
+        out = np.zeros(rows.T.shape)
+        for part, inverse in self.blocks:
+            out[part] = inverse @ rows.T[part]
+        return out
+
+    @cached_property
+    def applied(self) -> Floats:
+        """Generalized force of gravity and of the hand at the start (d,)."""
+        force, hand = -self.mechanism.gravity(self.q, self.gravity), self.scene.hand
+        if hand is not None and any(hand.force):
+            body = self.mechanism.index(hand.body)
+            R, p = self.mechanism.placements(self.q)
+            flat = len(hand.force) == 3
+            wrench = np.array([*hand.force[:2], 0.0, 0.0, 0.0, hand.force[2]] if flat else hand.force)
+            point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
+            force += wrench[:3] @ self.mechanism.point_jacobian(self.q, body, point)
+            force += wrench[3:] @ self.mechanism.frame_jacobian(self.q, body)[3:]
+        return force
+
+    @cached_property
+    def by_pair(self) -> list[NDArray[np.int64]]:
+        """Contacts of each pair of shapes, closest first, no more than can lie flat on a face."""
+        most = 4 if self.spatial else 2
+        kept: dict[tuple[int, int], list[int]] = {}
+        for i, pair in enumerate(zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)):
+            kept.setdefault(pair, []).append(i)
+        return [np.array(sorted(rows, key=lambda i: float(self.found.gap[i]))[:most]) for rows in kept.values()]
+
+    @cached_property
+    def touching(self) -> list[NDArray[np.int64]]:
+        """Groups of contacts that touch, or nearly, at the start: linked by moving trees."""
+        near = np.flatnonzero(self.found.gap <= NEAR * np.where(np.isfinite(self.thickness), self.thickness, 0.0))
+        group: dict[int, int] = {}
+
+        def first(tree: int) -> int:
+            while group.setdefault(tree, tree) != tree:
+                tree = group[tree]
+            return tree
+
+        for i in near.tolist():
+            trees = self.trees(i)
+            for tree in trees[1:]:
+                group[first(tree)] = first(trees[0])
+        found: dict[int, list[int]] = {}
+        for i in near.tolist():
+            found.setdefault(first(self.trees(i)[0]), []).append(i)
+        return [np.array(rows) for rows in found.values()]
+
+    def trees(self, i: int) -> list[int]:
+        """The trees that contact i touches."""
+        bodies = [int(b) for b in (self.found.body_a[i], self.found.body_b[i]) if b >= 0]
+        return list(dict.fromkeys(int(self.mechanism.tree_of_body[b]) for b in bodies))
+
+    @cached_property
+    def supports(self) -> list[NDArray[np.int64]]:
+        """Groups that carry loads: those that touch, and of a tree that touches nothing what it falls on first."""
+        touched = {tree for rows in self.touching for i in rows for tree in self.trees(i)}
+        pull = self.rows @ self.moved(self.applied[None])[:, 0]
+        falls: dict[int, tuple[float, NDArray[np.int64]]] = {}
+        for rows in self.by_pair:
+            tree, gap = self.trees(rows[0])[0], float(self.found.gap[rows[0]])
+            free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # of a linkage the pose would change
+            flat = len(rows) > 1 or self.shapes.radius[self.found.shape_a[rows[0]]] > 0.0  # not on one corner
+            if tree in touched or not (free and flat and pull[rows[0]] < 0.0):
+                continue
+            if gap < falls.get(tree, (math.inf, rows))[0]:
+                falls[tree] = gap, rows
+        return [*self.touching, *(rows for _, rows in falls.values())]
+
+    @cached_property
+    def resting(self) -> Floats:
+        """Forces (c,) [N] at the contacts that touch, where the scene would stay as it starts."""
+        force = np.zeros(len(self.found.gap))
+        for rows in self.touching:
+            force[rows] = self.loads(rows)
+        return force
+
+    def names(self, rows: Iterable[int]) -> str:
+        """The things that contacts join: "box and floor", or the first of many."""
+        shapes = [s for i in rows for s in (int(self.found.shape_a[i]), int(self.found.shape_b[i]))]
+        named = list(dict.fromkeys(self.labels[s] for s in shapes))
+        return " and ".join(named) if len(named) < 3 else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
+
+    def mobility(self, rows: Floats) -> float:
+        """Largest eigenvalue of J M⁻¹ Jᵀ [1/kg]."""
+        return float(np.linalg.eigvalsh(rows @ self.moved(rows))[-1]) if len(rows) else 0.0
+
+    @cached_property
+    def critical(self) -> tuple[tuple[float, NDArray[np.int64]], tuple[float, NDArray[np.int64]]]:
+        """Largest mobility [1/kg], with the contacts, of those that touch together and of one pair that meets."""
+        nobody = (0.0, np.zeros(0, np.int64))
+        pairs = [rows for rows in self.by_pair if self.is_near(rows[0])]
+        lasting, meeting = ([(self.mobility(self.rows[rows]), rows) for rows in each]
+                            for each in ([*self.touching, *pairs], pairs))
+        return tuple(max(each, key=lambda one: one[0], default=nobody)  # type: ignore[return-value]
+                     for each in (lasting, meeting))
+
+    def is_near(self, i: int) -> bool:
+        """Whether the row of contact i is that of a touch: two boxes in space must be near for that."""
+        boxes = self.shapes.kind[self.found.shape_a[i]] == BOX and self.shapes.kind[self.found.shape_b[i]] == BOX
+        return not boxes or bool(self.found.gap[i] <= self.thickness[i])
+
+    def loads(self, rows: NDArray[np.int64]) -> Floats:
+        """Forces p >= 0 (c,) [N] at the contacts of a group that hold gravity and the hand: W p = −J M⁻¹ f."""
+        J, force = self.rows[rows], np.zeros(len(rows))
+        W, wanted = J @ self.moved(J), -J @ self.moved(self.applied[None])[:, 0]
+        pushing = np.ones(len(rows), np.bool_)
+        for _ in range(len(rows)):
+            force[:] = 0.0
+            force[pushing] = np.linalg.lstsq(W[np.ix_(pushing, pushing)], wanted[pushing], rcond=1e-12)[0]
+            if (force >= 0.0).all():
+                break
+            pushing &= force > 0.0  # what would pull carries nothing
+        return np.clip(force, 0.0, self.total_load)  # more is what wedges and levers make of it, in other poses less
+
+    @cached_property
+    def total_load(self) -> float:
+        """All weights and the hand's force [N]."""
+        hand = self.scene.hand
+        pushed = float(np.linalg.norm(hand.force[: 2 if len(hand.force) == 3 else 3])) if hand is not None else 0.0
+        return float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies) + pushed
+
+
+def _room(shapes: Shapes, pairs: NDArray[np.int32], few: bool) -> int:
+    """Contacts that the pairs give where none is left out for its distance: a corner each, and faces clipped."""
+    if not few:
+        return contact_capacity(shapes, pairs)
+    corners = np.where(shapes.kind == BOX, 8, np.maximum(shapes.count, 2))
+    return int(corners[pairs].sum()) + 32
+
+
+def _smallest_extent(shapes: Shapes, i: int) -> float:
+    """Smallest width of a shape [m]; infinite for half-planes and half-spaces."""
+    if shapes.kind[i] in ENDLESS:
+        return math.inf
+    if shapes.kind[i] == BOX:
+        return 2.0 * float(shapes.half_size[i].min())
+    if shapes.kind[i] != POLYGON:
+        return 2.0 * float(shapes.radius[i])
+    corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+    return float((np.einsum("ei,vi->ev", normals, corners) - np.sum(normals * corners, axis=1)[:, None]).max(1).min())
+
+
+def holds(integrator: Integrator, k: float, b: float) -> bool:
+    """Whether a contact with k = K Δt²/m and b = B Δt/m does not swing up."""
+    def step(x: float, v: float) -> tuple[float, float]:
+        q, rate = integrator.step(
+            lambda q, v, dt: q + dt * v, lambda q, v: -k * q - b * v, np.array([x]), np.array([v]), 1.0)
+        return float(q[0]), float(rate[0])
+
+    (a, c), (d, e) = step(1.0, 0.0), step(0.0, 1.0)
+    return float(np.abs(np.linalg.eigvals([[a, d], [c, e]])).max()) <= 1.0 + ROUNDED
+
+
+def _largest(good: Any, high: float) -> float:
+    """Largest x in (0, high] with good(x), 0 where there is none; good is true below some x."""
+    if good(high):
+        return high
+    low = 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low if low > 1e-9 * high else 0.0
+
+
+def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLimits | None:
+    """Return what the step can hold at the contacts that hold least; None where nothing can touch."""
+    lasting, meeting = start.critical
+    found = [_limits(start, INTEGRATORS[integrator], *one, thrown) for one, thrown in ((lasting, math.inf),
+                                                                                      (meeting, THROWN)) if one[0]]
+    return min(found, key=lambda one: (one.stiffness, one.damping), default=None)
+
+
+def _limits(start: Start, method: Integrator, mobility: float, rows: NDArray[np.int64], most: float) -> StepLimits:
+    """Largest stiffness, damping and step that hold at contacts of one mobility, with k at most `most`."""
+    dt, contact = start.dt, start.scene.contact
+    k, b = contact.stiffness * mobility * dt**2, contact.damping * mobility * dt
+    stiffness = _largest(lambda x: x <= most and holds(method, x, b), 4.0) / (mobility * dt**2)
+    damping = _largest(lambda x: holds(method, k, x), 4.0) / (mobility * dt)
+    longest = _largest(lambda x: k * x**2 <= most and holds(method, k * x**2, b * x), 1e6) * dt
+    rate = 1.0 / longest if longest else math.inf
+    return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness, damping, rate)
+
+
+def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, ...]:
+    """Say what makes a run of this scene worthless, before it is run.
+
+    Parameters
+    ----------
+    scene : Scene
+    law : contact law; default `ImpulseAugmented()`. What a law does not use is not looked at.
+
+    Returns
+    -------
+    tuple of Caution
+        Empty where nothing is wrong.
+    """
+    chosen: Any = ImpulseAugmented() if law is None else law
+    start = Start(settled(scene)[0])
+    uses: frozenset[str] = getattr(chosen, "uses", frozenset())
+    found = [*_overlaps(start), *_fast(start)]
+    if PENALTY in uses:
+        found += [*_too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler")), *_sags(start)]
+    if FRICTION in uses and PENALTY in uses:
+        found += _overdriven_friction(start)
+    return tuple(found)
+
+
+def _overlaps(start: Start) -> Iterator[Caution]:
+    """Shapes that start inside each other, behind a wall, or in a gap narrower than they are."""
+    found = start.found
+    sides: dict[int, list[int]] = {}
+    for rows in start.by_pair:
+        i = int(rows[0])
+        depth, size = -float(found.gap[i]), float(start.thickness[i])
+        if depth <= 0.0 or not _too_deep(start, rows):
+            continue
+        if found.body_b[i] < 0:
+            sides.setdefault(int(found.body_a[i]), []).append(i)
+        a, b = start.labels[found.shape_a[i]], start.labels[found.shape_b[i]]
+        out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
+        stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
+        if start.shapes.kind[found.shape_b[i]] in ENDLESS and depth >= size:
+            yield Caution("outside", f"{a} and {b}", f"{a} starts behind {b}, {_length(depth)} deep: "
+                          f"move it by [{out}] m")
+        elif float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0]) <= 1e-12 * start.critical[0][0]:
+            yield Caution("overlap", f"{a} and {b}", f"{a} starts {_length(depth)} inside {b}, and no joint can move "
+                          f"it out: move it by [{out}] m, or take the shape or the wall away")
+        else:
+            yield Caution("overlap", f"{a} and {b}", f"{a} starts {_length(depth)} inside {b}, and {stored:.3g} J in "
+                          f"the contact's spring throw it out: move it by [{out}] m")
+    for rows_of_body in sides.values():
+        for n, i in enumerate(rows_of_body):
+            against = [j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5]
+            for j in against[:1]:
+                a, b, c = (start.labels[s] for s in (found.shape_a[i], found.shape_b[j], found.shape_b[i]))
+                wide = -float(found.gap[i] + found.gap[j])
+                yield Caution("wedged", f"{a}, {b}, {c}", f"{a} stands in a gap between {b} and {c} that is "
+                              f"{_length(wide)} narrower than it: widen the gap, or make {a} smaller")
+
+
+def _too_deep(start: Start, rows: NDArray[np.int64]) -> bool:
+    """Whether a pair starts deeper than at rest: by depth, or by what its springs hold."""
+    gap = np.minimum(start.found.gap[rows], 0.0)
+    depth, size, K = -float(gap.min()), float(start.thickness[rows[0]]), start.scene.contact.stiffness
+    if depth * K <= 2.0 * float(start.resting[rows].max()):
+        return False
+    if depth > DEEP * size:
+        return True
+    moved = start.moved(start.rows[rows])
+    mass = 1.0 / max(float(np.max(np.sum(start.rows[rows] * moved.T, axis=1))), 1e-300)
+    closing = float(np.abs(start.rows[rows] @ start.v).max())
+    weight = float(np.abs(start.rows[rows] @ start.moved(start.applied[None])[:, 0]).max()) * mass
+    usual = 0.5 * mass * closing**2 + weight * DEEP * size
+    usual = max(usual, 0.5 * mass * size**2)  # its size in a second
+    return depth > 1e-6 * size and 0.5 * K * float(np.sum(gap**2)) > usual
+
+
+def _fast(start: Start) -> Iterator[Caution]:
+    """Bodies that move by more than half of a shape in the step that meets it."""
+    pull = start.rows @ start.moved(start.applied[None])[:, 0]
+    for rows in start.by_pair:
+        i = int(rows[0])
+        gap, size = max(float(start.found.gap[i]), 0.0), float(start.thickness[i])
+        approach, force = -float(start.rows[i] @ start.v), -float(pull[i])
+        if approach <= 0.0 and force <= 0.0 or approach**2 + 2.0 * force * gap < 0.0:
+            continue
+        speed = math.sqrt(approach**2 + 2.0 * force * gap)
+        late = 2.0 * gap > (approach + speed) * start.scene.duration
+        if late or speed * start.dt <= 0.5 * size:
+            continue
+        thin, other = (start.labels[s] for s in _thin_first(start, i))
+        yield Caution("fast", f"{thin} and {other}", f"{other} meets {thin} at {speed:.3g} m/s, "
+                      f"{_length(speed * start.dt)} in a step, and the thinner is {_length(size)}: it sinks in or "
+                      f"passes through; set rate >= {_up(4.0 * speed / size)} Hz")
+
+
+def _thin_first(start: Start, i: int) -> tuple[int, int]:
+    a, b = int(start.found.shape_a[i]), int(start.found.shape_b[i])
+    return (a, b) if start.size[a] < start.size[b] else (b, a)
+
+
+def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
+    """Stiffness or damping beyond what the step can hold."""
+    limits, contact = step_limits(start, integrator), start.scene.contact
+    if limits is None or (contact.stiffness <= limits.stiffness and contact.damping <= limits.damping):
+        return
+    many = f"{limits.contacts} contact{'s' * (limits.contacts > 1)}"
+    who = f"{limits.where} ({many}, effective mass {limits.mass:.3g} kg)"
+    remedy = f"or rate >= {_up(limits.rate)} Hz" if math.isfinite(limits.rate) else "or another integrator"
+    if limits.stiffness == 0.0:
+        yield Caution("damping", limits.where, f"contact.damping = {contact.damping:g} N s/m is more than a step of "
+                      f"{start.scene.rate:g} Hz can hold at {who}: set contact.damping <= "
+                      f"{_down(limits.damping)}, {remedy}")
+    else:
+        yield Caution("stiffness", limits.where, f"contact.stiffness = {contact.stiffness:g} N/m is more than a step "
+                      f"of {start.scene.rate:g} Hz can hold at {who}: set contact.stiffness <= "
+                      f"{_down(limits.stiffness)}, {remedy}")
+
+
+def _sags(start: Start) -> Iterator[Caution]:
+    """Loads that press a contact in by more than a tenth of a shape."""
+    K = start.scene.contact.stiffness
+    worst: tuple[float, int] = (SAG, -1)
+    for rows in start.supports if K > 0.0 else ():
+        shares = start.loads(rows) / (K * start.thickness[rows])
+        worst = max(worst, (float(shares.max()), int(rows[shares.argmax()])))
+    share, i = worst
+    if i < 0:
+        return
+    a, b = (start.labels[s] for s in (start.found.shape_a[i], start.found.shape_b[i]))
+    yield Caution("sag", f"{a} and {b}", f"at rest {a} and {b} overlap by {_length(share * start.thickness[i])}, "
+                  f"{share:.0%} of the thinner: set contact.stiffness >= {_up(K * share / SAG)}")
+
+
+def _overdriven_friction(start: Start) -> Iterator[Caution]:
+    """Regularised friction (6), an explicit damper μN/v_thr, that turns a motion round within a step."""
+    contact = start.scene.contact
+    if contact.friction_law != "regularised" or contact.friction == 0.0:
+        return
+    worst, where = 2.0, np.zeros(0, np.int64)
+    for rows in start.supports:
+        force = start.loads(rows)
+        root = np.sqrt(contact.friction * force * start.dt / contact.friction_velocity)
+        tangents = [(start._row(i, t), r) for i, r in zip(rows, root, strict=True) for t in _tangents(start, i)]
+        found = start.mobility(np.array([r * row for row, r in tangents]))
+        if found > worst * (1.0 + ROUNDED):
+            worst, where = found, rows
+    if len(where):
+        speed = contact.friction_velocity * worst / 2.0
+        yield Caution("friction", start.names(where), f"friction (6) at {start.names(where)} turns motion round within "
+                      f"a step, {0.5 * worst:.3g} times beyond its limit μ N Δt = 2 m v_threshold: set "
+                      f"contact.friction_velocity >= {_up(speed)}, or contact.friction_law: coulomb")
+
+
+def _tangents(start: Start, i: int) -> Floats:
+    axes = frame_along("normal", start.found.normal[i])
+    n = start.found.normal[i]
+    return axes[:, :2].T if start.spatial else np.array([[-n[1], n[0], 0.0]])
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.3g} m" if metres >= 1.0 else f"{1e3 * metres:.3g} mm"
+
+
+def _down(x: float, digits: int = 2) -> str:
+    """A number of two digits that is not above x."""
+    return f"{_two_digits(x, math.floor, digits):g}"
+
+
+def _up(x: float, digits: int = 2) -> str:
+    """A number of two digits that is not below x."""
+    return f"{_two_digits(x, math.ceil, digits):g}"
+
+
+def _two_digits(x: float, way: Any, digits: int = 2) -> float:
+    if not (0.0 < x < math.inf):
+        return x
+    power = math.floor(math.log10(x)) - digits + 1
+    slack = 1.0 + ROUNDED if way is math.floor else 1.0 - ROUNDED
+    return float(f"{way(x * slack / 10.0**power)}e{power}")
+
+
+# What `contact.auto` chooses
+
+AUTO_K, AUTO_B = 0.2, 0.5  # k and b of the most critical contacts: k + 2 b = 1.2, far below 4; nearly critical damping
+SPARE = 2.0  # contacts that come together later are up to so much lighter than those at the start
+
+
+def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str, ...]]:
+    """Return the scene with what `contact.auto` chooses, and what is said of it; the scene itself without auto."""
+    if not scene.contact.auto:
+        return scene, ()
+    start = Start(scene) if start is None else start
+    mobility, rows = start.critical[0]
+    mobility *= SPARE if len(start.blocks) > 1 else 1.0
+    if mobility == 0.0:
+        return scene.with_values({"contact.auto": False}), ()
+    dt, given = start.dt, scene.contact.model_fields_set
+    choice: dict[str, float] = {}
+    if "stiffness" not in given:
+        choice["stiffness"] = min(_two_digits(AUTO_K / (mobility * dt**2), math.floor), 1e9)
+    if "damping" not in given:
+        K = choice.get("stiffness", scene.contact.stiffness)
+        most = AUTO_B * min(1.0, math.sqrt(K * mobility * dt**2 / AUTO_K))  # softer springs want less
+        choice["damping"] = min(_two_digits(most / (mobility * dt), math.floor), 1e9)
+    if "coherence_distance" not in given:
+        choice["coherence_distance"] = _two_digits(2.0 * _top_speed(start) * dt, math.ceil)
+    said = ("contact.auto chose " + ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
+            + f": effective mass {1.0 / mobility:.3g} kg at {start.names(rows)}, {scene.rate:g} Hz")
+    return scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()}), (said,)
+
+
+_UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
+
+
+def _top_speed(start: Start) -> float:
+    """Fastest that a contact point can get, by its start and by a fall or push through the scene's length [m/s]."""
+    length = float(np.ptp(start.found.point, axis=0).max()) if len(start.found.gap) else 0.0
+    push = np.abs(start.rows @ start.moved(start.applied[None])[:, 0]).max(initial=0.0)
+    speed = np.abs(start.rows @ start.v).max(initial=0.0)
+    return float(math.sqrt(speed**2 + 2.0 * push * length))
+
+
+# After a run
+
+
+def distrust_of(run: Run) -> tuple[str, ...]:
+    """Say why a result is not to be trusted, from the record alone; empty where nothing is wrong."""
+    if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
+        return ("positions or velocities are not finite",)
+    return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _flew(run)) if found)
+
+
+def _at_hand(run: Run) -> tuple[float, float]:
+    """Energy in springs at the start, and all that the run may show [J]: start, springs, fallen through, worked in."""
+    energy, contact = run.energy, run.scene_resolved.get("contact", {})
+    first = slice(int(run.contacts.offsets[0]), int(run.contacts.offsets[1])) if run.steps else slice(0, 0)
+    stored = 0.5 * contact.get("stiffness", 0.0) * float(np.sum(np.minimum(run.contacts.gap[first], 0.0) ** 2))
+    fallen = float(energy["potential"][0] - energy["potential"].min())
+    worked = sum(float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work"))
+    return stored, float(energy["kinetic"][0]) + stored + fallen + worked
+
+
+def _made_energy(run: Run) -> str:
+    """Energy above start plus work."""
+    energy = run.energy
+    if not {"kinetic", "potential", "hand_work", "coupling_work"} <= set(energy) or not run.steps:
+        return ""
+    stored, at_hand = _at_hand(run)
+    total = energy["kinetic"] + energy["potential"]
+    allowed = total[0] + stored + energy["hand_work"] + energy["coupling_work"]
+    excess = total[1:] - allowed
+    k = int(np.argmax(excess))
+    if excess[k] <= UNACCOUNTED * at_hand + _trifle(run):
+        return ""
+    return (f"its energy is {excess[k]:.3g} J above start and work at {run.time[k + 1]:.4g} s, where these are "
+            f"{at_hand:.3g} J")
+
+
+def _trifle(run: Run) -> float:
+    """Energy too small to count [J]: of lifting the bodies by a thousandth of their size."""
+    gravity = float(np.linalg.norm(run.scene_resolved.get("gravity") or [0.0]))
+    return 1e-3 * gravity * sum(body.get("mass", 0.0) * _size(body.get("shapes", ()), 0.0)
+                                for body in run.scene_resolved.get("bodies", ()))
+
+
+def _friction_drove(run: Run) -> str:
+    """Friction that did work on the bodies."""
+    work = run.energy.get("friction_work")
+    if work is None or not len(work) or not {"hand_work", "coupling_work"} <= set(run.energy):
+        return ""
+    most, (_, at_hand) = float(work.max()), _at_hand(run)
+    return f"friction drove the bodies, by {most:.3g} J" if most > UNACCOUNTED * at_hand + _trifle(run) else ""
+
+
+def _size(shapes: Iterable[dict[str, Any]], without: float = math.inf) -> float:
+    """Smallest extent among plain shapes of the scene [m]."""
+    sizes = []
+    for shape in shapes:
+        if "radius" in shape:
+            sizes.append(2.0 * shape["radius"])
+        elif "size" in shape:
+            sizes.append(min(shape["size"]))
+        elif "vertices" in shape:
+            sizes.append(float(np.ptp(np.array(shape["vertices"]), axis=0).min()))
+    return min(sizes, default=without)
+
+
+def _sank(run: Run) -> str:
+    """Penetration above half a shape."""
+    bodies = run.scene_resolved.get("bodies", [])
+    if not len(run.contacts.gap) or len(bodies) != len(run.body_names):
+        return ""
+    sizes = np.array([*(_size(body.get("shapes", ())) for body in bodies), math.inf])  # the world is -1, the last
+    thinner = np.minimum(sizes[run.contacts.body_a], sizes[run.contacts.body_b])
+    i = int(np.argmin(run.contacts.gap / thinner))
+    if -run.contacts.gap[i] <= 0.5 * thinner[i]:
+        return ""
+    k = int(np.searchsorted(run.contacts.offsets, i, "right")) - 1
+    a, b = (run.body_names[x] if x >= 0 else "a wall" for x in (run.contacts.body_a[i], run.contacts.body_b[i]))
+    return (f"{a} and {b} overlap by {_length(-float(run.contacts.gap[i]))} at {run.time[k]:.4g} s, more than half of "
+            f"{_length(float(thinner[i]))}")
+
+
+def _flew(run: Run) -> str:
+    """Positions that no start, speed and acceleration explain."""
+    lengths = [i for i, unit in enumerate(run.coordinate_units) if unit == "m"]
+    if not lengths or not run.steps:
+        return ""
+    scene, time = run.scene_resolved, float(run.time[-1])
+    masses = [body["mass"] for body in scene.get("bodies", ()) if body.get("mass")]
+    push = float(np.linalg.norm(((scene.get("hand") or {}).get("force") or [0.0])[:2])) / min(masses, default=1.0)
+    acceleration = float(np.linalg.norm(scene.get("gravity") or [0.0])) + push
+    reach = float(np.abs(run.q[0]).max() + np.abs(run.v[0]).max() * time + 0.5 * acceleration * time**2)
+    reach += max((_size(body.get("shapes", ()), 0.0) for body in scene.get("bodies", ())), default=0.0)
+    moved = np.abs(run.q[:, lengths] - run.q[0, lengths]).max(axis=0)
+    i = int(moved.argmax())
+    if moved[i] <= WILD * reach:
+        return ""
+    far = _length(float(moved[i]))
+    return f"{run.coordinate_names[lengths[i]]} moves by {far}, where {_length(reach)} can be explained"

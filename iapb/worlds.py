@@ -1,0 +1,64 @@
+"""Worlds by name: a contact law and a coupling. The engine's are here; `reference.worlds` adds the rigid ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError
+from iapb.haptics.coupling import Coupling
+from iapb.lazy import load_extensions
+from iapb.names import one_of
+from iapb.scene import Scene
+from iapb.system import coupling_of
+
+
+class World(NamedTuple):
+    """A named combination; the coupling's gains come from the scene."""
+
+    name: str
+    law: ContactLaw
+    coupling: str
+
+    def coupling_in(self, scene: Scene) -> Coupling:
+        """The coupling with the scene's gains; none where the scene has no hand or gives no gains at all."""
+        gains = scene.couplings
+        without = scene.hand is None or (gains.four_channel is None and gains.unilateral is None)
+        return coupling_of(scene, "none" if without else self.coupling)
+
+
+# name -> (how IAPB meets the device's limits) -> world
+WORLDS: dict[str, Callable[[str], World]] = {
+    "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
+    "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
+    "IAPB-friction": lambda rendering: World(
+        "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
+    ),
+    "IAPB-push": lambda rendering: World(
+        "IAPB-push", ImpulseAugmented(rendering=rendering, pushing=True), "four-channel"
+    ),
+}
+
+
+def find_world(name: str, rendering: str = "full") -> World:
+    """Return the world of that name.
+
+    Parameters
+    ----------
+    name : a key of `WORLDS`
+    rendering : how IAPB meets the device's limits: full (ignores them), saturate, scale or spread
+
+    Raises
+    ------
+    ArgumentError
+        There is no such world, or its law has no impulses that a rendering could fit.
+    """
+    if name not in WORLDS:
+        load_extensions("iapb.worlds")
+    if name not in WORLDS:
+        raise ArgumentError("world", name, one_of(name, WORLDS))
+    world = WORLDS[name](rendering)
+    if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
+        raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")
+    return world

@@ -1,0 +1,188 @@
+"""Warnings before a run and distrust after it: each number in closed form, and nothing said of what is right."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.checks import Start, check_scene, distrust_of, settled, step_limits
+from iapb.contact.laws import ImpulseAugmented
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text, scene_names
+from iapb.simulation import simulate
+
+FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
+SIDE, MASS = 0.1, 1.0
+INERTIA = MASS * SIDE**2 / 6.0
+
+
+def box(i: int = 0, height: float = 0.0, **values: Any) -> dict[str, Any]:
+    return {"name": f"box_{i}", "joint": "planar", "mass": MASS, "inertia": INERTIA,
+            "shapes": [{"kind": "box", "size": [SIDE, SIDE]}], "position": [0, 0.5 * SIDE + height, 0], **values}
+
+
+def scene(*bodies: dict[str, Any], walls: Any = (FLOOR,), rate: float = 1000.0, duration: float = 0.2,
+          gravity: Any = (0, -9.81), **contact: Any) -> Scene:
+    return Scene.model_validate({
+        "name": "made", "rate": rate, "duration": duration, "gravity": gravity, "bodies": list(bodies),
+        "walls": list(walls), "contact": contact})
+
+
+def kinds(found: Scene) -> set[str]:
+    return {caution.kind for caution in check_scene(found)}
+
+
+@pytest.mark.parametrize("damping", [0.0, 50.0, 150.0])
+def test_the_step_holds_k_plus_2b_up_to_4_at_the_lightest_mode_of_a_box_on_two_corners(damping: float) -> None:
+    """Rocking: J M⁻¹ Jᵀ of two corners has the eigenvalue 2 a²/I = 3/m, a half a side; k ≤ 1 for what meets."""
+    limits, dt, mobility = step_limits(Start(scene(box(), damping=damping, stiffness=1e4))), 1e-3, 3.0 / MASS
+    assert limits is not None and limits.mass == pytest.approx(MASS / 3.0)
+    expected = min(1.0, 4.0 - 2.0 * damping * mobility * dt) / (mobility * dt**2)
+    assert limits.stiffness == pytest.approx(expected, rel=1e-6)
+    assert limits.damping == pytest.approx((4.0 - 1e4 * mobility * dt**2) / (2.0 * mobility * dt), rel=1e-6)
+
+
+def test_in_a_stack_all_contacts_swing_together() -> None:
+    """Heaving of n boxes on springs 2K: the largest eigenvalue of 2/m tridiag(−1, 2, −1), free end."""
+    n = 5
+    start = Start(scene(*(box(i, SIDE * i) for i in range(n))))
+    heave = 2.0 / MASS * (2.0 + 2.0 * math.cos(2.0 * math.pi / (2 * n + 1)))
+    assert start.critical[0][0] == pytest.approx(3.0 / 2.0 * heave, rel=1e-6)  # the same chain, rocking
+
+
+def test_what_no_damping_makes_stable_under_the_midpoint_rule_is_said() -> None:
+    limits = step_limits(Start(scene(box(), damping=0.0)), "midpoint")
+    assert limits is not None and limits.stiffness < 1e-3 * MASS / 3.0 / 1e-6
+
+
+def test_too_stiff_is_said_with_a_stiffness_and_a_rate_that_are_right() -> None:
+    made = scene(box(height=0.15), stiffness=1e9)
+    (caution,) = check_scene(made)
+    assert caution.kind == "stiffness" and "<= 330000" in caution.text and "rate >= 55000 Hz" in caution.text
+    assert not check_scene(made.with_values({"contact.stiffness": 330000.0}))
+    assert not check_scene(made.with_values({"rate": 55000.0}))
+    assert kinds(scene(box(), stiffness=1e4, damping=2000.0)) == {"damping"}
+
+
+def test_sag_is_the_weight_above_over_two_springs() -> None:
+    made = scene(*(box(i, SIDE * i) for i in range(5)))
+    (caution,) = check_scene(made)
+    assert caution.kind == "sag" and f"{1e3 * 5 * MASS * 9.81 / 2000.0:.3g} mm" in caution.text
+    assert not check_scene(made.with_values({"contact.stiffness": 2500.0}))
+
+
+def test_regularised_friction_is_judged_by_its_limit() -> None:
+    """Sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m + h²/I) N = 2.5 g here."""
+    made = scene(box(), stiffness=1e4, friction=0.5, friction_law="regularised")
+    (caution,) = check_scene(made)
+    least = 0.5 * 0.5 * 9.81 * 2.5 * 1e-3
+    assert caution.kind == "friction" and f">= {math.ceil(1e4 * least) / 1e4:g}" in caution.text
+    assert not check_scene(made.with_values({"contact.friction_velocity": 1.01 * least}))
+    assert not check_scene(made.with_values({"contact.friction_law": "coulomb"}))
+
+
+@pytest.mark.parametrize(("height", "kind"), [(-5.0, "outside"), (-0.03, "overlap"), (-4e-4, None)])
+def test_bodies_that_start_inside_or_behind_a_wall_are_named(height: float, kind: str | None) -> None:
+    found = check_scene(scene(box(height=height), stiffness=1e4))
+    assert [caution.kind for caution in found] == ([kind] if kind else [])
+    assert all(f"move it by [0, {-height:g}] m" in caution.text for caution in found)
+
+
+def test_a_stack_that_starts_where_its_springs_carry_it_is_no_overlap() -> None:
+    assert not check_scene(load_scene(find_scene("box_stack")))
+
+
+def test_a_body_wider_than_its_gap_is_wedged() -> None:
+    walls = [{"name": name, "kind": "box", "size": [0.2, 2], "center": [x, 0]}
+             for name, x in (("l", -0.13), ("r", 0.13))]
+    found = check_scene(scene(box(height=-0.05), walls=walls, stiffness=1e4))
+    assert [caution.kind for caution in found] == ["overlap", "overlap", "wedged"] and "40 mm" in found[-1].text
+
+
+def test_a_link_that_no_joint_can_move_out_of_a_wall() -> None:
+    post = {"name": "post", "kind": "box", "size": [0.2, 0.2], "center": [0, 0]}
+    slide = box(height=-0.05, joint="prismatic", axis=[0, 1], position=[0.0])
+    found = check_scene(scene(slide, walls=[post | {"size": [0.12, 2.0]}], stiffness=1e4))
+    assert any("no joint can move it out" in caution.text for caution in found)
+
+
+@pytest.mark.parametrize(("speed", "said"), [(-100.0, True), (-10.0, False)])
+def test_what_passes_half_a_shape_in_a_step_is_said(speed: float, said: bool) -> None:
+    plate = {"name": "plate", "kind": "box", "size": [1.0, 0.05], "center": [0, 0]}
+    made = scene(box(height=0.5, velocity=[0, speed, 0]), walls=[plate], stiffness=1e4)
+    assert ("fast" in kinds(made)) == said
+
+
+def test_a_law_without_springs_hears_nothing_of_stiffness() -> None:
+    class Rigid:
+        name, settings, uses = "rigid", {}, frozenset({"impulses"})
+
+        def advance(self, *_: Any) -> Any:
+            raise NotImplementedError
+
+    assert not check_scene(scene(box(height=0.15), stiffness=1e9), Rigid())
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_shipped_scenes_get_no_warning(name: str) -> None:
+    assert not check_scene(load_scene(find_scene(name)))
+
+
+# contact: auto
+
+
+def test_auto_chooses_what_the_step_holds_and_what_is_given_stays() -> None:
+    text = "name: made\nrate: 1000\nduration: 0.1\ngravity: [0, -9.81]\nbodies:\n  - {name: b, joint: planar, " \
+           "mass: 1, inertia: 0.0016666666, shapes: [{kind: box, size: [0.1, 0.1]}], position: [0, 0.2, 0]}\nwalls:\n" \
+           "  - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}\n"
+    chosen, (said,) = settled(scene_from_text(text + "contact: auto\n"))
+    assert chosen.contact.stiffness == 66000.0 and chosen.contact.damping == 160.0  # 0.2 and 0.5 of m/3 and steps
+    assert "stiffness = 66000 N/m" in said and not check_scene(chosen)
+    given, (said,) = settled(scene_from_text(text + "contact: {auto: true, stiffness: 2000, friction: 0.3}\n"))
+    assert given.contact.stiffness == 2000.0 and given.contact.friction == 0.3 and "stiffness" not in said
+    lighter = scene_from_text(text + "contact: auto\n")
+    heavier = lighter.with_values({"bodies.b.mass": 2.0, "bodies.b.inertia": 0.003333})
+    assert settled(heavier)[0].contact.stiffness == pytest.approx(2 * 66000.0, rel=0.02)
+    again = scene_from_text(chosen.source_text)
+    assert again == chosen and settled(again) == (again, ())
+
+
+def test_auto_carries_a_stack_for_a_second_and_the_run_says_what_was_chosen() -> None:
+    made = scene(*(box(i, SIDE * i) for i in range(5)), duration=0.3, auto=True)
+    run = simulate(made)
+    assert run.scene_resolved["contact"]["stiffness"] == settled(made)[0].contact.stiffness
+    assert not run.distrust and "contact.auto chose" in run.remarks[0]
+    sag = 15.0 * MASS * 9.81 / (2.0 * run.scene_resolved["contact"]["stiffness"])  # of the top box: 5 + 4 + 3 + 2 + 1
+    assert np.abs(run.q[-1] - run.q[0]).max() < 1.2 * sag
+
+
+# After a run
+
+
+def run_of(made: Scene, law: Any = None) -> Any:
+    return simulate(made, law or ImpulseAugmented())
+
+
+def test_a_run_that_gains_energy_says_so() -> None:
+    run = run_of(scene(box(height=0.05), stiffness=1e9, duration=0.2))
+    assert any("above start and work" in why for why in run.distrust)
+    assert "not to be trusted" in repr(run) and "Not to be trusted" in run._repr_html_()
+
+
+def test_a_run_that_is_right_is_trusted_and_each_reason_is_found_in_its_arrays() -> None:
+    run = run_of(scene(box(height=0.01), stiffness=1e4, duration=0.1))
+    assert run.distrust == distrust_of(run) == () and len(repr(run)) < 160
+    gained = run.energy["kinetic"] + np.linspace(0.0, 1.0, run.steps + 1)
+    assert "above start" in distrust_of(replace(run, energy=run.energy | {"kinetic": gained}))[0]
+    driven = np.linspace(0.0, 1.0, run.steps)
+    assert "friction drove" in distrust_of(replace(run, energy=run.energy | {"friction_work": driven}))[0]
+    deep = replace(run.contacts, gap=run.contacts.gap - 0.51 * SIDE)
+    assert "more than half of 100 mm" in distrust_of(replace(run, contacts=deep))[0]
+    far = run.q.copy()
+    far[-1, 0] = 1e3
+    assert "can be explained" in distrust_of(replace(run, q=far))[0]
+    far[-1, 0] = np.nan
+    assert distrust_of(replace(run, q=far)) == ("positions or velocities are not finite",)
