@@ -22,17 +22,16 @@ from verification.complementarity.convergence import ConvergenceRow
 from verification.complementarity.extensions import compare_friction, compare_unequal, struck_bar
 from verification.complementarity.problems import study_read
 from verification.complementarity.study import OWN, ComparisonStudy
-from verification.cost.step_cost import LEMKE_KERNEL, WAYS, CostRow, StepCostRow, impact_cost
-from verification.finding import VERDICTS, Table, titled
-
-NAN = float("nan")
+from verification.cost.step_cost import COST_COLUMNS, LEMKE_KERNEL, STEP_COLUMNS, WAYS, impact_cost
+from verification.finding import VERDICTS, Table, table_of, titled
 
 
 @pytest.fixture(scope="module")
 def study() -> ComparisonStudy:
     found = compare_cases(random_cases(2, seed=3))
-    left_out = CostRow("pile", 2, 3, "slow", "left out", NAN, NAN, NAN, 0, NAN, "left out: 9 s for fewer contacts")
-    wrong = CostRow("pile", 2, 3, "wrong", "failed", 2e-4, 1e-4, 3e-4, 3, 0.1)
+    pile, spread = {"impacts": "pile", "contacts": 2}, {"median": 200.0, "least": 100.0, "largest": 300.0}
+    unsolved = ({**pile, "solver": "slow", "outcome": "left out", "note": "left out: 9 s for fewer contacts"},
+                {**pile, "solver": "wrong", "outcome": "failed", **spread, "distance": 0.1})
     problems = [StoredProblem(ImpactProblem.from_delassus(np.eye(3), [-1.0, 0.2, 0.0], 0.0, mu, name=f"ball {mu}"))
                 for mu in (None, 0.5)]  # fmt: skip
     return ComparisonStudy(
@@ -40,8 +39,8 @@ def study() -> ComparisonStudy:
         compare_friction(2), compare_unequal(4), struck_bar(),
         (ConvergenceRow("two_discs", "automatic", False, 0.2, 1, 1.0, 0.9, 1.0, 1.0),
          ConvergenceRow("still", "automatic", False, 0.2, 0, 0.0, 0.0, 1.0, 1.1)),
-        (*impact_cost((1, 2), ("daqp",), 1), left_out, wrong),
-        tuple(StepCostRow("peg_corner", way, 2e-4, 1e-4, 3e-4, 3, 8) for way in WAYS),
+        table_of(COST_COLUMNS, [*impact_cost((1, 2), ("daqp",), 1).records(), *unsolved]),
+        table_of(STEP_COLUMNS, [{"scene": "peg_corner", "world": way, **spread} for way in WAYS]),
         (study_read(OWN, problems),),
     )  # fmt: skip
 

@@ -19,7 +19,6 @@ from verification.cost.step_cost import (
     KERNEL,
     LEMKE_KERNEL,
     PRINTED,
-    CostRow,
     costs_more,
     rivals,
     step_rivals,
@@ -31,6 +30,7 @@ from verification.finding import (
     REPRODUCED,
     Failure,
     Part,
+    Table,
     attempt,
     verdict_of_trials,
 )
@@ -241,35 +241,35 @@ def cost(study: ComparisonStudy) -> Part | None:
         decided = [pair for pair in pairs if pair.costs_more is not None]
         more = sum(bool(pair.costs_more) for pair in decided)
         found.append(f"{called}, a solver costs more than IAPB in {more} of {len(decided)} pairs that differ clearly")
-    rows = study.impact_costs
-    most, least = max(row.contacts for row in rows), min(row.contacts for row in rows)
-    parts = [_cost_part(rows, family, contacts) for family in dict.fromkeys(row.family for row in rows)
-             for contacts in sorted({least, most})]  # fmt: skip
+    costs = study.impact_costs
+    sizes = costs.column("contacts")
+    parts = [_cost_part(costs.where(impacts=family, contacts=contacts), family, contacts)
+             for family in dict.fromkeys(costs.column("impacts")) for contacts in sorted({min(sizes), max(sizes)})]
     return Part(f"C22, time per impact: {'; '.join(found)}. Medians: {'; '.join(parts)}.",
                 verdict_of_trials([pair.costs_more for pair in rivals(study.impact_costs)]),
                 "cost", timed=True)  # fmt: skip
 
 
-def _cost_part(rows: Sequence[CostRow], family: str, contacts: int) -> str:
-    here = {row.solver: row for row in rows if row.family == family and row.contacts == contacts}
-    others = [row for name, row in here.items() if name not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL)
-              and row.verdict == "solved"]  # fmt: skip
-    compiled, called = _seconds(here[KERNEL].median), _seconds(here[IAPB].median)
-    text = f"{family} of {contacts}: IAPB {compiled} compiled, {called} from Python"
-    if LEMKE_KERNEL in here and here[LEMKE_KERNEL].verdict == "solved":
-        text += f", Lemke {_seconds(here[LEMKE_KERNEL].median)} compiled"
+def _cost_part(costs: Table, family: str, contacts: int) -> str:
+    here = {row["solver"]: row for row in costs.records()}
+    times = {name: _seconds(1e-6 * row["median"]) for name, row in here.items() if row["median"] is not None}
+    solved = [name for name in times if here[name]["outcome"] == "solved"]
+    others = [name for name in solved if name not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL)]
+    text = f"{family} of {contacts}: IAPB {times[KERNEL]} compiled, {times[IAPB]} from Python"
+    if LEMKE_KERNEL in solved:
+        text += f", Lemke {times[LEMKE_KERNEL]} compiled"
     if not others:
         return text + ", no LCP solver from Python solved it"
-    best = min(others, key=lambda row: row.median)
-    return text + f", fastest from Python {best.solver} {_seconds(best.median)}"
+    best = min(others, key=lambda name: here[name]["median"])
+    return text + f", fastest from Python {best} {times[best]}"
 
 
 def steps(study: ComparisonStudy) -> Part | None:
     """C22, per step."""
     parts = []
-    for scene in dict.fromkeys(row.scene for row in study.step_costs):
-        here = {row.way: row.median for row in study.step_costs if row.scene == scene}
-        parts.append(f"{scene}: " + ", ".join(f"{way} {_seconds(value)}" for way, value in here.items()))
+    for scene in dict.fromkeys(study.step_costs.column("scene")):
+        here = study.step_costs.where(scene=scene).records()
+        parts.append(f"{scene}: " + ", ".join(f"{row['world']} {_seconds(1e-6 * row['median'])}" for row in here))
     if not parts:
         return None
     return Part("C22, time per step: " + "; ".join(parts) + ".",

@@ -31,8 +31,8 @@ from verification.complementarity.extensions import (
 from verification.complementarity.piles import PileRow, compare_piles
 from verification.complementarity.problems import ProblemStudy, own_problems, study_problems, study_read
 from verification.complementarity.scene_cases import impacts_of_run, scene_impacts
-from verification.cost.step_cost import CONTACTS, CostRow, StepCostRow, impact_cost, world_cost
-from verification.finding import Failure, attempt, of_each
+from verification.cost.step_cost import CONTACTS, impact_cost, world_cost
+from verification.finding import Failure, Table, attempt, of_each
 from verification.mechanics.engine_differences import SceneDifference, scene_difference
 
 Progress = Callable[[str, int, int], None]
@@ -92,8 +92,8 @@ class ComparisonStudy:
     unequal: tuple[UnequalCell, ...]
     bar: Mapping[str, float]
     convergence: tuple[ConvergenceRow, ...]
-    impact_costs: tuple[CostRow, ...]
-    step_costs: tuple[StepCostRow, ...]
+    impact_costs: Table
+    step_costs: Table
     problems: tuple[ProblemStudy, ...] = ()
     piles: tuple[PileRow, ...] = ()
     differences: tuple[SceneDifference, ...] = ()

@@ -22,14 +22,13 @@ from verification.complementarity.study import ComparisonStudy
 from verification.finding import Failure, Table, attempt, titled
 
 WORLD_SCENE = "peg_corner"
-SPREAD = ("median [µs]", "least [µs]", "largest [µs]")
 
 
 def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) -> dict[str, Table]:
     """Every table of the topic but the worlds, by name; `failures` receives those that cannot be made."""
     makers: dict[str, Callable[[], Table]] = {
         "map": partial(agreement, study), "two contacts": partial(two_contacts, study),
-        "time per impact": partial(impact_costs, study), "time per step": partial(step_costs, study),
+        "time per impact": lambda: study.impact_costs, "time per step": lambda: study.step_costs,
         "profile": partial(profile, study.problems), "convergence": partial(convergence, study),
         "friction": partial(friction, study), "unequal restitution": partial(unequal, study),
         "struck bar": partial(bar, study), "piles": partial(piles, study), "references": partial(references, study),
@@ -62,26 +61,6 @@ def two_contacts(study: ComparisonStudy) -> Table:
     rows = tuple((c.cosine, c.speed_ratio, c.predicted, c.found, c.distance) for c in study.two_contacts)
     return titled(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
                    "Two contacts whose rows have this cosine in the kinetic metric, closing at speeds 1 and r.")
-
-
-def impact_costs(study: ComparisonStudy) -> Table:
-    """A row per solver and size."""
-    rows = tuple(
-        (r.family, r.contacts, r.coordinates, r.solver, r.verdict, _known(r.median * 1e6), _known(r.least * 1e6),
-         _known(r.largest * 1e6), r.repeats, _known(r.distance), r.note)
-        for r in study.impact_costs
-    )  # fmt: skip
-    return titled(
-        ("impacts", "contacts", "coordinates", "solver", "outcome", *SPREAD, "samples", "distance", "note"), rows, 3,
-        "From M, J, v to v⁺, one thread, in turns. Kernels are called from compiled code, all others from Python, "
-        "their checks included.", timed=(*SPREAD, "note"))  # fmt: skip
-
-
-def step_costs(study: ComparisonStudy) -> Table:
-    """A row per scene and world."""
-    rows = tuple((r.scene, r.way, *(1e6 * value for value in (r.median, r.least, r.largest)), r.repeats)
-                 for r in study.step_costs)  # fmt: skip
-    return titled(("scene", "world", *SPREAD, "samples"), rows, 3, timed=SPREAD)
 
 
 def profile(studies: Iterable[ProblemStudy]) -> Table:

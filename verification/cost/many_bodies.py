@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from iapb.recording import make_record
 from iapb.scene import scene_from_text
 from iapb.simulation import Simulation
 from verification.clock import timed
-from verification.cost.growth import power_law
-from verification.finding import Failure, attempt
+from verification.finding import Column, Failure, Table, of_each, table_of
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 LEAST_BODIES = 20  # with fewer, overhead hides the growth
@@ -26,19 +25,11 @@ RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between the
 CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # chunks are short, so that some repeat of each is undisturbed
 
 
-@dataclass(frozen=True)
-class StepCost:
-    """seconds : per step; contacts : mean per step; impacts : in all.
-
-    pairs : of shapes that could touch; tested : those that the broad phase leaves to be tested, mean per step
-    """
-
-    bodies: int
-    seconds: float
-    contacts: float
-    impacts: int
-    pairs: int
-    tested: float
+# contacts : mean per step; pairs of shapes : that could touch; pairs tested : those that the broad phase leaves, mean
+COLUMNS = (
+    Column("bodies", condition=True), Column("step", "µs", timed=True), Column("contacts"), Column("pairs of shapes"),
+    Column("pairs tested"),
+)
 
 
 def field_of_discs(n: int) -> str:
@@ -58,19 +49,13 @@ def field_of_discs(n: int) -> str:
     ])  # fmt: skip
 
 
-def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | None = None) -> tuple[StepCost, ...]:
+def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | None = None) -> Table:
     """Return the cost of a step for each number of bodies."""
-    found = (attempt(f"{n} bodies", partial(_cost, n), failures) for n in counts)
-    return tuple(cost for cost in found if cost is not None)
+    rows = of_each(counts, lambda n: [_cost(n)], failures, lambda n: f"{n} bodies")
+    return table_of(COLUMNS, rows, digits=3)
 
 
-def growth_exponent(costs: Sequence[StepCost], quantity: str = "seconds", least_bodies: int = LEAST_BODIES) -> float:
-    """Return the slope of log(quantity) over log(bodies), from `least_bodies` on."""
-    chosen = [cost for cost in costs if cost.bodies >= least_bodies]
-    return power_law([cost.bodies for cost in chosen], [getattr(cost, quantity) for cost in chosen])
-
-
-def _cost(n: int) -> StepCost:
+def _cost(n: int) -> dict[str, Any]:
     """Do the same steps again and again: the quickest time of each chunk is the one that nothing else disturbed."""
     simulation = Simulation(scene_from_text(field_of_discs(n)))
     sizes = (simulation.system.mechanism.nq, simulation.system.mechanism.nv, 0, 0)
@@ -78,16 +63,16 @@ def _cost(n: int) -> StepCost:
     quickest = [math.inf] * CHUNKS
     for _ in range(REPEATS):
         simulation.state = simulation.system.make_state()
-        contacts, impacts, tested = 0.0, 0, 0.0
+        contacts, tested = 0.0, 0.0
         for k in range(CHUNKS):
             record = make_record(CHUNK_STEPS, sizes, simulation.system.capacity, n)
             _, spent = timed(partial(simulation.advance_chunk, record, CHUNK_STEPS))
             quickest[k] = min(quickest[k], spent)
             contacts += float(record.contact_count.mean()) / CHUNKS
-            impacts += int(record.used[1])
             tested += _tested(simulation) / CHUNKS
     seconds = sum(quickest) / (CHUNKS * CHUNK_STEPS)
-    return StepCost(n, seconds, contacts, impacts, len(simulation.world.pairs), tested)
+    return {"bodies": n, "step": seconds * 1e6, "contacts": contacts, "pairs of shapes": len(simulation.world.pairs),
+            "pairs tested": tested}  # fmt: skip
 
 
 def _tested(simulation: Simulation) -> int:

@@ -9,9 +9,8 @@ IAPB's step is timed in both ways, as the loop runs it and one step at a time fr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from reference.worlds import find_world
 from verification.clock import LEAST_ROUNDS, Times, sampler, seconds, take_turns
 from verification.cost.calls import Call, Floats, KernelCall, LemkeCall, engine_call, solver_call
 from verification.cost.loop import RecordedLoop
-from verification.finding import Failure, attempt, failure_of
+from verification.finding import Column, Failure, Row, Table, attempt, failure_of, table_of
 from verification.impacts import ImpactCase
 
 CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
@@ -35,49 +34,40 @@ LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked f
 _SOLVED = 1e-5
 
 
-@dataclass(frozen=True)
-class CostRow:
-    """Seconds per impact of one solver on one problem: median, least and largest of `repeats` samples.
-
-    distance : of v⁺ from daqp's (from IAPB's for IAPB's own methods), kinetic metric, relative; NaN without v⁺
-    verdict : "solved", "failed", "missing" or "left out" (slower than LONGEST before)
-    """
-
-    family: str
-    contacts: int
-    coordinates: int
-    solver: str
-    verdict: str
-    median: float
-    least: float
-    largest: float
-    repeats: int
-    distance: float
-    note: str = ""
+_SPREAD = tuple(Column(name, "µs", timed=True) for name in ("median", "least", "largest"))
+# outcome : "solved", "failed", "missing" or "left out" (slower than LONGEST before)
+# distance : of v⁺ from daqp's (from IAPB's for IAPB's own methods), kinetic metric, relative
+COST_COLUMNS = (
+    Column("impacts", condition=True), Column("contacts", condition=True), Column("coordinates"),
+    Column("solver", condition=True), Column("outcome"), *_SPREAD, Column("samples"), Column("distance"),
+    Column("note", timed=True),
+)
+STEP_COLUMNS = (Column("scene", condition=True), Column("world", condition=True), *_SPREAD, Column("samples"))
 
 
 class Rivals(NamedTuple):
     """Two ways to resolve one impact, called alike: compiled, or from Python."""
 
     called: str
-    solver: CostRow
-    ours: CostRow
+    solver: Row
+    ours: Row
 
     @property
     def costs_more(self) -> bool | None:
         """Whether the solver costs more; None where it solved nothing, or where the samples of the two overlap."""
-        return costs_more(self.solver, self.ours) if self.solver.verdict == "solved" else None
+        return costs_more(self.solver, self.ours) if self.solver["outcome"] == "solved" else None
 
 
-def rivals(rows: Sequence[CostRow]) -> tuple[Rivals, ...]:
+def rivals(costs: Table) -> tuple[Rivals, ...]:
     """Every complementarity solver with IAPB at the same impact: kernel with kernel, the others from Python."""
-    ours = {(row.family, row.contacts, row.solver): row for row in rows}
+    rows = costs.records()
+    ours = {(row["impacts"], row["contacts"], row["solver"]): row for row in rows}
     found = []
     for row in rows:
-        if row.solver in (IAPB, KERNEL, PRINTED):
+        if row["solver"] in (IAPB, KERNEL, PRINTED):
             continue
-        called, mine = ("compiled", KERNEL) if row.solver == LEMKE_KERNEL else ("from Python", IAPB)
-        found.append(Rivals(called, row, ours[row.family, row.contacts, mine]))
+        called, mine = ("compiled", KERNEL) if row["solver"] == LEMKE_KERNEL else ("from Python", IAPB)
+        found.append(Rivals(called, row, ours[row["impacts"], row["contacts"], mine]))
     return tuple(found)
 
 
@@ -113,9 +103,9 @@ def impact_cost(
     longest: float = LONGEST,
     progress: Callable[[str, int, int], None] | None = None,
     failures: list[Failure] | None = None,
-) -> tuple[CostRow, ...]:
+) -> Table:
     """Time every solver and IAPB on a patch and on a pile of each size; at least LEAST_ROUNDS samples each."""
-    rows: list[CostRow] = []
+    rows: list[Row] = []
     too_slow: dict[tuple[str, str], float] = {}
     for done, count in enumerate(contacts):
         for make in (patch, pile):
@@ -125,13 +115,14 @@ def impact_cost(
                 rows += attempt(f"{case.family} of {count} contacts", timing, failures) or []
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))
-    return tuple(rows)
+    return table_of(COST_COLUMNS, rows, digits=3, note="From M, J, v to v⁺, one thread, in turns. Kernels are called "
+                    "from compiled code, all others from Python, their checks included.")  # fmt: skip
 
 
 def _time_case(
     case: ImpactCase, solvers: Sequence[str], repeats: int, longest: float, too_slow: dict[tuple[str, str], float],
     failures: list[Failure] | None,
-) -> list[CostRow]:
+) -> list[Row]:
     calls, answers, notes = _warm(case, solvers, too_slow, failures)
     samples = take_turns({name: sampler(call) for name, call in calls.items()}, repeats, warm=False)
     too_slow.update({(case.family, name): times.median for name, times in samples.items() if times.median > longest})
@@ -166,18 +157,22 @@ def _warm(
 
 def _row(
     case: ImpactCase, name: str, samples: dict[str, Times], answers: dict[str, Floats], notes: dict[str, str]
-) -> CostRow:
-    size = (case.family, case.contacts, len(case.velocity), name)
+) -> Row:
+    row: dict[str, Any] = {"impacts": case.family, "contacts": case.contacts, "coordinates": len(case.velocity),
+                           "solver": name, "samples": 0, "note": ""}  # fmt: skip
     if name not in samples:
-        verdict = notes[name].split(":")[0]
-        return CostRow(*size, verdict, np.nan, np.nan, np.nan, 0, np.nan, notes[name])
+        return row | {"outcome": notes[name].split(":")[0], "note": notes[name]}
     reference = answers[IAPB] if name in (IAPB, KERNEL, PRINTED) else answers.get("daqp", answers[name])
     upper = np.linalg.cholesky(case.mass_matrix).T
     speed = float(np.linalg.norm(upper @ case.velocity))
     distance = float(np.linalg.norm(upper @ (answers[name] - reference))) / speed
-    verdict = "solved" if distance <= _SOLVED else "failed"
-    times = samples[name]
-    return CostRow(*size, verdict, times.median, times.least, times.largest, times.rounds, distance)
+    outcome = "solved" if distance <= _SOLVED else "failed"
+    return row | {"outcome": outcome, **_spread(samples[name]), "distance": distance if np.isfinite(distance) else None}
+
+
+def _spread(times: Times) -> dict[str, Any]:
+    return {"median": times.median * 1e6, "least": times.least * 1e6, "largest": times.largest * 1e6,
+            "samples": times.rounds}  # fmt: skip
 
 
 SCENES = ("peg_corner", "peg_hole")
@@ -186,47 +181,33 @@ WAYS = ("IAPB, compiled loop", STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP pe
 STEPS = 256  # half a second of the peg: free, colliding and resting steps
 
 
-@dataclass(frozen=True)
-class StepCostRow:
-    """Seconds per step of one world on one scene: median, least and largest of `repeats` runs of `steps` steps."""
-
-    scene: str
-    way: str
-    median: float
-    least: float
-    largest: float
-    repeats: int
-    steps: int
-
-
-def step_rivals(rows: Sequence[StepCostRow]) -> tuple[tuple[StepCostRow, StepCostRow], ...]:
+def step_rivals(costs: Table) -> tuple[tuple[Row, Row], ...]:
     """(the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
-    by = {(row.scene, row.way): row for row in rows}
-    scenes = dict.fromkeys(row.scene for row in rows)
-    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in scenes
+    by = {(row["scene"], row["world"]): row for row in costs.records()}
+    return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in dict.fromkeys(costs.column("scene"))
                  if (scene, IDEAL) in by and (scene, STEPPED) in by)  # fmt: skip
 
 
-def costs_more(theirs: CostRow | StepCostRow, ours: CostRow | StepCostRow) -> bool | None:
+def costs_more(theirs: Row, ours: Row) -> bool | None:
     """Whether theirs costs more; None where the samples of the two overlap."""
-    if theirs.least <= ours.largest and ours.least <= theirs.largest:
+    if theirs["least"] <= ours["largest"] and ours["least"] <= theirs["largest"]:
         return None
-    return theirs.median > ours.median
+    return bool(theirs["median"] > ours["median"])
 
 
 def world_cost(
     scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS, ways: Sequence[str] = WAYS,
     progress: Callable[[str, int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> tuple[StepCostRow, ...]:
+) -> Table:
     """Time every world on every scene; at least LEAST_ROUNDS samples each."""
-    rows: list[StepCostRow] = []
+    rows: list[Row] = []
     for done, name in enumerate(scenes):
         times = take_turns({way: partial(_seconds_per_step, name, way, steps) for way in ways},
                            max(LEAST_ROUNDS, repeats), failures=failures, name=lambda way: f"{name}, {way}")  # noqa: B023  # fmt: skip
-        rows += [StepCostRow(name, way, t.median, t.least, t.largest, t.rounds, steps) for way, t in times.items()]
+        rows += [{"scene": name, "world": way, **_spread(each)} for way, each in times.items()]
         if progress is not None:
             progress("time per step", done + 1, len(scenes))
-    return tuple(rows)
+    return table_of(STEP_COLUMNS, rows, digits=3)
 
 
 def _seconds_per_step(scene_name: str, way: str, steps: int) -> float:

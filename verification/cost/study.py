@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from iapb.errors import MissingDependencyError
 from verification.cost.against_mujoco import (
     PART_COLUMNS,
@@ -32,10 +30,10 @@ from verification.cost.growth import (
     scaling,
 )
 from verification.cost.impacts import anytime
-from verification.cost.many_bodies import LEAST_BODIES, StepCost, study_many_bodies
+from verification.cost.many_bodies import LEAST_BODIES, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.start_up import start_up
-from verification.cost.step_cost import IAPB, KERNEL, CostRow, Rivals, impact_cost, rivals
+from verification.cost.step_cost import IAPB, KERNEL, Rivals, impact_cost, rivals
 from verification.cost.trajectories import BELOW, trajectory_precision
 from verification.finding import (
     MIXED,
@@ -97,11 +95,10 @@ def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tup
     yield "scaling", times
     yield "fitted", fitted(times)
     yield "contacts at 1 kHz", _rate(haptic_rate(progress=within("contacts at 1 kHz"), failures=failures))
-    yield "bodies", _bodies(study_many_bodies(failures=failures))
+    yield "bodies", study_many_bodies(failures=failures)
     if (robots := attempt("robots", partial(_robots, depth), failures)) is not None:
         yield "robots", robots
-    yield "solvers", solvers_table(impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say,
-                                               failures=failures))  # fmt: skip
+    yield "solvers", impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say, failures=failures)
     yield "start", start_up(depth, failures)
     yield "budgets", anytime(40 if full else 15, within("budgets"), failures)
     yield "motions", trajectory_precision(depth=depth, progress=within("whole motions"), failures=failures)
@@ -127,12 +124,6 @@ def _rate(trials: Table) -> Table:
     )  # fmt: skip
 
 
-def _bodies(costs: tuple[StepCost, ...]) -> Table:
-    columns = (Column("bodies", condition=True), Column("step", "µs", timed=True), Column("contacts"),
-               Column("pairs of shapes"), Column("pairs tested"))  # fmt: skip
-    return Table(columns, tuple((b.bodies, b.seconds * 1e6, b.contacts, b.pairs, b.tested) for b in costs), digits=3)
-
-
 def _robots(depth: str) -> Table:
     """The robots of others where they are, else the project's own."""
     files, _ = robot_files()
@@ -142,28 +133,6 @@ def _robots(depth: str) -> Table:
                            condition=k < 4, timed=k >= 4) for k, key in enumerate(keys))  # fmt: skip
     return Table(columns, found.select(keys).rows, digits=3,
                  note="robots of others" if files else "the project's own robots")  # fmt: skip
-
-
-SOLVER_COLUMNS = (
-    Column("impacts", condition=True),
-    Column("contacts", condition=True),
-    Column("solver", condition=True),
-    Column("outcome"),
-    Column("median", "µs", timed=True),
-    Column("least", "µs", timed=True),
-    Column("largest", "µs", timed=True),
-    Column("distance of v⁺"),
-)
-
-
-def solvers_table(rows: tuple[CostRow, ...]) -> Table:
-    """A row per solver and size."""
-    def known(value: float) -> float | None:
-        return value if np.isfinite(value) else None
-
-    cells = tuple((r.family, r.contacts, r.solver, r.verdict, *(known(1e6 * t) for t in (r.median, r.least, r.largest)),
-                   known(r.distance)) for r in rows)  # fmt: skip
-    return Table(SOLVER_COLUMNS, cells, digits=3, note="From M, J, v to v⁺; kernels compiled, all others from Python.")
 
 
 def finding(tables: Tables, failures: list[Failure]) -> Finding:
@@ -238,9 +207,9 @@ def _say_printed(tables: Tables) -> Iterator[Part]:
 
 def _say_solvers(tables: Tables) -> Iterator[Part]:
     """One sentence per way of calling: faster everywhere, or where not."""
-    found = rivals(_cost_rows(tables["solvers"]))
+    found = rivals(tables["solvers"])
     for called in ("compiled", "from Python"):
-        pairs = [pair for pair in found if pair.called == called and pair.solver.verdict == "solved"]
+        pairs = [pair for pair in found if pair.called == called and pair.solver["outcome"] == "solved"]
         slower = [pair for pair in pairs if pair.costs_more is False]
         decided = [pair for pair in pairs if pair.costs_more is not None]
         if not decided:
@@ -253,18 +222,11 @@ def _say_solvers(tables: Tables) -> Iterator[Part]:
             f"({len(pairs) - len(decided)} do not){_slower(slower)}.{checks}", not slower)  # fmt: skip
 
 
-def _cost_rows(table: Table) -> tuple[CostRow, ...]:
-    """The rows of `impact_cost` again, times in µs."""
-    return tuple(
-        CostRow(row["impacts"], row["contacts"], 0, row["solver"], row["outcome"], row["median"] or np.nan,
-                row["least"] or np.nan, row["largest"] or np.nan, 0, 0.0) for row in table.records())  # fmt: skip
-
-
 def _slower(pairs: list[Rivals]) -> str:
     """Where IAPB is slower."""
     at: dict[tuple[str, str], list[int]] = {}
     for pair in pairs:
-        at.setdefault((pair.solver.solver, pair.solver.family), []).append(pair.solver.contacts)
+        at.setdefault((pair.solver["solver"], pair.solver["impacts"]), []).append(pair.solver["contacts"])
     texts = [f"{solver} on the {family} at {', '.join(map(str, sorted(contacts)))} contacts"
              for (solver, family), contacts in at.items()]  # fmt: skip
     return f"; slower than {', '.join(texts)}" if texts else ""

@@ -17,12 +17,13 @@ from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, imp
 
 
 def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:
-    rows = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
-    assert {(r.family, r.contacts, r.solver) for r in rows} == {
+    costs = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
+    assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
         (family, contacts, solver) for family in ("patch", "pile") for contacts in (1, 3)
         for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")
     }  # fmt: skip
-    assert all(r.verdict == "solved" and r.repeats >= 3 and r.least <= r.median <= r.largest for r in rows)
+    assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
+    assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
 
 
 def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,9 +33,9 @@ def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monke
         return (lambda: case.velocity) if name == "lemke" else original(case, name)
 
     monkeypatch.setattr(step_cost, "solver_call", wrong)
-    rows = {(r.family, r.contacts, r.solver): r for r in impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0)}
-    assert rows["patch", 1, "lemke"].verdict == "failed"
-    assert rows["patch", 2, "daqp"].verdict == "left out"
+    patch = impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0).where(impacts="patch")
+    assert patch.where(contacts=1, solver="lemke").column("outcome") == ["failed"]
+    assert patch.where(contacts=2, solver="daqp").column("outcome") == ["left out"]
 
 
 def test_a_folder_of_problems(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from verification.complementarity.cases import random_cases
 from verification.complementarity.findings import PARTS, problems
 from verification.complementarity.piles import PileRow
 from verification.complementarity.problems import own_problems, study_read
-from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, CostRow, rivals
-from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL, LEMKE_KERNEL, rivals
+from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED, table_of
 from verification.mechanics.engine_differences import SceneDifference
 
 FOUND = compare_cases(random_cases(3, seed=12))
@@ -26,8 +26,9 @@ SINGLE = tuple(c for c in FOUND if c.family == "one contact" and not c.redundanc
 STUDY = SimpleNamespace(left_out=0, single=SINGLE, cells=CELLS, scenes=CELLS, two_contacts=two_contact_map())
 
 
-def row(solver: str, least: float, largest: float, verdict: str = "solved") -> CostRow:
-    return CostRow("pile", 4, 6, solver, verdict, 0.5 * (least + largest), least, largest, 3, 0.0)
+def row(solver: str, least: float, largest: float, outcome: str = "solved") -> dict[str, Any]:
+    return {"impacts": "pile", "contacts": 4, "solver": solver, "outcome": outcome, "median": 0.5 * (least + largest),
+            "least": least, "largest": largest}  # fmt: skip
 
 
 def verdict(name: str, **changed: Any) -> str:
@@ -72,10 +73,11 @@ def test_piles_say_where_to_stop_and_references_where_the_engine_differs() -> No
 def test_costs_are_told_apart_only_where_samples_do_not_overlap() -> None:
     rows = (row(IAPB, 1.0, 2.0), row(KERNEL, 0.1, 0.2), row("slow", 3.0, 4.0), row("alike", 1.5, 9.0),
             row("fast", 0.1, 0.5), row("wrong", 3.0, 4.0, "failed"), row(LEMKE_KERNEL, 0.5, 0.9))  # fmt: skip
-    outcomes = {pair.solver.solver: pair.costs_more for pair in rivals(rows)}
+    costs = table_of(COST_COLUMNS, rows)
+    outcomes = {pair.solver["solver"]: pair.costs_more for pair in rivals(costs)}
     assert outcomes == {"slow": True, "alike": None, "fast": False, "wrong": None, LEMKE_KERNEL: True}
-    assert verdict("cost", impact_costs=rows) == MIXED
-    assert verdict("cost", impact_costs=rows[:2] + rows[3:4]) == NOT_TESTABLE
+    assert verdict("cost", impact_costs=costs) == MIXED
+    assert verdict("cost", impact_costs=table_of(COST_COLUMNS, rows[:2] + rows[3:4])) == NOT_TESTABLE
 
 
 def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_limits() -> None:

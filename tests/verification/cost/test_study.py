@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,10 +16,10 @@ from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
 from verification.cost.effects import summary
 from verification.cost.growth import FACTORED, PRINTED, RATE_COLUMNS, SCALING_COLUMNS, fitted
 from verification.cost.impacts import BUDGET_COLUMNS
-from verification.cost.many_bodies import StepCost
+from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
 from verification.cost.start_up import COLUMNS as START_COLUMNS
-from verification.cost.step_cost import IAPB, KERNEL, CostRow
-from verification.cost.study import _bodies, _rate, finding, solvers_table
+from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL
+from verification.cost.study import _rate, finding
 from verification.cost.trajectories import BELOW
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
@@ -43,7 +44,14 @@ def _times(printed: float) -> Table:
 
 
 def _costs(*solvers: tuple[str, float]) -> Table:
-    return solvers_table(tuple(CostRow("patch", 4, 6, name, "solved", t, t, t, 3, 0.0) for name, t in solvers))
+    return table_of(COST_COLUMNS, [
+        {"impacts": "patch", "contacts": 4, "solver": name, "outcome": "solved", "median": t, "least": t, "largest": t}
+        for name, t in solvers])  # fmt: skip
+
+
+def _bodies(*counts: int, step: Callable[[int], float], tested: Callable[[int], int]) -> Table:
+    return table_of(BODY_COLUMNS, [{"bodies": n, "step": step(n), "contacts": 1.0, "pairs of shapes": n * n,
+                                    "pairs tested": tested(n)} for n in counts])  # fmt: skip
 
 
 def _run(method: str, step: float, error: float | None, time: float, outcome: str = "ok", note: str = "") -> Any:
@@ -71,7 +79,7 @@ def tables() -> Tables:
             {"scene": "peg in the corner", "part": name, "time": t} for name, t in parts]),
         "scaling": _times(20.0), "fitted": fitted(_times(20.0)),
         "contacts at 1 kHz": _rate(table_of(RATE_COLUMNS, late)),
-        "bodies": _bodies(tuple(StepCost(n, 1e-6 * n, 1.0, 1, n * n, n) for n in (20, 100, 200))),
+        "bodies": _bodies(20, 100, 200, step=float, tested=int),
         "robots": replace(robots, note="made up"),
         "solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4), ("Lemke kernel", 2e-6)),
         "start": Table(START_COLUMNS, (("iapb --help", 0.4, 0.3, 1, 0.5),)),
@@ -101,8 +109,8 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({"scaling": _times(5.0)}, "5 times as long"),
         ({"solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
         ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "iapb --help takes 0.90 s"),
-        ({"bodies": _bodies(tuple(StepCost(n, 1e-9 * n**2, 1.0, 1, n, n) for n in (20, 200)))}, "power 2.00"),
-        ({"bodies": _bodies(tuple(StepCost(n, 1e-6 * n, 1.0, 1, n * n, n * n) for n in (20, 200)))}, "pairs tested"),
+        ({"bodies": _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2.00"),
+        ({"bodies": _bodies(20, 200, step=float, tested=lambda n: n * n)}, "pairs tested"),
         ({"budgets": table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
     ],
 )
