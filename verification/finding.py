@@ -225,6 +225,7 @@ class Part:
 
     name : where the parts of one question are told apart; sentence : what was found, with its number
     held, decided : trials in which it held, of those that could tell; unknown : trials that could not
+    cases : how many cases the trials that decide stand for, where they are fewer than LEAST_DECIDED
     region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
     optional : about what does not come with the project, as another engine: absent, it leaves the verdict to others
@@ -240,6 +241,7 @@ class Part:
     fails: str = ""
     timed: bool = False
     optional: bool = False
+    cases: int = 0
 
     @property
     def outcome(self) -> str:
@@ -344,6 +346,7 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
         said = f"{said}; {tried}"
     cases = _decided_cases(trials)
     if decided < LEAST_DECIDED <= cases:
+        part = replace(part, cases=cases)
         said = f"{said}, which stand for {cases} cases"
     elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE and (held or decided < LEAST_FAILING):
         part = replace(part, verdict=NOT_TESTABLE)
@@ -533,6 +536,7 @@ def _span(values: Sequence[Any]) -> str:
 
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
+    key = key.replace("_", " ")
     if low is None:
         return f"{key} <= {high:g} {unit}".rstrip()
     return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()

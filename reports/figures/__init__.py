@@ -23,6 +23,7 @@ from reports.figures.figure import Recipe
 
 RECIPES: tuple[Recipe, ...] = (
     corner.hero,
+    complementarity.where_to_stop,
     scenes_plane.peg_corner,
     two_link_arm.arm,
     scenes_plane.contact_forces,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
@@ -104,6 +104,65 @@ def _border(numbers: Table) -> str:
             if predicted != found:
                 axes.plot(cosine, ratio, "s", markersize=12, markerfacecolor="none", markeredgecolor=INK)
         axes.set(xlim=(-1.02, 1.02), ylim=(0.0, 1.06), xlabel="cosine c of the two rows", ylabel="speed ratio r")
+    return plot.svg
+
+
+@recipe("where-to-stop", "Where to stop using (19): dense piles", "complementarity/piles", section="hero", caption="")
+def where_to_stop(numbers: Table) -> Drawn:
+    """Draw the distance from complementarity over contacts and redundancy, and the price of pushing."""
+    rows = numbers.records()
+    limit = max(row["most contacts that agree"] for row in rows)
+    beyond = [row for row in rows if row["contacts"] > limit]
+    price = [row["time of pushing"] / row["time of (21)"] for row in rows]
+    panels = (
+        Panel(_distance_over(rows, "contacts", limit), f"No pile of more than {limit} contacts agrees.",
+              "distance over the number of contacts"),
+        Panel(_distance_over([row | {"redundant share": row["redundant"] / row["contacts"]} for row in rows],
+                             "redundant share"), "Distance over the share of redundant contacts.",
+              "distance over the share that is redundant"),
+        Panel(_price(rows, price), f"Pushing takes {min(price):.2g} to {max(price):.2g} times as long as (21).",
+              "price of impulses that only push"),
+    )  # fmt: skip
+    pulling = 100.0 * sum(row["share of impulses that pull"] for row in beyond) / max(len(beyond), 1)
+    caption = (
+        "A pile of spheres falls on the floor; every mark is one kind of pile, with all contacts that approach, or all "
+        f"that touch, as equalities (19). Stop using (19) where more than {limit} contacts collide at once: from there "
+        f"on its motion is never that of complementarity, and {pulling:.0f} % of its impulses pull. The world "
+        "IAPB-push (method “poisson”) only pushes, agrees with complementarity to rounding, and takes "
+        f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
+    )
+    kinds = dict.fromkeys(numbers.column("rows"))
+    legend = series_legend([f"contacts that are {given}" for given in kinds], line=False)
+    return Drawn(panels, numbers, (*legend, ("stop here", STYLES["bound"])), caption)
+
+
+def _distance_over(rows: Rows, name: str, limit: float | None = None) -> str:
+    kinds = list(dict.fromkeys(row["rows"] for row in rows))
+    with Plot(f"where-to-stop-{name.replace(' ', '-')}") as plot:
+        for number, given in enumerate(kinds):
+            plot.marks([(row[name], row["median distance from the LCP"]) for row in rows if row["rows"] == given],
+                       numbered(number))  # fmt: skip
+        plot.axes.set(xlabel=name, ylabel="distance of the motions, of |v⁻|", ylim=(-0.02, None))
+        if limit is not None:
+            plot.axes.set_xscale("log")
+            counts = (5, 10, 20, 50, 100, 200)
+            plot.axes.set_xticks(counts, [str(count) for count in counts], minor=False)
+            plot.axes.minorticks_off()
+            plot.axes.axvline(limit, **line_arguments(STYLES["bound"], marked=False))
+    return plot.svg
+
+
+def _price(rows: Rows, price: Sequence[float]) -> str:
+    kinds = list(dict.fromkeys(row["rows"] for row in rows))
+    with Plot("where-to-stop-price") as plot:
+        for number, given in enumerate(kinds):
+            plot.marks([(row["contacts"], ratio) for row, ratio in zip(rows, price, strict=True)
+                        if row["rows"] == given], numbered(number))  # fmt: skip
+        plot.axes.axhline(1.0, **line_arguments(STYLES["bound"], marked=False))
+        plot.axes.set(xscale="log", xlabel="contacts", ylabel="time, pushing over (21)", ylim=(0.0, None))
+        counts = (5, 10, 20, 50, 100, 200)
+        plot.axes.set_xticks(counts, [str(count) for count in counts])
+        plot.axes.minorticks_off()
     return plot.svg
 
 

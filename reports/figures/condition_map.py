@@ -22,7 +22,7 @@ Outcomes = Sequence[bool | None]
 
 
 def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[float]], y: tuple[str, Sequence[float]],
-                  holds: Outcomes, panels: Sequence[Any] | None = None) -> Figure:
+                  holds: Outcomes, panels: Sequence[Any] | None = None, ranked: bool = False) -> Figure:
     """Draw where a claim holds.
 
     Parameters
@@ -30,13 +30,16 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
     x, y : label with unit, and the condition's value in each trial.
     holds : whether the claim held in each trial; None where the trial cannot tell.
     panels : the value by which trials are split into maps of their own; default one map.
+    ranked : whether x goes by rank, each value with a tick of its own, so that crowded values stay apart.
     """
+    values = sorted(set(x[1])) if ranked else []
+    across = [values.index(value) for value in x[1]] if ranked else x[1]
     split = ["" for _ in holds] if panels is None else [str(value) for value in panels]
     drawn = []
     for number, name in enumerate(dict.fromkeys(split)):
         kept = [k for k, value in enumerate(split) if value == name]
-        places = _places([x[1][k] for k in kept], [y[1][k] for k in kept], [holds[k] for k in kept])
-        drawn.append(Panel(_map(f"{key}-{number}", x[0], y[0], places), _words(x[0], y[0], places), name))
+        places = _places([across[k] for k in kept], [y[1][k] for k in kept], [holds[k] for k in kept])
+        drawn.append(Panel(_map(f"{key}-{number}", x[0], y[0], places, values), _words(x[0], y[0], places), name))
     legend = (("holds", "holds"), ("fails", "fails"), ("cannot tell", "cannot tell"))
     return Figure(key, "", title, caption, tuple(drawn), None, legend if None in holds else legend[:2])
 
@@ -52,7 +55,7 @@ def _places(x: Sequence[float], y: Sequence[float], holds: Outcomes) -> Places:
     return places
 
 
-def _map(key: str, x_label: str, y_label: str, places: Places) -> str:
+def _map(key: str, x_label: str, y_label: str, places: Places, ticks: Sequence[float]) -> str:
     with Plot(key, _SIZE) as plot:
         axes = plot.axes
         for (x, y), trials in places.items():
@@ -66,6 +69,8 @@ def _map(key: str, x_label: str, y_label: str, places: Places) -> str:
                 axes.scatter(x, y, s=_DOT * share, color=BLUE, edgecolor=PAPER, linewidth=0.5, zorder=3)
         axes.margins(0.08)
         axes.set(xlabel=x_label, ylabel=y_label)
+        if ticks:
+            axes.set_xticks(range(len(ticks)), [f"{tick:g}" for tick in ticks], rotation=90)
     return plot.svg
 
 

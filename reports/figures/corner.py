@@ -80,7 +80,10 @@ FIGURES = (
     Shown(7, "Hand trajectories of the four worlds", UNLIMITED, False,
           "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
           "line (“ideal”) is the rigid world. Look at which curve leaves it at the first contact, and which come "
-          "back to it. The device can apply any force here."),
+          "back to it. The device can apply any force here. Of the axes that the paper printed we know one range, "
+          "0 to −2.5; its unit, the other axis and the start of the peg are lost. Our axes are therefore in mm and "
+          "degrees. The last panel uses the printed range, in mm, for the depth of the hand past the place where the "
+          "rigid world stops it."),
     Shown(8, "Forces that the hand feels", UNLIMITED, True,
           "In full: a new contact answers with one blow of one step in the worlds with impulses. Magnified: what "
           "remains between blows, to be compared with the 0.32 N that balances the hand."),
@@ -122,6 +125,8 @@ def first_shown(runs: Mapping[str, Run]) -> int:
     return max(min(touching) - round(_BEFORE_CONTACT / dt), 0) if touching else 0
 
 
+_PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; a line of room for curves at 0
+
 # Trajectories
 
 
@@ -129,6 +134,8 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run],
                        names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Table]:
     """The path and the three coordinates; where the device is limited, also tool against device and penetration."""
     panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
+    if names == UNLIMITED:
+        panels.append(_printed_panel(key, runs))
     if names in (LIMITED, STRATEGIES):
         panels += [_separation_panel(key, runs), _penetration_panel(key, runs)]
     reference = "ideal" if "ideal" in runs else None
@@ -172,6 +179,21 @@ def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
     name, unit, factor = _COORDINATES[k]
     svg = _over_time(f"{key}-{'xyz'[k]}", runs, lambda run: factor * run.device_q[:, k], f"{name} [{unit}]")
     return Panel(svg, f"{name} of the hand over time in {unit}, for {', '.join(runs)}.", f"{name} over time")
+
+
+def _printed_panel(key: str, runs: Mapping[str, Run]) -> Panel:
+    """How deep the hand goes along y past where the rigid world stops, on the axis that Figure 7 prints."""
+    stop = runs["ideal"].device_q[-1, 1]
+    with Plot(f"{key}-printed", kind=TIME) as plot:
+        for number, (curve, run) in enumerate(runs.items()):
+            depth = MILLI * (stop - run.device_q[:, 1])
+            plot.axes.plot(run.time, depth, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+                           markevery=marks(len(depth), number), zorder=3 + number / 10)  # fmt: skip
+        plot.axes.set(xlabel="t [s]", ylabel="past the rigid place [mm]", xlim=(0, runs["ideal"].time[-1]),
+                      ylim=_PRINTED_RANGE)
+    deepest = ", ".join(f"{curve} {MILLI * (stop - run.device_q[:, 1].max()):.2f}" for curve, run in runs.items())
+    return Panel(plot.svg, f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
+                 "depth along y past the rigid place, on the printed range")  # fmt: skip
 
 
 def _separation_panel(key: str, runs: Mapping[str, Run]) -> Panel:
@@ -270,8 +292,8 @@ _SIZE = (4.5, 3.8)  # inches
     caption="A constant force pushes a tilted peg into a corner; first picture: its outlines in the rigid world, from "
     "start to end. Second picture, magnified: where the hand goes, from shortly before the first contact. The closer a "
     "curve is to the ideal one, the more the wall feels like a rigid wall. This start, tilted by 0.015 rad, sits at "
-    "the edge: up to there IAPB is the closest in x and y, beyond it often not, and in the angle rarely; claim C10 has "
-    "the map.",
+    "the edge: up to there IAPB is the closest in x and y, beyond it often not, and in the angle rarely. The map of "
+    "claim C10 below shows every start.",
 )  # fmt: skip
 def hero(*given: Run) -> Drawn:
     """Draw the picture from the runs named in UNLIMITED."""

@@ -18,7 +18,9 @@ from reports.pages.inline import policy, script
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
+from verification.claims.c10_trajectory import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
+from verification.scenes.trace import COORDINATES
 
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
@@ -43,6 +45,7 @@ def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
         script=text, policy=policy(text), played=played(figures),
         evidence=evidence, sections=SECTIONS, figures=figures,
         counts=count_verdicts(evidence.claims), maps={claim.key: map_of(claim) for claim in evidence.claims},
+        first_map=first_map(evidence.claims),
         part_counts=count_verdicts(part for claim in evidence.claims for part in claim.parts),
         used={user for entry in evidence.manifest for user in entry.used_by},
     )
@@ -66,14 +69,33 @@ def map_of(claim: Finding) -> Figure | None:
     table = claim.tables.get(claim.key)
     if not claim.axes or claim.verdict == REPRODUCED or table is None or not table.rows:
         return None
+    caption = f"Each mark is one simulated condition of {claim.key}."
+    return _map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
+
+
+def first_map(claims: Sequence[Finding]) -> Figure | None:
+    """Where C10 holds, start by start on the full grid, for the first page; None where it was not computed."""
+    table = next((claim.tables.get(claim.key) for claim in claims if claim.key == "C10"), None)
+    grid = table.where(threshold=FULL) if table and "threshold" in table.keys else None
+    if grid is None or not grid.rows:
+        return None
+    counts = [f"{shown.holds.count(True)} of {len(shown.rows) - shown.holds.count(None)} in {coordinate}"
+              for coordinate in COORDINATES for shown in [grid.where(coordinate=coordinate)]]
+    caption = (
+        "Each mark is one start of the peg, simulated in four worlds: a dot where IAPB follows the ideal hand closest, "
+        f"a cross where PB or CBuc does. IAPB is the closest in {', '.join(counts)}. It wins where the peg starts "
+        "nearly flat. The picture above starts at a tilt of 0.015 rad, at the edge of that region."
+    )
+    return _map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "coordinate", ranked=True)
+
+
+def _map(key: str, title: str, caption: str, table: Table, x: str, y: str, *split: str, ranked: bool = False) -> Figure:
+    """Draw the outcomes over two columns, in a panel for every combination of the values of others."""
     titles = {column.key: column.title for column in table.columns}
-    x, y, *split = claim.axes
-    panels = [value if isinstance(value, str) else f"{titles[split[0]]}: {value:g}"
-              for value in table.column(split[0])] if split else None  # fmt: skip
-    return condition_map(
-        f"map-{claim.key}", f"Where {claim.key} holds", f"Each mark is one simulated condition of {claim.key}.",
-        (titles[x], table.column(x)), (titles[y], table.column(y)), table.holds, panels,
-    )  # fmt: skip
+    panels = [", ".join(row[name] if isinstance(row[name], str) else f"{titles[name]}: {row[name]:g}" for name in split)
+              for row in table.records()]  # fmt: skip
+    return condition_map(key, title, caption, (titles[x], table.column(x)), (titles[y], table.column(y)), table.holds,
+                         panels, ranked)  # fmt: skip
 
 
 def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
@@ -90,12 +112,15 @@ def badge_words(topic: Finding) -> str:
 
 
 def counted(part: Part) -> str:
-    """Return in how many trials a part holds, of those that could tell, how many could not, and a region's share."""
+    """Return in how many trials a part holds, of those that could tell, how many could not, and a region's counts."""
     if not part.decided and not part.unknown:
         return ""
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
-    share = f", region {part.region.share:.0%} of the range" if part.region else ""
-    return f"{part.held} of {part.decided}{unknown}{share}"
+    cases = f" on {part.cases} cases" if part.cases else ""
+    region = part.region
+    where = (f"; region {region.share:.0%} of the range, found on {region.searched}, confirmed on "
+             f"{region.others + region.fresh}") if region else ""  # fmt: skip
+    return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:

@@ -78,6 +78,9 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
+# A second grid for what depends on the grid: tilts at even distances, where those above crowd at small ones.
+EVEN_TILTS = tuple(0.05 * n for n in range(8))
+EVEN_CLEARANCES = (0.004, 0.008, 0.016, 0.024)
 FRICTIONS = (0.1, 0.3)
 # 1e-6 takes every contact that approaches at all, as the paper does. An old contact that creeps into its wall under
 # the hand approaches too, by up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value leaves such contacts out.
@@ -97,6 +100,16 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys(grid + travels + frictions + approaches))
 
 
+def full_grid() -> tuple[Condition, ...]:
+    """Every tilt and clearance of the full depth, at the paper's approach threshold."""
+    return tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
+
+
+def even_grid() -> tuple[Condition, ...]:
+    """Tilts at even distances, and other clearances."""
+    return tuple(Condition(tilt, clearance) for tilt in EVEN_TILTS for clearance in EVEN_CLEARANCES)
+
+
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
     """The starting conditions with the paper's device limits, some also with tighter ones (C12 to C14, C16)."""
     default = Condition()
@@ -114,12 +127,12 @@ def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) ->
     kept, so that they repeat anywhere.
     """
     rng, found = np.random.default_rng(seed), list[Condition]()
-    ends = {name: [getattr(condition, name) for condition in tested] for name in UNITS}
+    ends = {name: region.ends(name, [getattr(condition, name) for condition in tested]) for name in UNITS}
     while len(found) < count:
         shares = dict(zip(UNITS, rng.random(len(UNITS)), strict=True))
-        start = {name: _between(min(ends[name]), max(ends[name]), shares[name]) for name in START}
-        if all(low <= start[name] <= high for name in START for low, high in [region.ends(name, ends[name])]):
-            others = {name: _between(*region.ends(name, ends[name]), shares[name], by_decades=name in BY_DECADES)
+        start = {name: _between(*START[name], shares[name]) for name in START}
+        if all(low <= start[name] <= high for name, (low, high) in ends.items() if name in START):
+            others = {name: _between(*ends[name], shares[name], by_decades=name in BY_DECADES)
                       for name in UNITS if name not in START}  # fmt: skip
             found.append(Condition(**start, **others))
     return found
@@ -142,7 +155,9 @@ UNITS = {
     "approach_velocity": "m/s", "force_limit": "F_limit",
 }  # fmt: skip
 
-START = ("tilt", "clearance", "travel")  # where the peg starts: all that a rigid world sees
+# Where the peg starts, from the least to the largest value tested at any depth: all that a rigid world sees.
+START = {name: (min(values["full"]), max(values["full"]))
+         for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))}  # fmt: skip
 BY_DECADES = ("approach_velocity",)
 
 

@@ -140,6 +140,7 @@ def piles(study: ComparisonStudy) -> Table:
     rows = tuple(
         (name, given, len(found), float(np.mean([row.contacts for row in found])),
          float(np.mean([row.redundant for row in found])), float(np.mean([row.agrees for row in found])),
+         max((row.contacts for row in found if row.agrees), default=0),
          float(np.mean([row.pulling for row in found])), float(np.mean([row.pulling_share for row in found])),
          float(np.median([row.distance for row in found])), max(row.lcp for row in found),
          1e6 * float(np.median([row.equality for row in found])),
@@ -148,8 +149,9 @@ def piles(study: ComparisonStudy) -> Table:
     )  # fmt: skip
     times = ("time of (21) [µs]", "time of pushing [µs]")
     return titled(
-        ("pile", "rows", "piles", "contacts", "redundant", "share that agrees", "share of impulses that pull",
-         "negative share of p", "median distance from the LCP", "pushing from the LCP", *times), rows, 3,
+        ("pile", "rows", "piles", "contacts", "redundant", "share that agrees", "most contacts that agree",
+         "share of impulses that pull", "negative share of p", "median distance from the LCP", "pushing from the LCP",
+         *times), rows, 3,
         "(21) on every row given, and impulses that only push (method \"poisson\"); e = 0; distances in the kinetic "
         "metric, of |v⁻|. Agrees: some p >= 0 gives the motion of (21). Times from Python, checks included.",
         timed=times)  # fmt: skip
