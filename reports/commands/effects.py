@@ -14,7 +14,7 @@ from iapb.errors import ArgumentError
 from reference.worlds import find_world
 from reports.commands.progress import stage_progress
 from reports.commands.run import Rendering, SceneName, scene_given
-from verification.cost.effects import effects_of, summary
+from verification.cost.effects import NOTHING, effects_of, summary
 
 
 def effects(
@@ -67,3 +67,6 @@ def _measure(source: Any, world: str) -> None:
                       best.get(one["effect"], "–"))  # fmt: skip
     console = Console(width=max(140, Console().width))
     console.print(table)
+    idle = [one["effect"] for one in found.records() if (one["change"] or "").startswith(NOTHING)]
+    if idle:
+        print(f"On, and change nothing in this run: {', '.join(idle)}.")

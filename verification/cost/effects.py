@@ -67,7 +67,19 @@ LEFT_OUT: dict[str, Variant] = {
     "delay": Variant((("device.delay", 0),)),
     "quantisation": Variant((("device.position_resolution", None),)),
     "device_damping": Variant((("device.damping", None),)),
+    "device_limits": Variant((("device.force_limit", None),)),
+    "waveform": Variant((("device.waveform", "step"),)),
 }
+NOTHING = "nothing in this run"  # how the words begin on an effect that is on and changes nothing
+# What acts through contacts alone, and what it asks of the run: pairs of the first kind, or any contact at all.
+_THROUGH_CONTACTS = {
+    "wall_contacts": ("wall", "no body touches a wall"),
+    "body_contacts": ("body", "no two separate bodies touch"),
+    "self_collisions": ("tree", "no two links of one tree touch"),
+} | dict.fromkeys(
+    ("impulses", "unequal_restitution", "penalty_stiffness", "contact_damping", "friction", "clustering", "coherence"),
+    ("", "nothing touches"),
+)
 
 
 # One effect: on or off, why, and what leaving it out would change in any scene; then as measured in this one. What is
@@ -160,7 +172,18 @@ def measure(scene: Scene, world: World, whole: Loop, name: str, pairs: int) -> d
         "device": _farthest(whole.device_places(), other.device_places()),
         "energy": 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), _TINY)),
     }
-    return found | in_words(found)
+    words = in_words(found)
+    if whole.same_motion(other):
+        words["change"] = f"{NOTHING}: {_why_nothing(name, whole.touching())}"
+    return found | words
+
+
+def _why_nothing(name: str, touching: frozenset[str]) -> str:
+    """Why leaving the effect out changed nothing, as far as the contacts of the run tell."""
+    kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
+    if absent and not (touching if not kind else touching & {kind}):
+        return absent
+    return "all states are the same to the last bit"
 
 
 def in_words(found: Row) -> dict[str, str]:
@@ -194,6 +217,18 @@ class Loop(RecordedLoop):
         if variant.switches:
             self.simulation.world = _switched_off(self.simulation.world, variant.switches)
         self.q = self.v = self.device_q = np.zeros((0, 0))
+
+    def same_motion(self, other: Loop) -> bool:
+        """Whether tool and device were at the same places with the same velocities, to the last bit, in all steps."""
+        return all(np.array_equal(self.recording.joined("steps", name), other.recording.joined("steps", name))
+                   for name in ("q", "v", "device_q", "device_v"))  # fmt: skip
+
+    def touching(self) -> frozenset[str]:
+        """Kinds of the contacts of the last sample: "wall", "body" (of two trees) and "tree" (of one)."""
+        a, b = (self.recording.joined("contacts", name) for name in ("body_a", "body_b"))
+        tree = self.simulation.system.mechanism.tree_of_body
+        kinds = np.where(b < 0, "wall", np.where(tree[a] == tree[np.maximum(b, 0)], "tree", "body"))
+        return frozenset(np.unique(kinds).tolist())
 
     def sample(self) -> float:
         """Seconds per step of one whole run."""

@@ -1,4 +1,8 @@
-"""Collisions with a certain answer in closed form: cradle, break shot, rocking block, superball, stack, wedge, rod."""
+"""Collisions with a certain answer in closed form: cradle, break shot, rocking block, superball, stack, wedge, rod.
+
+Bodies in space have the coordinates (x, y, z, ω) of their centre of mass in world axes; what they strike holds the
+point in all three directions (rows along z, x, y).
+"""
 
 from __future__ import annotations
 
@@ -97,4 +101,51 @@ def painleve_impact() -> FrictionalCase:
         "restitution met, no gain: tangential impulse up to sticking, reduced to what the impact can pay for",
         np.diag([1.0, 1.0, 1.0 / 12.0]), np.array([[0.0, 1.0, -0.5 * cosine]]), np.array([-1.0, -0.1, 0.0]), 0.0,
         methods=("factored", "Newton with Coulomb"), tangent=np.array([[1.0, 0.0, 0.5 * sine]]), friction=2.0,
+    )  # fmt: skip
+
+
+def _at_a_point(r: tuple[Fraction | int, ...]) -> np.ndarray:
+    """Rows (3, 6) of the velocities along z, x, y of a point at r from the centre of mass, in fractions."""
+    x, y, z = (Fraction(part) for part in r)
+    return np.array([[0, 0, 1, y, -x, 0], [1, 0, 0, 0, z, -y], [0, 1, 0, -z, 0, x]], dtype=object)
+
+
+def sleeping_top() -> HardCase:
+    """A top that spins upright at 1,000 rad/s and sinks on its tip at 1 cm/s."""
+    exact = _at_a_point((0, 0, Fraction(-1, 2)))
+    return HardCase(
+        "Sleeping top set on its tip",
+        "Klein and Sommerfeld, Über die Theorie des Kreisels (1897-1910); numbers ours",
+        "all but a part in 1e9 of the energy is spin, in which no row has a share",
+        "the spin is kept; the tip is stopped in all three directions, and the axis starts to turn with it",
+        np.diag([2.0, 2.0, 2.0, 0.75, 0.75, 0.5]), exact.astype(float),
+        np.array([0.125, 0.0, -0.01, 0.0, 0.0, 1000.0]), 0.0, exact_jacobian=exact,
+    )  # fmt: skip
+
+
+def rolling_coin() -> HardCase:
+    """A coin that leans by the angle of the triangle 3-4-5 and lands on its rim, spinning without rolling."""
+    exact = _at_a_point((Fraction(3, 5), 0, Fraction(-4, 5)))
+    mass = np.diag([100.0] * 6)
+    mass[3:, 3:] = [[41.0, 0.0, 12.0], [0.0, 25.0, 0.0], [12.0, 0.0, 34.0]]  # 25 (1 + a aᵀ), a = (4/5, 0, 3/5)
+    return HardCase(
+        "Coin that starts to roll",
+        "Appell, Traité de mécanique rationnelle (1900); numbers ours",
+        "sliding, falling and spin are coupled through a full inertia: the grip changes the axis of the spin",
+        "it rolls: the rim's point rests, the angular momentum about that point is kept",
+        mass, exact.astype(float), np.array([0.0, 2.0, -1.0, -4.0, 0.0, -3.0]), 0.0, exact_jacobian=exact,
+    )  # fmt: skip
+
+
+def rattleback() -> HardCase:
+    """A celt struck on its end: axes of inertia turned by the angle of 3-4-5 against those of its shape."""
+    exact = _at_a_point((Fraction(1, 2), 0, Fraction(-1, 4)))
+    mass = np.diag([100.0, 100.0, 100.0, 52.0, 73.0, 120.0])
+    mass[3, 4] = mass[4, 3] = -36.0  # 25 R diag(1, 4) Rᵀ
+    return HardCase(
+        "Rattleback tapped on its end",
+        "Walker, Quarterly J. of Pure and Applied Mathematics 28 (1896); numbers ours",
+        "a fall without any spin makes spin, through one entry of the inertia that is not on its diagonal",
+        "it spins to the side that the product of inertia says, and not at all without one",
+        mass, exact.astype(float), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]), 0.0, exact_jacobian=exact,
     )  # fmt: skip

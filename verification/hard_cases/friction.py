@@ -1,4 +1,4 @@
-"""Dry friction at its edges: Kane and Levinson's double pendulum, just below and above sliding, Painlevé's rod.
+"""Dry friction at its edges: Kane and Levinson's double pendulum, about sliding, Painlevé's rod, stick-slip.
 
 Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with friction makes energy. Two
 uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from the vertical, angles of the triangles 5-12-13 and
@@ -328,3 +328,85 @@ def _measure_rod(run: Run) -> Measured:
     true = truth(run.time[slipping])
     steepest = float(np.abs(np.diff(true)).max())
     return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[slipping] - true).max()) / _SPEED, steepest / _SPEED)
+
+
+# --- a plate pushed by a spring: stick-slip -----------------------------------------------------------------------
+# The spring is that of a contact: a ball of 1e8 kg at a steady speed presses on the edge of a plate of 1 kg.
+_PRESS, _STEADY, _PRESSED = 1e4, 0.01, 0.5  # spring [N/m], speed of the ball [m/s], duration [s]
+_OMEGA = math.sqrt(_PRESS)
+_SLIDING = _MU * _G / _PRESS  # the spring's depth [m] at which the plate slides steadily; it starts half as deep again
+_THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
+# A first-order step finds each of the two ends of sticks a step late, at most, before the cycle is reached, and the
+# cycle, whose sticks have no length, by a step each time.
+_LATE = 4.0
+
+_PLATE = """
+name: stick_slip
+title: A plate pushed by a spring
+source: textbook
+rate: 4000
+duration: {duration}
+gravity: [0, -{g}]
+bodies:
+  - name: plate
+    joint: planar
+    mass: 1.0
+    inertia: 0.001875
+    shapes: [{{kind: box, size: [0.15, {thick}]}}]
+    position: [0, {height!r}, 0]
+    velocity: [{speed}, 0, 0]
+  - name: ball
+    joint: prismatic
+    axis: [1, 0]
+    origin: [{behind!r}, {height!r}]
+    mass: 1e8
+    shapes: [{{kind: circle, radius: {thin}}}]
+    velocity: [{speed}]
+walls:
+  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+contact: {{stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2e-3}}
+"""
+
+
+def stick_slip() -> TrajectoryCase:
+    """A plate of 1 kg on a rough floor, pushed by a spring whose other end moves steadily."""
+    amplitude, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
+    scene = _PLATE.format(g=_G, height=0.5 * _THICK - _G / (2.0 * _PRESS), behind=-0.075 - _THIN + depth, mu=_MU,
+                          thick=_THICK, thin=_THIN, press=_PRESS, speed=_STEADY, duration=_PRESSED)  # fmt: skip
+
+    def measure(run: Run) -> Measured:
+        """Largest distance from the closed form, as a share of the cycle's amplitude; the energy seen from the ball.
+
+        That energy, (v − V)² / 2 + K u² / 2, is kept while the plate slides and falls while it sticks; the symplectic
+        step lets it swing by ω Δt.
+        """
+        u = _STEADY * run.time - run.q[:, 0] + 0.5 * _SLIDING
+        held = (run.v[:, 0] - _STEADY) ** 2 + _PRESS * u**2
+        off = float(np.abs(run.q[:, 0] - pushed_plate(run.time)).max()) / amplitude
+        gain = float(held.max() / held[0]) - 1.0
+        return Measured(gain, _OMEGA * run.dt, off, _LATE * _STEADY * run.dt / amplitude)
+
+    return TrajectoryCase(
+        "Stick-slip oscillator and its limit cycle",
+        "Den Hartog, Trans. ASME 53 (1931); the block on a belt of textbooks",
+        "each cycle ends in a stick of no length, at no speed and at the very edge of the cone",
+        "one slip, one stick, then for ever the same cycle of 2π/ω",
+        "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
+        "v = V (1 − cos ωt), whatever it began with",
+        scene_from_text(scene), measure, ("IAPB", "PB"),
+    )  # fmt: skip
+
+
+def pushed_plate(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position of the plate [m]: u, the depth beyond steady sliding, obeys u'' = −ω² u while it slides.
+
+    It starts with u₀ at the ball's speed, comes to rest where u = −√(u₀² − V²/ω²), and slides again from u = 0 on.
+    """
+    u, way = 0.5 * _SLIDING, _STEADY / _OMEGA
+    stops = (math.pi + math.asin(way / u)) / _OMEGA
+    last = -math.sqrt(u * u - way * way)
+    starts = stops - last / _STEADY
+    first = u + _STEADY * time - u * np.cos(_OMEGA * time)
+    held, since = u + _STEADY * stops - last, time - starts
+    cycle = held + _STEADY * since - way * np.sin(_OMEGA * since)
+    return np.asarray(np.select([time < stops, time < starts], [first, np.full_like(time, held)], cycle), np.float64)

@@ -10,8 +10,8 @@ import pytest
 
 from iapb import find_scene, load_scene
 from iapb.effects import EFFECTS
-from iapb.scene import Scene
-from verification.cost.effects import LEFT_OUT, effects_of, in_words
+from iapb.scene import Scene, scene_from_text, scene_names
+from verification.cost.effects import LEFT_OUT, NOTHING, effects_of, in_words
 
 
 def _scene(name: str, duration: float) -> Scene:
@@ -63,3 +63,43 @@ def test_a_hinged_rod_goes_elsewhere_though_its_hinge_stays(tmp_path: Path) -> N
     acceleration = 0.5 * 9.81 * 0.3 / (1e-2 + 0.5 * 0.3**2)
     farthest = 0.3 + np.sqrt(1e-2 / 0.5)  # the point a radius of gyration beyond the centre of mass
     assert found["gravity"]["position"] == pytest.approx(1e3 * 0.5 * acceleration * 0.1**2 * farthest, rel=0.03)
+
+
+_SLIDER = """
+name: slider
+rate: 500
+duration: 0.2
+gravity: [0, -9.81]
+bodies:
+  - {{name: cart, joint: prismatic, axis: [1, 0], mass: 1.0, velocity: [{speed}],
+     shapes: [{{kind: circle, radius: 0.05}}]}}
+walls:
+  - {{name: wall, kind: half_plane, point: [0.2, 0], normal: [-1, 0]}}
+contact: {{friction: 0.5, stiffness: 1e3, damping: 1}}
+"""
+
+
+def test_a_wall_that_is_never_reached_changes_nothing_and_gravity_on_a_slider_is_off() -> None:
+    """At 0.5 m/s the cart ends 50 mm before the wall; at 1 m/s it strikes it, and only friction has nothing to do."""
+    short, far = (
+        {row["effect"]: row for row in effects_of(scene_from_text(_SLIDER.format(speed=speed)), pairs=1).records()}
+        for speed in (0.5, 1.0)
+    )
+    assert not short["gravity"]["active"] and "nothing moves along gravity" in short["gravity"]["reason"]
+    for name in ("friction", "impulses", "penalty_stiffness", "contact_damping"):
+        assert short[name]["active"] and short[name]["change"] == f"{NOTHING}: nothing touches"
+    assert short["wall_contacts"]["change"] == f"{NOTHING}: no body touches a wall"
+    assert far["friction"]["change"] == f"{NOTHING}: all states are the same to the last bit"
+    for name in ("wall_contacts", "impulses"):
+        assert not far[name]["change"].startswith(NOTHING) and far[name]["position"] > 0.0
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_effects_that_change_nothing_are_named_in_every_shipped_scene(name: str) -> None:
+    """A tenth of a second of each: an effect has numbers that differ from zero, or changes nothing and says so."""
+    for row in effects_of(_scene(name, 0.1), pairs=1).records():
+        if not row["active"] or row["step"] is None:
+            continue
+        numbers = [row["position"], row["device"] or 0.0, row["energy"]]
+        assert row["change"].startswith(NOTHING) <= (numbers == [0.0, 0.0, 0.0]), row
+        assert max(numbers) > 0.0 or "0 mm" in row["change"] or row["change"].startswith(NOTHING), row

@@ -11,6 +11,7 @@ import pytest
 from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge_hard_case
 from verification.hard_cases.case import FrictionalCase
 from verification.hard_cases.exact import exact_poisson
+from verification.hard_cases.friction import pushed_plate
 from verification.hard_cases.judge import restitution_residual, run_in_world
 from verification.hard_cases.motions import exact_height
 
@@ -145,3 +146,55 @@ def test_the_struck_rod_sticks() -> None:
     rows = [[Fraction(x) for x in row] for row in case.all_rows]
     assert [sum((a * v for a, v in zip(row, case.truth.velocity, strict=True)), Fraction(0)) for row in rows] == [0, 0]
     assert case.truth.velocity == case.newton_with_coulomb()
+
+
+def _momentum_about(case: HardCase, r: tuple[Fraction, ...], velocity: tuple[Fraction, ...]) -> list[Fraction]:
+    """Angular momentum about the point at r from the centre of mass: I ω − r × m v."""
+    mass = [[Fraction(x) for x in row] for row in case.mass_matrix]
+    p = [mass[0][0] * x for x in velocity[:3]]
+    spin = [sum((mass[3 + i][3 + j] * velocity[3 + j] for j in range(3)), Fraction(0)) for i in range(3)]
+    return [spin[0] - (r[1] * p[2] - r[2] * p[1]), spin[1] - (r[2] * p[0] - r[0] * p[2]),
+            spin[2] - (r[0] * p[1] - r[1] * p[0])]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "point"),
+    [("sleeping_top", ("0", "0", "-1/2")), ("rolling_coin", ("3/5", "0", "-4/5")),
+     ("rattleback", ("1/2", "0", "-1/4"))],
+)
+def test_a_held_point_rests_and_keeps_the_angular_momentum_about_it(name: str, point: tuple[str, ...]) -> None:
+    case = _impact(name)
+    r, after = tuple(Fraction(x) for x in point), case.truth.velocity
+    before = tuple(Fraction(x) for x in case.velocity)
+    omega = after[3:]
+    cross = (omega[1] * r[2] - omega[2] * r[1], omega[2] * r[0] - omega[0] * r[2], omega[0] * r[1] - omega[1] * r[0])
+    assert [v + x for v, x in zip(after, cross, strict=False)] == [0, 0, 0]
+    assert _momentum_about(case, r, after) == _momentum_about(case, r, before)
+
+
+def test_the_top_sleeps_and_the_rattleback_spins_by_its_product_of_inertia() -> None:
+    top = _impact("sleeping_top").truth.velocity
+    assert top == (Fraction(1, 20), 0, 0, 0, Fraction(1, 10), 1000)
+    celt = _impact("rattleback")
+    spins = []
+    for product in (-36.0, 36.0, 0.0):
+        mass = celt.mass_matrix.copy()
+        mass[3, 4] = mass[4, 3] = product
+        spins.append(replace(celt, mass_matrix=mass).truth.velocity[5])
+    assert spins[0] == Fraction(120, 3607) and spins[1] == -spins[0] and spins[2] == 0
+
+
+def test_the_pushed_plate_slips_sticks_and_then_cycles() -> None:
+    """Depth of the spring: 3/2 of the sliding depth at first; at most that depth in every stick; period 2π/ω."""
+    period, speed = 2.0 * np.pi / 100.0, 0.01
+    time = np.linspace(0.0, 0.5, 200_001)
+    x = pushed_plate(time)
+    rate = np.gradient(x, time)
+    depth = speed * time - x + 1.5 * 0.3 * 9.81 / 1e4
+    push = np.gradient(rate, time) - 1e4 * depth + 0.3 * 9.81  # zero while it slides
+    moving = rate > 1e-5
+    assert x[0] == 0.0 and rate[0] == pytest.approx(speed, rel=1e-2) and rate.min() > -1e-7
+    assert np.quantile(np.abs(push[moving]), 0.999) < 1e-6  # all but the ends of sticks, where a difference spans both
+    assert (~moving).sum() > 1000 and np.max(depth[~moving]) * 1e4 <= 1.02 * 0.3 * 9.81
+    one, other = pushed_plate(time[-1] - np.array([period, 0.0]))
+    assert other - one == pytest.approx(speed * period)
