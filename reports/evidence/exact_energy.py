@@ -27,8 +27,8 @@ from verification.laws.exact_energy import FAMILIES, exact_energy
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _RUNS = (Column("run"), Column("law"), Column("impacts"), Column("gains"), Column("largest gain"),
          Column("M Δv − impulse"), Column("Jᵀp − impulse"), Column("restitution"), Column(HOLDS))  # fmt: skip
-_FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("cancelled"), Column("median loss"),
-             Column("largest loss"), Column(HOLDS))  # fmt: skip
+_FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("cancelled"), Column("median price"),
+             Column("largest price"), Column(HOLDS))  # fmt: skip
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
@@ -45,7 +45,8 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         progress(len(files) + done, len(files) + len(FAMILIES))
         one = exact_energy(family, _DRAWN[depth])
         drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "cancelled": one.cancelled,
-                      "median loss": _known(one.loss[0]), "largest loss": _known(one.loss[2]), HOLDS: one.gains == 0})
+                      "median price": _known(one.price[0]), "largest price": _known(one.price[2]),
+                      HOLDS: one.gains == 0})
     engine = [row for row in rows if row["law"] in ENGINE_LAWS]
     others = [row for row in rows if row["law"] not in ENGINE_LAWS]
     worst = max((row["largest gain"] for row in others), default=0.0)

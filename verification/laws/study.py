@@ -158,8 +158,9 @@ def energy_gains(run: Any, depth: str, progress: Progress) -> Finding:
     parts = []
     if ours and printed:
         gain, share = "largest relative energy gain", "gain / (10 d ε √κ)"
-        said = (f"In {ours['impacts']:,} random impacts the engine's largest relative energy gain is {ours[gain]:.1e}, "
-                f"at most {ours[share]:.2g} of its bound 10 d ε √κ(M); the printed formula gains up to "
+        most = " gains no energy" if ours[gain] <= 0.0 else \
+            f"'s largest relative energy gain is {ours[gain]:.1e}, {ours[share]:.2g} of its bound 10 d ε √κ(M)"
+        said = (f"In {ours['impacts']:,} random impacts the engine{most}; the printed formula gains up to "
                 f"{printed[gain]:.1e}.")  # fmt: skip
         parts.append(Part(said, REPRODUCED if ours["above 10 d ε √κ"] == 0 else REFUTED))
     return finding_of("energy-gains", "Passive in floating point", "Does rounding make energy?",

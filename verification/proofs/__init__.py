@@ -88,16 +88,17 @@ def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> 
     records = []
     for done, name in enumerate(names):
         progress(done, len(names))
-        records.append(attempt(name, partial(check, name), failures))
+        records.append(attempt(name, partial(_check_with_coq, name), failures))
     progress(len(names), len(names))
-    return tuple(_with_coq(record) for record in records if record is not None)
+    return tuple(record for record in records if record is not None)
 
 
-def _with_coq(record: ProofRecord) -> ProofRecord:
-    """The record with Coq's answer, for the theorems that are written out for it."""
-    if record.name not in CERTIFIED:
+def _check_with_coq(name: str) -> ProofRecord:
+    """The record, with Coq's answer for the theorems that are written out for it."""
+    record = check(name)
+    if name not in CERTIFIED:
         return record
-    opinion = second_opinion(load(record.name))
+    opinion = second_opinion(load(name))
     return replace(record, coq="coqc is not installed" if opinion.verdict == "skipped" else opinion.answer)
 
 
