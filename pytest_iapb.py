@@ -1,0 +1,82 @@
+"""pytest plugin: one test per law for an impact resolver. It loads nothing until a test asks for it.
+
+    import pytest
+    from my_solver import resolve
+
+    @pytest.mark.iapb(contract="unilateral")
+    def test_resolve(iapb_law):
+        iapb_law(resolve)
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+IMPACTS = 1000  # of each law, unless the marker or --iapb-impacts says otherwise
+_MARKER = ("iapb(contract='equality', laws=None, impacts=1000, **options): what `iapb_law` judges by; "
+           "options as of verification.check_passivity")  # fmt: skip
+
+
+def _at_least(least: int) -> Callable[[str], int]:
+    def number(text: str) -> int:
+        value = int(text)
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text}: expected a whole number, {least} or more")
+        return value
+
+    return number
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the number of impacts and the seed."""
+    group = parser.getgroup("iapb", "laws of impact resolvers")
+    group.addoption("--iapb-impacts", type=_at_least(1), metavar="N", help=f"random impacts for each law [{IMPACTS}]")
+    group.addoption("--iapb-seed", type=_at_least(0), default=0, metavar="N", help="seed of the impacts [0]")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the marker."""
+    config.addinivalue_line("markers", _MARKER)
+
+
+def _asked(node: Any) -> dict[str, Any]:
+    """The keywords of the nearest marker."""
+    marker = node.get_closest_marker("iapb")
+    return {} if marker is None else dict(marker.kwargs)
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test that uses `iapb_law` one parameter for each law of its contract."""
+    if "iapb_law" not in metafunc.fixturenames:
+        return
+    from verification.laws.kit import choose_laws
+
+    asked = {"contract": "equality", "laws": None, "unequal_restitution": False} | _asked(metafunc.definition)
+    try:
+        laws = choose_laws(asked["contract"], asked["laws"], asked["unequal_restitution"])
+    except ValueError as error:
+        pytest.fail(f"marker iapb: {error}", pytrace=False)
+    metafunc.parametrize("iapb_law", list(laws), indirect=True)
+
+
+@pytest.fixture
+def iapb_law(request: pytest.FixtureRequest) -> Callable[[Callable[..., Any]], None]:
+    """Judge a resolver by one law: call it with the resolver; it raises with the shrunk counterexample."""
+    from verification import check_passivity
+
+    asked = {"impacts": IMPACTS} | _asked(request.node) | {"laws": [request.param]}
+    impacts = request.config.getoption("--iapb-impacts")
+    asked["impacts"] = asked["impacts"] if impacts is None else impacts
+    asked.setdefault("seed", request.config.getoption("--iapb-seed"))
+
+    def judge(resolver: Callable[..., Any]) -> None:
+        __tracebackhide__ = True
+        report = check_passivity(resolver, **asked)
+        if not report.passed:
+            pytest.fail(f"{report}\n\nseed {report.seed}", pytrace=False)
+
+    return judge
