@@ -53,12 +53,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Give a test that uses `iapb_law` one parameter for each law of its contract."""
     if "iapb_law" not in metafunc.fixturenames:
         return
-    from verification.laws.kit import choose_laws
+    from iapb.errors import IapbError
+    from iapb.lazy import needed
 
     asked = {"contract": "equality", "laws": None, "unequal_restitution": False} | _asked(metafunc.definition)
     try:
-        laws = choose_laws(asked["contract"], asked["laws"], asked["unequal_restitution"])
-    except ValueError as error:
+        kit = needed("verification.laws.kit", "The fixture iapb_law")
+        laws = kit.choose_laws(asked["contract"], asked["laws"], asked["unequal_restitution"])
+    except IapbError as error:
         pytest.fail(f"marker iapb: {error}", pytrace=False)
     metafunc.parametrize("iapb_law", list(laws), indirect=True)
 
