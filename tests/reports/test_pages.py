@@ -20,6 +20,9 @@ from reports.pages.formulas import formula, prose
 from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from reports.report import build_report, write_report
+from verification.claims import CLAIMS
+from verification.claims.c10_trajectory import FULL
+from verification.claims.conditions import full_grid
 from verification.cost.effects import COLUMNS as EFFECTS
 from verification.finding import (
     MIXED,
@@ -27,6 +30,7 @@ from verification.finding import (
     REFUTED,
     REPRODUCED,
     VERDICTS,
+    Column,
     Finding,
     Part,
     finding_of,
@@ -252,3 +256,22 @@ def test_a_page_too_large_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="8000000"):
         write_report(tmp_path / "report.html", "x" * 8_000_001)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None:
+    claim = CLAIMS["C10"]
+    near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
+    rows = [start.record() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
+            for start in full_grid()]  # fmt: skip
+    found = claim.conclude(claim.judge(table_of(claim.columns, rows)))
+    pile = dict.fromkeys(("contacts", "redundant", "time of (21)", "time of pushing"), 10.0)
+    piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
+                     "share of impulses that pull": pulls, "median distance from the LCP": pulls}
+             for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
+    table = table_of([Column(key) for key in piles[0]], piles)
+    topic = finding_of("complementarity", "Piles", "", "No.", (Part("n.", REFUTED),), {"piles": table})
+    page = build_report(Evidence(claims=(found,), topics=(topic,)))
+    assert "IAPB is the closest in 24 of 84 in x" in page and 'id="where-c10"' in page
+    assert "where more than 14 contacts collide at once" in page and "25 % of its impulses pull" in page
+    fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
+    assert 'id="where-c10"' not in build_report(Evidence(claims=(fewer,)))
