@@ -10,9 +10,11 @@ import math
 from fractions import Fraction as Exact
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic_core import InitErrorDetails
 
 from iapb.mechanics.joints import KINDS
+from iapb.scene.density import filled
 from iapb.scene.parts import (
     SMALLEST_POSITIVE,
     Name,
@@ -24,8 +26,10 @@ from iapb.scene.parts import (
     Vector2,
     Vector3,
     expectation,
+    located,
 )
 
+INERTIAL = ("mass", "center_of_mass", "inertia")  # what a density gives
 WORLD = "world"  # the parent of a body that hangs on nothing
 ORIGIN = (0.0, 0.0, 0.0)
 MAX_SHAPES_OF_BODY = 64
@@ -167,12 +171,41 @@ SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminat
 
 # Moving bodies
 
+_DENSITY: TypeAdapter[float] = TypeAdapter(Positive)
 
 class _AnyBody(Part):
     """What a joint asks of its body's numbers, in the plane and in space."""
 
+    _shapes: ClassVar[TypeAdapter[Any]]  # how its shapes are read
     with_axis: ClassVar[tuple[str, ...]]  # the joints that have an axis
     an_axis: ClassVar[str]  # what one looks like
+
+    @model_validator(mode="before")
+    @classmethod
+    def _filled(cls, given: Any) -> Any:
+        """Turn a density into mass, centre of mass and inertia; one that cannot be is left for `across_fields`."""
+        density = given.get("density") if isinstance(given, dict) else None
+        if not isinstance(density, int | float) or isinstance(density, bool) or any(given.get(x) for x in INERTIAL):
+            return given
+        try:
+            shapes, value = cls._shapes.validate_python(given.get("shapes") or ()), _DENSITY.validate_python(density)
+        except ValidationError:
+            return given
+        if not shapes:
+            return given
+        plain = {name: value for name, value in given.items() if name not in ("density", *INERTIAL)}
+        return plain | filled(shapes, value, spatial=cls.an_axis.count(",") == 2)
+
+    @classmethod
+    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+        density = given.get("density") if isinstance(given, dict) else None
+        if density is None:
+            return []
+        beside = [name for name in INERTIAL if given.get(name)]
+        if beside:
+            expected = f"no density beside {', '.join(beside)}: it gives mass, centre of mass and inertia"
+            return [located(("density",), density, expected)]
+        return [] if given.get("shapes") else [located(("density",), density, "shapes that it fills")]
 
     @field_validator("axis", check_fields=False)
     @classmethod
@@ -219,6 +252,7 @@ class Body(_AnyBody):
     positive definite in every configuration.
     """
 
+    _shapes = TypeAdapter(tuple[Shape, ...])
     with_axis = ("prismatic",)
     an_axis = "[1, 0]"
 
@@ -232,6 +266,9 @@ class Body(_AnyBody):
     angle: Number = Field(0.0, description="rotation of the joint frame in the parent [rad]")
     center_of_mass: Vector2 = Field((0.0, 0.0), description="centre of mass [m], body axes")
     mass: NonNegative = Field(0.0, description="mass [kg]")
+    density: Positive | None = Field(
+        None, description="in place of mass, center_of_mass and inertia: mass per area of the shapes [kg/m2]"
+    )
     inertia: NonNegative = Field(0.0, description="moment of inertia about the centre of mass [kg m2]")
     shapes: Annotated[tuple[Shape, ...], Field(max_length=MAX_SHAPES_OF_BODY)] = Field(
         (), description="what can touch; none: the body passes through everything"
@@ -261,6 +298,7 @@ Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tupl
 class SpatialBody(_AnyBody):
     """A rigid body of a tree in space."""
 
+    _shapes = TypeAdapter(tuple[SpatialShape, ...])
     with_axis = ("revolute", "continuous", "prismatic")
     an_axis = "[0, 0, 1]"
 
@@ -275,6 +313,9 @@ class SpatialBody(_AnyBody):
     rpy: Vector3 = Field(ORIGIN, description="rotation of the joint frame in the parent: roll, pitch, yaw [rad]")
     center_of_mass: Vector3 = Field(ORIGIN, description="centre of mass [m], body axes")
     mass: NonNegative = Field(0.0, description="mass [kg]")
+    density: Positive | None = Field(
+        None, description="in place of mass, center_of_mass and inertia: mass per volume of the shapes [kg/m3]"
+    )
     inertia: Inertia = Field(
         ORIGIN,
         description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, zz, xy, xz, yz; or a matrix",

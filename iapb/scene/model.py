@@ -16,7 +16,7 @@ from pydantic_core import InitErrorDetails
 from iapb.errors import ArgumentError, SceneError
 from iapb.names import one_of
 from iapb.scene.across import across_parts
-from iapb.scene.bodies import ORIGIN, Body, SpatialBody, SpatialWall, Wall
+from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, Wall
 from iapb.scene.parts import (
     Fraction,
     Name,
@@ -280,6 +280,9 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
     for i, step in enumerate(steps):
         key = _key(place, step, path)
         if i == len(steps) - 1:
+            if key == "density" and isinstance(place, dict):  # what it gives is computed anew
+                for name in INERTIAL:
+                    place.pop(name, None)
             place[key] = _plain(value)
             return
         if isinstance(place, dict) and place.get(key) is None:
