@@ -178,7 +178,7 @@ def _start(world, state, count):
             for k in range(f.local.shape[0]):
                 f.local[k] += f.p[j] * f.rows[j, k]
         _give_back(world, f, r)
-    if along(f.p[: count * size], f.slip) + 0.5 * along(f.moved, f.moved) > 0.0:
+    if along(f.p[: count * size], f.slip[: count * size]) + 0.5 * along(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
 

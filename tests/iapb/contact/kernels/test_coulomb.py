@@ -145,3 +145,15 @@ def test_the_law_of_a_scene_is_coulombs_unless_it_says_otherwise() -> None:
     assert [world.coulomb for world in worlds] == [True, False]
     frictionless = pile((1.0,)).with_values({"contact.friction": 0})
     assert not System(frictionless).world_under(Penalty()).coulomb
+
+
+def test_what_earlier_steps_left_in_the_scratch_does_not_count() -> None:
+    """The start from the impulses before was judged with slips of contacts that are gone."""
+    found = []
+    for left in (0.0, 1e6):
+        system, state, _ = stepped(pile((2.0, 1.0, 0.5)), 20, np.zeros(18))
+        state.step_friction.p[:] = state.step_friction.slip[:] = left
+        assert advance(system.world_under(Penalty()), state, np.zeros(18)) == OK
+        assert state.contact_count[0] > 0
+        found.append(state.v.copy())
+    assert np.array_equal(*found)
