@@ -34,7 +34,14 @@ from verification.finding import Failure, Finding, Table, finding_of, titled
 from verification.worlds.comparison import compare_worlds
 
 FOLDER = Path("out/compare")
-_SHOWN = ("map", "friction", "convergence")  # tables of the comparison with complementarity that are printed whole
+# Columns of the comparison with complementarity that are printed; the file has all.
+_SHOWN = {
+    "map": ("impacts", "e", "redundant rows", "cases", "share that agrees", "largest distance",
+            "largest extra loss of KE⁻"),
+    "friction": ("e", "μ", "cases", "all contacts push", "of these as the NCP", "unsolved", "NCP gains",
+                 "largest change of KE, IAPB"),
+    "convergence": ("scene", "events", "step", "error of positions", "order, positions", "order, velocities"),
+}  # fmt: skip
 
 
 def compare(
@@ -121,7 +128,7 @@ def _problems_alone(folders: Iterable[Path], progress: Any) -> tuple[Finding, li
     parts = [part for study in studies for part in problem_parts(study)]
     tables = {study.folder: problems_table(study) for study in studies}
     found = finding_of("problems", "Solvers on problem files", "", "", parts, tables, failures)
-    return found, [line for study in studies for line in _problem_lines(study, tables[study.folder])]
+    return found, [line for study in studies for line in _problem_lines(study)]
 
 
 def _keep(found: Finding, place: Path, figure: str) -> None:
@@ -212,12 +219,12 @@ def _unsolved(problems: Table) -> list[str]:
 
 def _study_lines(found: Finding, studies: Sequence[ProblemStudy]) -> list[str]:
     lines: list[str] = []
-    for name in _SHOWN:
+    for name, keys in _SHOWN.items():
         if name in found.tables:
-            lines += [sentence(found.tables[name].note) or name, *table_lines(found.tables[name]), ""]
+            lines += [sentence(found.tables[name].note) or name, *table_lines(found.tables[name].select(keys)), ""]
     if "time per impact" in found.tables:
         lines += ["Time per impact [µs], median", *table_lines(_costs(found.tables["time per impact"]), keys=2), ""]
-    return lines + [line for study in studies for line in _problem_lines(study, problems_table(study))]
+    return lines + [line for study in studies for line in _problem_lines(study)]
 
 
 def _costs(table: Table) -> Table:
@@ -233,12 +240,19 @@ def _costs(table: Table) -> Table:
                   [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
 
 
-def _problem_lines(study: ProblemStudy, table: Table) -> list[str]:
+def _problem_lines(study: ProblemStudy) -> list[str]:
+    """Problems with those who did not solve them, by name, and the profile of times."""
+    rows: list[tuple[Any, ...]] = []
+    for line in study.lines:
+        others = [f"{name} {found}" for name, found in line.verdicts if found in ("refused", "failed")]
+        solved = sum(found == "solved" for _, found in line.verdicts)
+        rows.append((line.problem, line.unknowns, line.rank, solved, ", ".join(others) or None))
+    rows += [(file.file, None, None, None, f"not read: {file.reason}") for file in study.unread]
+    by_problem = titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows)
     shown = [1.0, 3.0, 10.0, 100.0, 1e5]
     at = [int(np.searchsorted(FACTORS, factor, side="right")) - 1 for factor in shown]
     profile = titled(("solver", "kind", *(f"within {factor:g}" for factor in shown)),
                      [(solver, kind, *(f"{100 * float(share[k]):.0f} %" for k in at))
                       for kind, solver, share in study.profile])  # fmt: skip
-    return [f"{study.folder}: every solver on every problem", *table_lines(table), "",
-            "Performance profile (Dolan and Moré): share solved within a factor of the fastest's time",
-            *table_lines(profile), ""]  # fmt: skip
+    return [f"{study.folder}: every solver on every problem", *table_lines(by_problem), "",
+            "Performance profile (Dolan and Moré): solved within a factor of the fastest", *table_lines(profile), ""]

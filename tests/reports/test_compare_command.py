@@ -67,6 +67,21 @@ def test_json_goes_to_stdout_or_to_the_file(iapb, tmp_path):
     assert worlds["columns"][:3] == ["world", "law", "ignores"] and printed["parts"][0]["name"] == "runs"
 
 
+def test_problem_files_are_listed_with_who_did_not_solve_them_and_stored(iapb, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("given").mkdir()
+    Path("given/two.lcp").write_text("2\n2 1\n1 2\n-5 -6\n")
+    Path("given/bad.lcp").write_text("2\nno number\n")
+    Path("given/none.lcp").write_text("1\n-1\n-1\n")  # 0 <= z, −z − 1 >= 0: no z
+    status, out, _ = iapb("compare", "--only-problems", "--problems", "given")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line[:4] in ("two.", "none", "bad.")}
+    assert status == 0 and max(map(len, out.splitlines())) <= WIDTH
+    assert int(rows["two.lcp"][2]) > 3 and rows["none.lcp"][2] == "0" and rows["bad.lcp"][3:5] == ["not", "read:"]
+    assert "Stored in out/compare/problems.h5" in out
+    tables = read_tables("out/compare/problems.h5")
+    assert set(tables) == {"given", "finding"} and tables["given"]["00 problem"][0] == "none.lcp"
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
