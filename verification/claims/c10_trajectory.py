@@ -46,7 +46,7 @@ def finding(table: Table) -> str:
     return (
         f"The distance of IAPB to ideal is, in the median, this multiple of PB's: {ratios}. In how many starts it is "
         f"the smallest depends on the grid: on the full one (14 tilts, most of them small, times 6 clearances) "
-        f"{_counts(table, FULL)}; on tilts at even distances {_counts(table, EVEN)}."
+        f"{_counts(table, FULL)}; on its 8 tilts at even distances {_counts(table, EVEN)}."
     )
 
 

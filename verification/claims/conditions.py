@@ -78,9 +78,8 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
-# A second grid for what depends on the grid: tilts at even distances, where those above crowd at small ones.
-EVEN_TILTS = tuple(0.05 * n for n in range(8))
-EVEN_CLEARANCES = (0.004, 0.008, 0.016, 0.024)
+# A second grid for what depends on the grid: the tilts at even distances, where those above crowd at small ones.
+EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
 # 1e-6 takes every contact that approaches at all, as the paper does. An old contact that creeps into its wall under
 # the hand approaches too, by up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value leaves such contacts out.
@@ -106,8 +105,8 @@ def full_grid() -> tuple[Condition, ...]:
 
 
 def even_grid() -> tuple[Condition, ...]:
-    """Tilts at even distances, and other clearances."""
-    return tuple(Condition(tilt, clearance) for tilt in EVEN_TILTS for clearance in EVEN_CLEARANCES)
+    """The starts of the full grid whose tilts lie at even distances."""
+    return tuple(start for start in full_grid() if start.tilt in EVEN_TILTS)
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
