@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any, TypeVar
@@ -575,6 +575,14 @@ def of_each(
             return list(results(case))
 
         yield from attempt(name(case) if name else _words(case), listed, failures) or ()
+
+
+def counted(cases: Collection[Case], progress: Callable[[int, int], None]) -> Iterator[Case]:
+    """Yield the cases; before each, and at the end, say how many of them are done."""
+    for done, case in enumerate(cases):
+        progress(done, len(cases))
+        yield case
+    progress(len(cases), len(cases))
 
 
 def _words(case: Any) -> str:

@@ -10,7 +10,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.scene import Scene
 from reports.runner import Runner
-from verification.finding import Failure, attempt
+from verification.finding import Failure, attempt, counted
 
 # The experiments of the paper's section VII, emulated: its device at 512 Hz read and driven one step late each way,
 # encoders of 1 µm and 0.01 mrad, a little bearing friction. Ours: the paper gives none of these numbers.
@@ -53,13 +53,11 @@ def figure_runs(
 ) -> dict[str, Run]:
     """Every run in FIGURE_RUNS, computed or read, but for those that fail."""
     runs = {}
-    for done, (name, (scene, values, world, rendering)) in enumerate(FIGURE_RUNS.items()):
-        progress(done, len(FIGURE_RUNS))
+    for name, (scene, values, world, rendering) in counted(FIGURE_RUNS.items(), progress):
         with runner.recording(name):
             run = attempt(name, partial(_run, runner, scene, values, world, rendering), failures)
         if run is not None:
             runs[name] = run
-    progress(len(FIGURE_RUNS), len(FIGURE_RUNS))
     return runs
 
 

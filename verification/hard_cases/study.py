@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from verification.finding import (
@@ -17,8 +16,9 @@ from verification.finding import (
     Finding,
     Part,
     Table,
-    attempt,
+    counted,
     finding_of,
+    of_each,
     table_of,
     verdict_of_trials,
 )
@@ -50,12 +50,7 @@ def hard_cases(
     simulate: Simulate, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[Finding, ...]:
     """Judge all methods and worlds on all cases; a part per method. A case without its files says so."""
-    found = []
-    for done, name in enumerate(HARD_CASES):
-        progress(done, len(HARD_CASES))
-        found.append(attempt(name, partial(_judged, name, simulate, failures), failures))
-    progress(len(HARD_CASES), len(HARD_CASES))
-    return tuple(case for case in found if case is not None)
+    return tuple(of_each(counted(HARD_CASES, progress), lambda name: [_judged(name, simulate, failures)], failures))
 
 
 def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:

@@ -23,8 +23,7 @@ from verification.laws.engine_laws import ENGINE_LAWS
 from verification.laws.impact_laws import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.kit import LawCount, RunningCount, residual_of
 from verification.laws.resolver import Resolver
-from verification.laws.scenes import draw_scene
-from verification.laws.scenes_space import draw_spatial_scene
+from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectory_laws import judge_run
 
 IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"

@@ -23,6 +23,7 @@ from verification.finding import (
     Finding,
     Part,
     attempt,
+    counted,
     finding_of,
     of_each,
     table_of,
@@ -36,8 +37,7 @@ from verification.laws.impact_laws import relative_gain
 from verification.laws.kit import residual_count
 from verification.laws.planted import each_contact_its_own_restitution
 from verification.laws.planted_runs import PLANTED_ENGINE_FAULTS, PLANTED_TRAJECTORY_FAULTS, first_occasion
-from verification.laws.scenes import draw_scene
-from verification.laws.scenes_space import draw_spatial_scene
+from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory
 
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
@@ -181,12 +181,8 @@ def _bulk_rows(
 def counterexamples(progress: Progress, failures: list[Failure]) -> tuple[Finding, ...]:
     """Break a law by the printed formula, a restitution per contact as equalities, and saturation."""
     makers = (printed_formula, restitution_per_contact, saturation)
-    records = []
-    for done, make in enumerate(makers):
-        progress(done, len(makers))
-        records.append(attempt(make.__name__.replace("_", " "), make, failures))
-    progress(len(makers), len(makers))
-    return tuple(record for record in records if record is not None)
+    return tuple(of_each(counted(makers, progress), lambda make: [make()], failures,
+                         lambda make: make.__name__.replace("_", " ")))  # fmt: skip
 
 
 def printed_formula() -> Finding:

@@ -14,7 +14,6 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from iapb.errors import ArgumentError
@@ -26,8 +25,9 @@ from verification.finding import (
     Failure,
     Finding,
     Part,
-    attempt,
+    counted,
     finding_of,
+    of_each,
     table_of,
 )
 from verification.proofs.checking import checked
@@ -84,13 +84,7 @@ def check(name: str) -> ProofRecord:
 
 def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[ProofRecord, ...]:
     """Check all statements, none for one that raises."""
-    names = all_proofs()
-    records = []
-    for done, name in enumerate(names):
-        progress(done, len(names))
-        records.append(attempt(name, partial(_check_with_coq, name), failures))
-    progress(len(names), len(names))
-    return tuple(record for record in records if record is not None)
+    return tuple(of_each(counted(all_proofs(), progress), lambda name: [_check_with_coq(name)], failures))
 
 
 def _check_with_coq(name: str) -> ProofRecord:

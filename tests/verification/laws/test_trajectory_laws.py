@@ -10,8 +10,7 @@ from hypothesis import given, settings
 
 from reports.store import read_run, write_run
 from verification.laws.planted_runs import PLANTED_TRAJECTORY_FAULTS, first_occasion
-from verification.laws.scenes import SceneCase, draw_scene
-from verification.laws.scenes_space import draw_spatial_scene
+from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.strategies import scenes, scenes_in_space
 from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory, _gain, judge_run
 
