@@ -12,18 +12,20 @@ from numpy.typing import NDArray
 from iapb.checks import distrust_of
 from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
-from iapb.mechanics.energy import FORCES, energy_of_run
+from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities
-from iapb.system import System
+from iapb.scene.model import SpatialScene
 
 Floats = NDArray[np.float64]
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
 _STEPS_PER_CHUNK = 512  # one second of the paper's loop: progress and Ctrl-C answer at least that often
 
-_STATES, _STEPS = quantities(Run, "time"), quantities(Run, "step")
-_CONTACTS, _IMPACTS = quantities(ContactTable, "contact"), quantities(ImpactTable)
+# What the loop writes; poses and energies follow from it.
+STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
+STEPS = quantities(Run, "step")
+CONTACTS, IMPACTS = quantities(ContactTable, "contact"), quantities(ImpactTable)
 _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
                       "device_actuator_work")
 
@@ -48,7 +50,7 @@ def bytes_per_step(simulation: Any) -> int:
     mechanism, port = simulation.system.mechanism, simulation.port
     lengths = {"time": 1, "step": 1, "coordinate": mechanism.nq, "velocity": mechanism.nv,
                "device_coordinate": len(port.device_q), "device_velocity": len(port.device_v)}
-    lines = sum(array.nbytes for array in blank(_STATES + _STEPS, lengths).values())
+    lines = sum(array.nbytes for array in blank(STATES + STEPS, lengths).values())
     return 2 * lines + 8 * len(FORCES) + 40
 
 
@@ -57,8 +59,8 @@ def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: in
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
     return block(Record(
-        columns("StepLines", blank(_STATES + _STEPS, lengths)), np.zeros(steps, np.int64),
-        columns("ContactLines", blank(_CONTACTS, lengths)), columns("ImpactLines", blank(_IMPACTS, lengths)),
+        columns("StepLines", blank(STATES + STEPS, lengths)), np.zeros(steps, np.int64),
+        columns("ContactLines", blank(CONTACTS, lengths)), columns("ImpactLines", blank(IMPACTS, lengths)),
         np.zeros(2, np.int64)))
 
 
@@ -120,17 +122,27 @@ def _write_impacts(record, step, state):
 
 
 class Recorder:
-    """The chunks of a simulation in the making, joined into a Run with its energy ledger and effects."""
+    """The chunks of a simulation in the making, joined into a Run with its poses, energy ledger and effects.
+
+    What is held can be taken as a Run that is a part of the whole, and forgotten: the next part goes on from there.
+    """
 
     def __init__(self, simulation: Any) -> None:
         self.simulation = simulation
         port, state = simulation.port, simulation.state
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
-        self.records: list[Record] = []
+        self.records: list[Any] = []
         self.sizes: list[int] = []
         self.seconds: list[float] = []
-        self.steps = 0
+        self.first, self.steps = 0, 0  # steps before those that are held, and steps in all
+        self._before: dict[str, float] | None = None  # the ledger at `first`
+        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None  # state and energy at the start
+
+    @property
+    def held_bytes(self) -> int:
+        """Memory of the chunks that are held."""
+        return sum(array.nbytes for record in self.records for array in record.arrays())
 
     def chunk(self, total: int) -> BaseException | None:
         """Do and keep the next chunk; return what stopped it before its end."""
@@ -144,17 +156,34 @@ class Recorder:
 
     def blank(self, total: int) -> tuple[Record, int]:
         """Return an empty record for the next chunk and its number of steps; the whole run has `total`."""
-        system, port = self.simulation.system, self.simulation.port
+        system = self.simulation.system
         size = chunk_steps(system.capacity, total - self.steps)
-        coordinates = (system.mechanism.nq, system.mechanism.nv, len(port.device_q), len(port.device_v))
-        return make_record(size, coordinates, system.capacity, len(system.mechanism.tree_dofs)), size
+        return make_record(size, self.coordinates, system.capacity, len(system.mechanism.tree_dofs)), size
 
-    def keep(self, record: Record, steps: int, seconds: float) -> None:
+    @property
+    def coordinates(self) -> tuple[int, int, int, int]:
+        """Lengths of q and v, and of the device's."""
+        mechanism, port = self.simulation.system.mechanism, self.simulation.port
+        return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
+
+    def keep(self, record: Any, steps: int, seconds: float) -> None:
         """Take a chunk of which `steps` lines are written, in `seconds` of work."""
         self.records.append(record)
         self.sizes.append(steps)
         self.seconds.append(seconds)
         self.steps += steps
+
+    def held(self) -> list[tuple[Any, int, float]]:
+        """The chunks that are held: each record, its steps and its seconds."""
+        return list(zip(self.records, self.sizes, self.seconds, strict=True))
+
+    def forget(self) -> None:
+        """Hold nothing any more: somebody else has written the chunks down."""
+        self.records, self.sizes, self.seconds, self.first = [], [], [], self.steps
+
+    def go_on(self, steps: int) -> None:
+        """Count from a number of steps that were done, and written down, before."""
+        self.first = self.steps = steps
 
     def joined(self, lines: str, name: str) -> np.ndarray:
         """One array over all chunks: a column of the record's `steps`, `contacts` or `impacts`."""
@@ -163,15 +192,27 @@ class Recorder:
             getattr(getattr(each, lines), name)[:size] for each, size in zip(self.records, sizes, strict=True)])
 
     def run(self, world: str, stopped: str) -> Run:
-        """Everything recorded so far as a Run; `stopped` says why it is not complete."""
+        """Everything held as a Run; `stopped` says why it is not complete."""
+        return self._part(world, stopped)[0]
+
+    def take(self, world: str) -> Run:
+        """Return what is held as a part of a run, and forget it: the next part starts where this one ends."""
+        part, ledger = self._part(world, "")
+        self.start = {each.name: getattr(part, each.name)[-1].copy() for each in STATES}
+        self._before = last_of(ledger, self._before)
+        self.forget()
+        return part
+
+    def _part(self, world: str, stopped: str) -> tuple[Run, dict[str, Floats]]:
+        """The Run, and its whole ledger."""
         simulation, system = self.simulation, self.simulation.system
         states: dict[str, Any] = {
             each.name: np.concatenate([self.start[each.name][None], self.joined("steps", each.name)])
-            for each in _STATES}
+            for each in STATES}
         counts = [each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)]
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
         law, coupling = simulation.law, simulation.coupling
-        steps: dict[str, Any] = {each.name: self.joined("steps", each.name) for each in _STEPS}
+        steps: dict[str, Any] = {each.name: self.joined("steps", each.name) for each in STEPS}
         run = Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
@@ -180,23 +221,32 @@ class Recorder:
             coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
             velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
             body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.steps + 1, dtype=np.float64) * system.dt, **states,
+            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states,
+            pose=system.mechanism.poses(states["q"], planar=not isinstance(simulation.scene, SpatialScene)),
             **steps,
-            contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in _CONTACTS}),
-            impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in _IMPACTS}),
+            contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in CONTACTS}),
+            impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in IMPACTS}),
             energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
                                      for one in simulation.effects),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks,
         )
-        run = replace(run, energy=_energy(run, system))
-        return replace(run, distrust=distrust_of(run))
+        device = system.device_mechanism() if coupling.name != "none" else None
+        ledger = energy_of_run(run, system.mechanism, system.gravity, device, self._before)
+        # Without the tool's balance under a unilateral coupler, where the tool is carried at times.
+        kept = _KEPT_WHEN_CARRIED if coupling.name == "unilateral" else ledger
+        run = replace(run, energy={name: values for name, values in ledger.items() if name in kept})
+        return replace(run, distrust=distrust_of(self._since_the_start(run))), ledger
 
-
-def _energy(run: Run, system: System) -> dict[str, Floats]:
-    """The ledger; without the tool's balance under a unilateral coupler, where the tool is carried at times."""
-    device = system.device_mechanism() if run.coupling != "none" else None
-    ledger = energy_of_run(run, system.mechanism, system.gravity, device)
-    if run.coupling != "unilateral":
-        return ledger
-    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED}
+    def _since_the_start(self, part: Run) -> Run:
+        """Return the run or, of a later part, one that goes from the first state of all to those of the part."""
+        first = {name: getattr(part, name)[0].copy() for name in ("q", "v")}
+        energy = {name: part.energy[name][0] for name in ("kinetic", "potential")}
+        if self._at_first is None:
+            self._at_first = first, energy
+            return part
+        first, energy = self._at_first
+        states: dict[str, Any] = {
+            name: np.concatenate([state[None], getattr(part, name)[1:]]) for name, state in first.items()}
+        ledger = {name: np.concatenate([[value], part.energy[name][1:]]) for name, value in energy.items()}
+        return replace(part, energy=part.energy | ledger, **states)

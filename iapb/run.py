@@ -150,6 +150,8 @@ class Run:
     v: Floats = field(metadata=_along("time velocity", VELOCITY, "generalized velocity"))
     device_q: Floats = field(metadata=_along("time device_coordinate", POSITION, "configuration of the device"))
     device_v: Floats = field(metadata=_along("time device_velocity", VELOCITY, "velocity of the device"))
+    # of each body's frame: x, y, angle in (−π, π] in the plane; x, y, z and a quaternion x, y, z, w >= 0 in space
+    pose: Floats = field(metadata=_along("time body placement", POSITION, "where each body is"))
 
     hand_force: Floats = field(metadata=_along("step velocity", FORCE, "generalized force of the hand on the tool"))
     coupling_force: Floats = field(metadata=_along("step velocity", FORCE, "force of the coupling on the tool"))
@@ -271,7 +273,7 @@ def unit_of(quantity: Quantity, run: Run) -> str:
     """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
     if isinstance(quantity.unit, str):
         return quantity.unit
-    units = [quantity.unit[unit] for unit in _labels_along(run, quantity.dimensions[1])[1]]
+    units = [quantity.unit[unit] for unit in _labels_along(run, quantity.dimensions[-1])[1]]
     return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
 
 
@@ -288,9 +290,13 @@ def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] 
 def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units along a dimension of generalized quantities; none along others."""
     q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
+    planar = run.pose.shape[-1] == 3
     return {
         "coordinate": (run.coordinate_names, run.coordinate_units),
         "velocity": (run.velocity_names, run.velocity_units),
         "device_coordinate": (run.coordinate_names[q], run.coordinate_units[q]),
         "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
+        "body": (run.body_names, ()),
+        "placement": (("x", "y", "angle") if planar else ("x", "y", "z", "qx", "qy", "qz", "qw"),
+                      ("m", "m", "rad") if planar else ("m", "m", "m", "1", "1", "1", "1")),
     }.get(dimension, ((), ()))

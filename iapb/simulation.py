@@ -166,6 +166,15 @@ class Simulation:
         self._steps = Entry(compiled_steps)
         self.steps_done = 0
 
+    def arrays(self) -> list[np.ndarray]:
+        """Everything that a step may change, in a fixed order: with it another simulation goes on from here."""
+        return [*self.state.arrays(), *self.port.arrays()]  # type: ignore[attr-defined]
+
+    @property
+    def keeps_no_state(self) -> bool:
+        """Whether `arrays` are all that the next step depends on: no device of its own, no law with a memory."""
+        return self.link is None and (self.compiled or _is_frozen(self.law))
+
     @property
     def time(self) -> float:
         """Simulated time [s]."""
@@ -329,20 +338,40 @@ def _simulated(simulation: Simulation, world: str, total: int, progress: Callabl
                checkpoint: Checkpoint | None) -> Run:
     """The loop of `simulate`, chunk by chunk."""
     recording = Recorder(simulation)
+
+    def keep() -> None:
+        if checkpoint is not None and checkpoint.due:
+            checkpoint(recording.run(world, "not finished when this was written"))
+
+    stopped = record(recording, total, progress, keep)
+    return recording.run(world, stopped)
+
+
+def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None,
+           between: Callable[[], None] | None = None) -> str:
+    """Do the steps that are missing of `total`, chunk by chunk; return why they are not all done, "" where they are.
+
+    progress : see `simulate`; between : called between two chunks.
+
+    Raises
+    ------
+    IapbError, KeyboardInterrupt
+        Stopped before the first step was done.
+    """
     stop: BaseException | None = None
     try:
         while recording.steps < total and stop is None:
             stop = recording.chunk(total)
             if progress is not None:
                 progress(recording.steps, total)
-            if checkpoint is not None and stop is None and recording.steps < total and checkpoint.due:
-                checkpoint(recording.run(world, "not finished when this was written"))
+            if between is not None and stop is None and recording.steps < total:
+                between()
     except KeyboardInterrupt as interrupt:
         stop = interrupt
     if stop is not None and recording.steps == 0:
         raise stop
     why = INTERRUPTED if isinstance(stop, KeyboardInterrupt) else str(stop)
-    return recording.run(world, "" if recording.steps == total else why)
+    return "" if recording.steps == total else why
 
 
 def _step_count(steps: Any) -> int:

@@ -72,10 +72,15 @@ def run_world(
     if not isinstance(scene, Scene):
         scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
-    label = name if rendering == "full" else f"{name} {rendering}"
     with one_thread():  # once for all steps of a rigid world
-        run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
+        run = simulate(scene, world.law, world.coupling_in(scene), world=label_of(name, rendering), progress=progress,
+                       **options)  # fmt: skip
     return run if partial else require_complete(run)
+
+
+def label_of(name: str, rendering: str) -> str:
+    """Return what a run in a world says of its world."""
+    return name if rendering == "full" else f"{name} {rendering}"
 
 
 def require_complete(run: Run) -> Run:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -80,6 +81,7 @@ def _facts() -> tuple[tuple[str, str], ...]:
         "system": f"{platform.system()} {platform.machine()}",
         "cpu": processor(),
         "blas": linear_algebra(),
+        "simd": dispatched(),
     }
     facts.update({package: package_version(package) for package in _PACKAGES})
     return tuple(facts.items())
@@ -133,19 +135,29 @@ def linear_algebra() -> str:
     return "; ".join(sorted(found)) or UNKNOWN
 
 
+def dispatched() -> str:
+    """Return the optional code of numpy that runs here; NPY_DISABLE_CPU_FEATURES can leave some out."""
+    try:
+        numpy = import_module("numpy._core._multiarray_umath")
+        return " ".join(name for name in numpy.__cpu_dispatch__ if numpy.__cpu_features__[name]) or "baseline"
+    except (ImportError, AttributeError):  # numpy does not promise these names
+        return UNKNOWN
+
+
 def machine_of(facts: Mapping[str, str]) -> str:
-    """Return what in a result's provenance can change last bits beside the code: processor and BLAS kernel.
+    """Return what in a result's provenance can change last bits beside the code: processor, BLAS and numpy's code.
 
     The number of threads is left out: it is that of the moment.
     """
     kernels = sorted(set(re.findall(r"(\S+) x\d+", facts.get("blas", ""))))
-    return ", ".join(text for text in (facts.get("cpu", ""), " and ".join(kernels)) if text)
+    simd = f"numpy {facts['simd']}" if "simd" in facts else ""
+    return ", ".join(text for text in (facts.get("cpu", ""), " and ".join(kernels), simd) if text)
 
 
 @cache
 def this_machine() -> str:
     """Return the same of this process: it is part of the keys of computed stages."""
-    return machine_of({"cpu": processor(), "blas": linear_algebra()})
+    return machine_of({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
 
 
 def _dirty() -> str:

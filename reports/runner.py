@@ -11,10 +11,14 @@ from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
+from iapb.simulation import Simulation
 from reference import worlds
+from reference.one_thread import one_thread
 from reports.batches import worker_pool
 from reports.store.folder import Checkpoint, Place, RunStore
+from reports.store.io import mark_store
 from reports.store.runs import RunEntry
+from reports.streaming import stream
 from reports.uses import UsedRun, add_use, run_command
 from verification.finding import attempt
 
@@ -72,6 +76,24 @@ class Runner:
         if keep and fetched.run.complete:
             self._held[place.path.name] = fetched
         return fetched
+
+    def stream(self, scene: Scene, world: str, rendering: str = "full", *, resume: bool = False) -> tuple[Place, Any]:
+        """Simulate and store a run in constant memory; return its place and what came of it, None where it exists.
+
+        resume : go on from what a stopped or killed process left, bit for bit.
+        """
+        place = self._place(scene, world, rendering)
+        if place.path.is_file():
+            return place, None
+        mark_store(self.store.folder)
+        found = worlds.find_world(world, rendering)
+        simulation = Simulation(scene, found.law, found.coupling_in(scene))
+        with one_thread():  # as run_world does
+            streamed = stream(place, simulation, worlds.label_of(world, rendering), scene.steps, resume=resume,
+                              progress=self.progress)  # fmt: skip
+        if streamed.entry is not None:
+            self.store.list_run(streamed.entry)
+        return place, streamed
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:

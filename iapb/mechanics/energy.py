@@ -49,12 +49,18 @@ def displacements(mechanism: Mechanism, q: Floats) -> Floats:
     return out
 
 
-def port_energy(force: Floats, displacement: Floats) -> Floats:
+def port_energy(force: Floats, displacement: Floats, before: float | None = None) -> Floats:
     """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F . Dq.
 
-    This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d).
+    This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d); `before` is
+    what had entered in earlier steps.
     """
-    return np.cumsum(np.einsum("nd,nd->n", force, displacement))
+    return _summed(np.einsum("nd,nd->n", force, displacement), before)
+
+
+def _summed(values: Floats, before: float | None) -> Floats:
+    """Sums so far, one addition after another: a run summed part by part has the bits of one that is summed whole."""
+    return np.cumsum(values) if before is None else np.cumsum(np.concatenate([[before], values]))[1:]
 
 
 def passivity_deficit(entered: Floats, stored: float = 0.0) -> float:
@@ -85,6 +91,7 @@ def energy_ledger(
     v: Floats,
     forces: Mapping[str, Floats],
     impulse: Floats,
+    before: Mapping[str, float] | None = None,
 ) -> dict[str, Floats]:
     """Return the ledger of n steps.
 
@@ -98,6 +105,8 @@ def energy_ledger(
         Generalized forces on the mechanism over each step; gravity is not among them.
     impulse : (n, d) [N s, N m s]
         Generalized impulse at the beginning of each step.
+    before : ledger name -> [J], optional
+        Where the sums stand that these steps continue (`last_of`).
 
     Returns
     -------
@@ -118,27 +127,43 @@ def energy_ledger(
         if np.shape(force) != (steps, mechanism.nv):
             raise ArgumentError(f"{name} of shape", np.shape(force), f"({steps}, {mechanism.nv})")
     for name, force in forces.items():
-        ledger[f"{name}_work"] = port_energy(force, displacement)
-    ledger["impact_loss"] = np.cumsum(impact_losses(mechanism, q, v, impulse))
+        ledger[f"{name}_work"] = port_energy(force, displacement, _entry(before, f"{name}_work"))
+    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), _entry(before, "impact_loss"))
     total = kinetic + potential
     explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
-    ledger["integration_residual"] = total[1:] - total[0] - explained
+    ledger["integration_residual"] = total[1:] - (total[0] if before is None else before[_AT_FIRST]) - explained
     return ledger
 
 
+_AT_FIRST = "energy at the start"
+
+
+def last_of(ledger: Mapping[str, Floats], before: Mapping[str, float] | None) -> dict[str, float]:
+    """Return where the sums of a ledger stand: `before` of the steps that follow."""
+    first = ledger["kinetic"][0] + ledger["potential"][0] if before is None else before[_AT_FIRST]
+    ends = {name: float(values[-1]) for name, values in ledger.items() if len(values)}
+    return dict(before or {}) | {_AT_FIRST: float(first)} | ends
+
+
+def _entry(before: Mapping[str, float] | None, name: str) -> float | None:
+    return None if before is None else before[name]
+
+
 def energy_of_run(
-    run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None
+    run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
+    before: Mapping[str, float] | None = None,
 ) -> dict[str, Floats]:
-    """Return the ledger of a run (see `energy_ledger`), with the device's side where there is one.
+    """Return the ledger of a run, or of the part that follows `before` (see `energy_ledger`), the device's side too.
 
     The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
     energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
     """
     forces = {name: getattr(run, f"{name}_force") for name in FORCES}
-    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse)
+    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before)
     if device is not None and run.device_q.shape[1]:
         moved = displacements(device, run.device_q)
         ledger["device_kinetic"], _ = energies(device, gravity, run.device_q, run.device_v)
-        ledger["device_hand_work"] = port_energy(run.hand_force[:, slice(*run.tool_dofs)], moved)
-        ledger["device_actuator_work"] = port_energy(run.device_force, moved)
+        ledger["device_hand_work"] = port_energy(
+            run.hand_force[:, slice(*run.tool_dofs)], moved, _entry(before, "device_hand_work"))
+        ledger["device_actuator_work"] = port_energy(run.device_force, moved, _entry(before, "device_actuator_work"))
     return ledger

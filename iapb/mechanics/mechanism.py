@@ -34,8 +34,8 @@ entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
     configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
     evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
     evaluation.is_configuration, evaluation.kinetic_energy, evaluation.mass_matrices_at, evaluation.mass_matrix_at,
-    evaluation.misplaced_body, evaluation.potential_energy, kinematics.forward_kinematics, kinematics.frame_jacobian,
-    kinematics.point_jacobian)})  # fmt: skip
+    evaluation.misplaced_body, evaluation.planar_poses_along, evaluation.poses_along, evaluation.potential_energy,
+    kinematics.forward_kinematics, kinematics.frame_jacobian, kinematics.point_jacobian)})  # fmt: skip
 
 
 class _Scratch(threading.local):
@@ -162,6 +162,18 @@ class Mechanism:
         """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
         workspace = self._at(q)
         return workspace.rotation.copy(), workspace.position.copy()
+
+    def poses(self, qs: ArrayLike, planar: bool) -> Floats:
+        """Return the pose of every body at each of the n configurations qs (n, nq).
+
+        (n, bodies, 3): x, y [m], angle in (−π, π] [rad], of bodies that move in the plane; else (n, bodies, 7):
+        x, y, z [m] and the quaternion x, y, z, w with w >= 0.
+        """
+        places = float_rows("qs", qs, self.nq)
+        out = np.empty((len(places), len(self.bodies), 3 if planar else 7))
+        along = entries.planar_poses_along if planar else entries.poses_along
+        along(self._block, self._scratch.workspace, places, out)
+        return out
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""

@@ -16,10 +16,12 @@ from reports.commands.run import Rendering, SceneName, Values, counted, duration
 from reports.live.budget import calibrated
 from reports.live.loop import LiveRun, Loop
 from reports.live.measure import Pace, live_simulation, summary
-from reports.live.replay import write_live
+from reports.live.replay import finish_live, open_log, read_timetable
 from reports.live.viewer import Viewer
+from reports.store.logs import RunLog
+from reports.store.runs import opened_run
 
-LONGEST = 1e8  # ticks: what is recorded is held in memory until the end
+LONGEST = 1e8  # ticks: at 1 kHz more than a day
 
 
 def live(
@@ -47,28 +49,37 @@ def live(
     with compiling_told(to_stderr):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)
         name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
-        result = _held(simulation, round(seconds * rate), world, budget, port if view else None)
-    describe(summary(result), result)
-    files = write_live(out, result, name)
+        ticks = round(seconds * rate)
+        log = open_log(out, name, simulation, world, ticks)
+        try:
+            stopped = _held(simulation, ticks, budget, port if view else None, log)
+            files = finish_live(log.path, stopped)
+        except BaseException:
+            log.close(remove=log.steps == 0)
+            raise
+        log.close(remove=True)
+    with opened_run(files[0]) as (run, _):
+        result = LiveRun(run, read_timetable(files[0]))
+        describe(summary(result), result)
     print(f"Run: {files[0]}\nTimetable: {files[1]}")
-    if not result.run.complete:
-        print(f"Stopped: {result.run.stopped}. What was done is in the files.")
-        raise typer.Exit(130 if result.run.stopped == INTERRUPTED else 1)
+    if stopped:
+        print(f"Stopped: {stopped}. What was done is in the files.")
+        raise typer.Exit(130 if stopped == INTERRUPTED else 1)
 
 
-def _held(simulation: Simulation, ticks: int, world: str, budget: bool, port: int | None) -> LiveRun:
-    """Do the ticks, with a viewer where there is a port for it."""
+def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, log: RunLog) -> str:
+    """Do the ticks, with a viewer where there is a port for it; return what stopped them."""
     rows = calibrated(simulation, simulation.system.dt) if budget else None
     length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
     if port is None:
-        loop = Loop(simulation, ticks, budget=rows)
+        loop = Loop(simulation, ticks, budget=rows, log=log)
         print(f"Under way for {length}", flush=True)
-        return loop.run(world)
+        return loop.stream()
     viewer = Viewer(simulation, port)
     try:
-        loop = Loop(simulation, ticks, budget=rows, audience=viewer)
+        loop = Loop(simulation, ticks, budget=rows, audience=viewer, log=log)
         print(f"See it, and drag the handle, at {viewer.start()} for {length}", flush=True)
-        return loop.run(world)
+        return loop.stream()
     finally:
         viewer.stop()
 
@@ -96,7 +107,7 @@ def _misses(pace: Pace) -> str:
 def _rows(pace: Pace, live: LiveRun) -> str:
     if not pace.collisions:
         return "No collision was resolved by an impulse."
-    least = int(live.timetable.budget[live.run.impacts.step].min())
+    least = int(live.timetable.budget[live.run.impacts.step[:]].min())
     collisions, left_out = counted(pace.collisions, "collision"), pace.rows_left_out
     if not left_out:
         return f"{collisions}, each with all the rows it needed (the least budget was {least})."

@@ -12,12 +12,17 @@ import typer
 
 from iapb.checks import Caution, check_scene
 from iapb.effects import ignored_fields
+from iapb.errors import RunFileError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import INTERRUPTED
 from reference.worlds import find_world
 from reports.commands.progress import step_progress
-from reports.runner import Fetched, Runner
+from reports.runner import Runner
+from reports.store.folder import Place
+from reports.store.io import blocks
+from reports.store.runs import opened_run
+from reports.streaming import Streamed
 from reports.uses import parsed
 
 SceneName = Annotated[str, typer.Argument(
@@ -42,52 +47,75 @@ def run(
                                             "IAPB-push: contacts only push.")] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped or killed.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")] = False,
 ) -> None:
     """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.
 
     Warnings about the scene come first, as of iapb check. Ends with 3 where the result is not to be trusted.
+    The memory that it takes does not depend on the number of steps; a run that is killed can be resumed.
     """
     source, runner = scene_given(scene, set_), Runner(out)
     cautions = check_scene(source, find_world(world, rendering).law)
     for caution in cautions:
         print(f"Warning: {caution}.", file=sys.stderr)
     with step_progress(f"{source.name} in {world}") as runner.progress:
-        fetched = runner.fetch(source, world, rendering)
-    result = fetched.run
-    if json_:
-        print(json.dumps(_as_json(result, fetched, cautions), indent=1, ensure_ascii=False))
-    else:
-        describe(result, fetched.existed)
-        print(f"Stored in {fetched.place.path}" if result.complete else
-              f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {fetched.place.partial}")
-    if not result.complete:
-        raise typer.Exit(130 if result.stopped == INTERRUPTED else 1)
-    if result.distrust:
+        place, streamed = runner.stream(source, world, rendering, resume=resume)
+    stopped = "" if streamed is None else streamed.stopped
+    with opened_run(place.partial if stopped else place.path) as (result, entry):
+        if entry.run_key != place.key:
+            raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
+        if json_:
+            print(json.dumps(_as_json(result, place, cautions), indent=1, ensure_ascii=False))
+        else:
+            _tell(result, place, streamed, resume)
+        distrust = result.distrust
+    if stopped:
+        raise typer.Exit(130 if stopped == INTERRUPTED else 1)
+    if distrust:
         raise typer.Exit(DISTRUSTED)
 
 
 DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
 
 
-def _as_json(run: Run, fetched: Fetched, cautions: tuple[Caution, ...]) -> dict[str, Any]:
+def _tell(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> None:
+    if streamed is not None and streamed.resumed_at:
+        print(f"Resumed after {streamed.resumed_at} steps.")
+    elif resume and streamed is not None:
+        print("Nothing to resume: computed from the start.")
+    describe(run, existed=streamed is None)
+    if run.complete:
+        print(f"Stored in {place.path}")
+        return
+    print(f"Stopped: {run.stopped}. The {run.steps} steps done are readable in {place.partial}")
+    if streamed is not None and streamed.resumable:
+        print("Go on with the same command and --resume.")
+
+
+def _as_json(run: Run, place: Place, cautions: tuple[Caution, ...]) -> dict[str, Any]:
     """What happened, as plain values."""
     return {
         "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling, "steps": run.steps,
         "dt": run.dt, "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
-        "deepest_penetration": max(0.0, -float(run.contacts.gap.min(initial=0.0))),
+        "deepest_penetration": deepest(run),
         "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
         "warnings": [caution._asdict() for caution in cautions], "remarks": run.remarks, "distrust": run.distrust,
-        "file": str(fetched.place.path if run.complete else fetched.place.partial),
+        "file": str(place.path if run.complete else place.partial),
     }  # fmt: skip
+
+
+def deepest(run: Run) -> float:
+    """Deepest penetration [m]; the gaps may be in the run's file."""
+    return max(0.0, *(-float(block.min(initial=0.0)) for block in blocks(run.contacts.gap)))
 
 
 SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
 
 
 def describe(run: Run, existed: bool) -> None:
-    """Say in sentences what happened."""
+    """Say in sentences what happened; the arrays may still be in the run's file."""
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     ignored = ignored_fields(run.effects)
@@ -97,13 +125,14 @@ def describe(run: Run, existed: bool) -> None:
           f"({duration(seconds / steps)} a step).")
     impacts = run.impacts
     if len(impacts.step):
-        lost = float(np.sum(impacts.energy_lost))
+        lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
+        most = max(int(block.max()) for block in blocks(impacts.rows))
         print(f"{counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
-              f"{counted(int(impacts.rows.max()), 'contact')} at once; {lost:.4g} J were lost in them.")
+              f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them.")
     else:
         print("No collision was resolved by an impulse.")
     if len(run.contacts.gap):
-        print(f"Deepest penetration {max(0.0, -float(run.contacts.gap.min())) * 1e3:.4g} mm.")
+        print(f"Deepest penetration {deepest(run) * 1e3:.4g} mm.")
     print(f"At the end: {_end_of(run)}.")
     for remark in run.remarks:
         print(f"{remark}.")

@@ -13,6 +13,7 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError
 from reports.commands.progress import stage_progress
+from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
 from reports.resimulate import repeat_run
 from reports.store.care import (
@@ -28,6 +29,7 @@ from reports.store.care import (
     repair_store,
 )
 from reports.store.runs import read_provenance
+from reports.streaming import logs_of_killed, recover
 
 
 class Action(StrEnum):
@@ -80,6 +82,12 @@ def _repair(where: Path) -> None:
     with stage_progress() as progress:
         states = repair_store(where, partial(progress, "files read whole"))
     _tell(states)
+    for log in logs_of_killed(where):
+        if is_live(log):
+            print(f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable")
+            log.unlink()
+        else:
+            print(f"{recover(log)}: what a killed run did; iapb run --resume goes on")
     aside = sum(not state.path.exists() for state in states)
     print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
 

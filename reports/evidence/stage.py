@@ -2,9 +2,9 @@
 
 A record's tables are typed columns of that file, its words a JSON text without their rows. The file's name carries a
 hash of what determines the records: the stage's inputs, the sources of the engine, the references and the verification,
-the scenes, the processor and BLAS kernel, and what else the stage says that it depends on. So a changed line of theirs
-makes the stage run again, a change of the report not, and no number wears another machine's name. Beside the records
-stand the runs they were made from.
+the scenes, the processor, BLAS kernel and optional code of numpy, and what else the stage says that it depends on. So a
+changed line of theirs makes the stage run again, a change of the report not, and no number wears another machine's
+name. Beside the records stand the runs they were made from.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -73,10 +73,10 @@ def draw_walls(axes: Any, scene: Mapping[str, Any], reach: float) -> None:
         axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
 
 
-def draw_bodies(axes: Any, scene: Mapping[str, Any], coordinates: Sequence[float] | Floats | None = None, *,
+def draw_bodies(axes: Any, scene: Mapping[str, Any], pose: Floats | None = None, *,
                 color: str = PEG, edge: str = INK, width: float = 1.1) -> None:
-    """Fill the moving bodies at `coordinates`, or where the scene starts."""
-    for _, corners in body_outlines(scene, coordinates):
+    """Fill the moving bodies at a `pose` of a run, or where the scene starts."""
+    for _, corners in body_outlines(scene, pose):
         axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
 
 

@@ -312,14 +312,14 @@ def hero(*given: Run) -> Drawn:
 
 def _motion(run: Run) -> str:
     scene = run.scene_resolved
-    corners = np.vstack([outline for k in (0, -1) for _, outline in body_outlines(scene, run.q[k])])
+    corners = np.vstack([outline for k in (0, -1) for _, outline in body_outlines(scene, run.pose[k])])
     low, high = np.minimum(corners.min(axis=0), 0.0) - _MARGIN, np.maximum(corners.max(axis=0), 0.0) + _MARGIN
     with Canvas("hero-scene", low, high, _SIZE, turned=True) as canvas:
         axes = canvas.axes
         draw_walls(axes, scene, reach=1.0)
-        draw_bodies(axes, scene, run.q[-1])
+        draw_bodies(axes, scene, run.pose[-1])
         for k in ghost_steps(run):
-            draw_bodies(axes, scene, run.q[k], color="none", edge=MUTED, width=0.8)
+            draw_bodies(axes, scene, run.pose[k], color="none", edge=MUTED, width=0.8)
         axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
         start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
         arrow(axes, start, _FORCE_LENGTH * force)

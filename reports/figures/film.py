@@ -93,10 +93,10 @@ def plan(scene: Mapping[str, Any]) -> View:
     return View(np.array([sign, 0.0, 0.0]), np.array([0.0, sign, 0.0]), np.array([0.0, 0.0, 1.0]))
 
 
-def frames(scene: Mapping[str, Any], seen: View, q: Floats) -> tuple[Placement, ...]:
-    """Return where the bodies are at q (nq,), in the view's frame."""
+def frames(scene: Mapping[str, Any], seen: View, pose: Floats) -> tuple[Placement, ...]:
+    """Return where the bodies are at a pose of the run, in the view's frame."""
     turn = Placement(np.array([seen.across, seen.up, seen.towards]), np.zeros(3))
-    return tuple(turn @ place for place in body_placements(scene, q).values())
+    return tuple(turn @ place for place in body_placements(scene, pose).values())
 
 
 def parts(scene: Mapping[str, Any], sight: Sight | None) -> Parts:
@@ -140,7 +140,7 @@ def _links(scene: Mapping[str, Any], number: Mapping[str, int]) -> Iterator[Link
 
 def _walls(scene: Mapping[str, Any], seen: View, sight: Sight | None) -> Iterator[Floats]:
     if sight:
-        yield from (seen.flat(piece.points) for piece in pieces(sight, {**scene, "bodies": ()}, np.zeros(0)))
+        yield from (seen.flat(piece.points) for piece in pieces(sight, {**scene, "bodies": ()}, np.zeros((0, 7))))
         return
     corners = [corners for _, corners in body_outlines(scene)]
     reach = _REACH * float(max(np.ptp(np.vstack(corners), axis=0)))
@@ -199,7 +199,7 @@ def _bounds(runs: Sequence[Run], drawn: Parts) -> tuple[Floats, Floats]:
 
 
 def _corners(run: Run, drawn: Parts, step: int) -> list[Floats]:
-    places = frames(run.scene_resolved, drawn.seen, run.q[step])
+    places = frames(run.scene_resolved, drawn.seen, run.pose[step])
     corners = [point for ring in drawn.rings for point in places[ring.body].of(ring.corners)[:, :2]]
     for ball in drawn.balls:
         center = places[ball.body].of(ball.center)[:2]
@@ -232,7 +232,7 @@ def _poses(made: Film) -> tuple[Floats, Floats]:
     from scipy.spatial.transform import Rotation
 
     corner = np.append(made.corner, 0.0)
-    each = [frames(made.run.scene_resolved, made.parts.seen, made.run.q[step]) for step in made.steps]
+    each = [frames(made.run.scene_resolved, made.parts.seen, made.run.pose[step]) for step in made.steps]
     origins = np.array([[made.scale * (place.origin - corner) for place in places] for places in each])
     turns = np.array([Rotation.from_matrix([place.rotation for place in places]).as_quat() for places in each])
     for k in range(1, len(turns)):  # the nearer of ±, so that the player may go straight from one to the next

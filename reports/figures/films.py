@@ -155,7 +155,7 @@ def _ring(points: Floats) -> str:
 
 def bodies_markup(film: Film, step: int) -> Iterator[str]:
     """Yield the faces and discs of the bodies at a step as SVG, the farthest first."""
-    places = frames(film.run.scene_resolved, film.parts.seen, film.run.q[step])
+    places = frames(film.run.scene_resolved, film.parts.seen, film.run.pose[step])
     drawn: list[tuple[float, str]] = []
     for ring in film.parts.rings:
         corners = places[ring.body].of(ring.corners)
@@ -175,7 +175,7 @@ def _area(corners: Floats) -> float:
 
 
 def _links(film: Film, step: int) -> Iterator[str]:
-    places = frames(film.run.scene_resolved, film.parts.seen, film.run.q[step])
+    places = frames(film.run.scene_resolved, film.parts.seen, film.run.pose[step])
     for link in film.parts.links:
         ends = film.flat([places[link.first].of(link.start), places[link.second].of(link.end)])
         yield "<path d=\"M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in ends) + '"/>'

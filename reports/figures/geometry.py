@@ -1,4 +1,4 @@
-"""Where the outlines of a scene are, from its resolved file alone (no engine, no mechanism), and how they look.
+"""Where the outlines of a scene are, from its resolved file and the poses of a run, and how they look.
 
 A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners, those of a scene in space (n, 3) [m].
 The view is axonometric: parallel lines stay parallel and nothing shrinks with distance. Quaternions are x, y, z, w; rpy
@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from iapb.scene.mechanism import mechanism_of, start_of
+from iapb.scene.model import scene_kind
 
 Floats = NDArray[np.float64]
 WORLD = "world"
@@ -56,37 +59,25 @@ def placement_of(placed: Mapping[str, Any], origin: str = "center") -> Placement
     return placement(placed.get(origin, (0.0, 0.0)), placed.get("rpy", (0.0, 0.0, placed.get("angle", 0.0))))
 
 
-def body_placements(scene: Mapping[str, Any], coordinates: Any = None) -> dict[str, Placement]:
-    """Return where every body is, at `coordinates` (nq,) or where the scene starts."""
-    places, used = {WORLD: placement()}, 0
-    for body in scene["bodies"]:
-        count = len(body["position"])
-        q = body["position"] if coordinates is None else coordinates[used : used + count]
-        used += count
-        joint = placement_of(body, "origin")
-        places[body["name"]] = places[body["parent"]] @ joint @ _moved(body, np.asarray(q, dtype=float))
-    del places[WORLD]
-    return places
+def start_pose(scene: Mapping[str, Any]) -> Floats:
+    """Return the poses (bodies, 3 or 7) of a resolved scene where it starts, as the engine has them."""
+    checked = scene_kind(scene).model_validate(scene)
+    poses: Floats = mechanism_of(checked).poses(start_of(checked)[0][None], planar=not is_spatial(scene))[0]
+    return poses
 
 
-def _moved(body: Mapping[str, Any], q: Floats) -> Placement:
-    """Return what the joint does to the body frame."""
+def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dict[str, Placement]:
+    """Return where every body is: at one of a run's poses (bodies, 3 or 7), or where the scene starts."""
+    poses = start_pose(scene) if pose is None else pose
+    return {body["name"]: _placed(one) for body, one in zip(scene["bodies"], poses, strict=True)}
+
+
+def _placed(pose: Floats) -> Placement:
+    if len(pose) == 3:
+        return placement(pose[:2], (0.0, 0.0, pose[2]))
     from scipy.spatial.transform import Rotation
 
-    joint = body["joint"]
-    if joint == "fixed":
-        return placement()
-    if joint == "planar":
-        return placement(q[:2], (0.0, 0.0, q[2]))
-    if joint in ("free_flyer", "spherical"):
-        shift = q[:3] if joint == "free_flyer" else np.zeros(3)
-        return Placement(Rotation.from_quat(q[-4:]).as_matrix(), shift)
-    axis = np.resize(np.append(body["axis"] or (0.0, 0.0, 1.0), 0.0), 3)
-    axis = axis / np.linalg.norm(axis)
-    if joint == "prismatic":
-        return placement(q[0] * axis)
-    angle = np.arctan2(q[1], q[0]) if joint == "continuous" else q[0]
-    return Placement(Rotation.from_rotvec(angle * axis).as_matrix(), np.zeros(3))
+    return Placement(Rotation.from_quat(pose[3:]).as_matrix(), np.array(pose[:3]))
 
 
 # In the plane
@@ -113,9 +104,9 @@ def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
     return point + reach * np.array([along, along - 2 * normal, -along - 2 * normal, -along])
 
 
-def body_outlines(scene: Mapping[str, Any], coordinates: Any = None) -> Iterator[tuple[str, Floats]]:
+def body_outlines(scene: Mapping[str, Any], pose: Floats | None = None) -> Iterator[tuple[str, Floats]]:
     """Yield (body, corners in world axes) for every shape of every body."""
-    places = body_placements(scene, coordinates)
+    places = body_placements(scene, pose)
     for body in scene["bodies"]:
         for shape in body["shapes"]:
             yield body["name"], places[body["name"]].of(outline(shape))
@@ -177,9 +168,9 @@ def view(azimuth: float, elevation: float) -> View:
     return View(np.array([-sa, ca, 0.0]), np.array([-ca * se, -sa * se, ce]), np.array([ca * ce, sa * ce, se]))
 
 
-def links(scene: Mapping[str, Any], coordinates: Any = None) -> Sequence[tuple[Floats, Floats]]:
+def links(scene: Mapping[str, Any], pose: Floats | None = None) -> Sequence[tuple[Floats, Floats]]:
     """Return lines (from, to) [m] from joint to joint, and on to the shapes: the skeleton of what hangs together."""
-    places, lines = body_placements(scene, coordinates), []
+    places, lines = body_placements(scene, pose), []
     for body in scene["bodies"]:
         if body["parent"] != WORLD:
             own = places[body["name"]]

@@ -57,14 +57,14 @@ def last_contact(run: Run) -> int | None:
 
 
 def _group(run: Run, step: int, values: np.ndarray, key: str) -> str:
-    scene, q = run.scene_resolved, run.q[step]
-    low, high = bounds([outline for _, outline in body_outlines(scene, q)], 0.12)
+    scene, pose = run.scene_resolved, run.pose[step]
+    low, high = bounds([outline for _, outline in body_outlines(scene, pose)], 0.12)
     longest = _LONGEST * max(high - low)
     with Canvas(key, low, high, turned=is_turned(scene)) as canvas:
         draw_walls(canvas.axes, scene, reach=1.0)
-        draw_bodies(canvas.axes, scene, q)
+        draw_bodies(canvas.axes, scene, pose)
         _contact_arrows(canvas.axes, run, step, values, longest)
-        hand(canvas.axes, scene, body_placements(scene, q)[scene["hand"]["body"]], 0.8 * longest, (-2, -19))
+        hand(canvas.axes, scene, body_placements(scene, pose)[scene["hand"]["body"]], 0.8 * longest, (-2, -19))
     return canvas.svg
 
 

@@ -76,7 +76,7 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
     """Yield a picture of the run for each moment, all of one scene at one scale."""
     scene = run.scene_resolved
     steps = [round(share * run.steps) for share in sight.moments]
-    drawn = [sorted(pieces(sight, scene, run.q[step]), key=lambda piece: piece.nearness) for step in steps]
+    drawn = [sorted(pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
     corners = np.vstack([sight.seen.flat(piece.points) for each in drawn for piece in each])
     margin = _MARGIN * np.ptp(corners, axis=0).max()
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
@@ -85,7 +85,7 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
             for order, piece in enumerate(each):
                 _fill(canvas.axes, sight.seen, piece, order)
             if scene["hand"]:
-                place = body_placements(scene, run.q[step])[scene["hand"]["body"]]
+                place = body_placements(scene, run.pose[step])[scene["hand"]["body"]]
                 hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), (0, 9), sight.seen.flat)
         moment = f"{run.time[step]:.2f} s"
         yield Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
@@ -101,13 +101,13 @@ def _fill(axes: Any, seen: View, piece: Piece, order: int) -> None:
                   zorder=2 + 1e-3 * order)  # fmt: skip
 
 
-def pieces(sight: Sight, scene: Mapping[str, Any], q: Floats) -> Iterator[Piece]:
-    """Yield the faces, discs and lines of a scene at q that are turned to the reader."""
+def pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
+    """Yield the faces, discs and lines of a scene at a pose that are turned to the reader."""
     seen = sight.seen
     for wall in scene["walls"]:
         yield from _wall(sight, wall)
-    places = body_placements(scene, q)
-    for line in links(scene, q):
+    places = body_placements(scene, pose)
+    for line in links(scene, pose):
         yield Piece(np.array(line), "none", LINK, _LINK_WIDTH, seen.depth(line))
     for body in scene["bodies"]:
         frame = places[body["name"]]

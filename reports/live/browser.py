@@ -1,4 +1,4 @@
-"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse. It imports no engine.
+"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse.
 
 Whoever reaches the page moves the hand. So the server listens on this machine only, and answers only those who name
 it as this machine (Host), know the random word in its address and, to open the web socket, come from its own page
@@ -39,11 +39,11 @@ _DISTANCE = {False: 2.2, True: 1.4}  # of the camera, in sizes of a scene in the
 _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
 
 
-def show_in_browser(name: str, coordinates: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
+def show_in_browser(name: str, numbers: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
     """What the viewer's process does: serve the page of memory `name` until the loop's process is gone."""
     os.nice(_POLITENESS)
     parent = os.getppid()
-    show(Window.opened(name, coordinates), scene, port, ready, lambda: os.getppid() == parent)
+    show(Window.opened(name, numbers), scene, port, ready, lambda: os.getppid() == parent)
 
 
 def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection, wanted: Callable[[], bool]) -> None:
@@ -61,12 +61,13 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
     ready.send(f"http://{HOST}:{server.get_port()}/{token}/")
     while wanted():
         started = time.monotonic()
-        q = window.shown()
-        if q is not None and np.all(np.isfinite(q)):
+        pose = window.shown()
+        if pose is not None and np.all(np.isfinite(pose)):
+            pose = pose.reshape(len(scene["bodies"]), -1)
             with server.atomic():
-                for name, (quaternion, position) in placements(scene, q).items():
+                for name, (quaternion, position) in placements(scene, pose).items():
                     frames[name].wxyz, frames[name].position = quaternion, position
-                mouse.follow(q)
+                mouse.follow(pose)
         window.want(mouse.target_at(time.monotonic()), time.monotonic())
         time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
     server.stop()
@@ -171,7 +172,7 @@ class _Mouse:
     def _gone(self, client: Any) -> None:
         self.target = None  # a mouse that nobody moves any more holds nothing
 
-    def follow(self, q: Floats) -> None:
+    def follow(self, pose: Floats) -> None:
         """Put the handle where the hand holds the tool, unless the mouse has it."""
         if self._handle is not None and self.target is None:
-            self._handle.position = held_point(self._scene, q)
+            self._handle.position = held_point(self._scene, pose)

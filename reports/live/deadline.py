@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+TICK_COLUMNS = 10
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
 
@@ -60,14 +61,13 @@ class Deadlines:
     period : float [s]
     ticks : how many there can be.
     first : float [s], the clock's time when the first one is due.
+    kept : so many of the last ticks are kept; default: all.
     """
 
-    def __init__(self, period: float, ticks: int, first: float) -> None:
+    def __init__(self, period: float, ticks: int, first: float, kept: int | None = None) -> None:
         self.period, self.first, self.done = period, first, 0
         self.due = first
-        self._instants = np.zeros((3, ticks))
-        self._budget = np.zeros(ticks, np.int64)
-        self._wrench = np.zeros((ticks, 6))
+        self._rows = np.zeros((ticks if kept is None else kept, TICK_COLUMNS))
 
     def left(self, now: float) -> float:
         """Time that the tick at hand may still take [s]."""
@@ -75,19 +75,30 @@ class Deadlines:
 
     def note(self, budget: int, wrench: Floats) -> None:
         """Keep what the step at hand was given: with this it can be done again."""
-        self._budget[self.done], self._wrench[self.done] = budget, wrench
+        row = self._rows[self.done % len(self._rows)]
+        row[3], row[4:] = budget, wrench
 
     def close(self, start: float, end: float) -> None:
         """Enter a tick; the next one is due a period later or, after a miss, now."""
-        instants = self._instants
-        instants[0, self.done], instants[1, self.done], instants[2, self.done] = self.due, start, end
+        row = self._rows[self.done % len(self._rows)]
+        row[0], row[1], row[2] = self.due - self.first, start - self.first, end - self.first
         self.done += 1
         self.due = max(self.due + self.period, end)
 
     def timetable(self, ticks: int) -> Timetable:
         """The first `ticks` ticks."""
-        due, start, end = self._instants[:, :ticks] - self.first
-        return Timetable(self.period, due, start, end, self._budget[:ticks].copy(), self._wrench[:ticks].copy())
+        return timetable_of(self.period, self.rows(0, ticks))
+
+    def rows(self, first: int, count: int) -> Floats:
+        """Return (count, TICK_COLUMNS) of the ticks from number `first` on: due, start, end, rows allowed, wrench."""
+        found: Floats = self._rows[np.arange(first, first + count) % len(self._rows)]
+        return found
+
+
+def timetable_of(period: float, rows: Floats) -> Timetable:
+    """Return the timetable in rows of `Deadlines`."""
+    due, start, end, budget = rows[:, :4].T.copy()
+    return Timetable(period, due, start, end, budget.astype(np.int64), rows[:, 4:].copy())
 
 
 def percentiles(seconds: Floats) -> Floats:

@@ -21,16 +21,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import IapbError
+from iapb.errors import IapbError, RunFileError
 from iapb.recording import Record, Recorder
 from iapb.run import Run
 from iapb.simulation import INTERRUPTED, Simulation
 from reports.live.budget import RowBudget
 from reports.live.deadline import Clock, Deadlines, MonotonicClock, Timetable
+from reports.store.logs import RunLog
 
 Floats = NDArray[np.float64]
 
 _SPARE_SECONDS = 4e-4  # a chunk is made only where this much is left of the period, or nothing is left anyway
+_LOG_SECONDS = 7e-4  # and written where this much is left,
+_MOST_WAITING = 8  # or so many wait
+_TICKS_KEPT = 16 * 512  # more than the ticks of the chunks that wait
 
 
 class Audience(Protocol):
@@ -64,14 +68,15 @@ class Loop:
     clock : default: this machine's.
     budget : rows from the time left; None: always all.
     audience : who looks on; None: nobody.
+    log : takes what is recorded while the loop is at work (`stream`); None: it is held in memory (`run`).
     """
 
     def __init__(self, simulation: Simulation, ticks: int, clock: Clock | None = None,
-                 budget: RowBudget | None = None, audience: Audience | None = None) -> None:
+                 budget: RowBudget | None = None, audience: Audience | None = None, log: RunLog | None = None) -> None:
         self.simulation, self.ticks, self.audience = simulation, ticks, audience
         self.clock: Clock = MonotonicClock() if clock is None else clock
         self.budget, self._rows = budget, int(simulation.state.row_budget[0])
-        self._tape = Tape(simulation, ticks)
+        self._tape = Tape(simulation, ticks, log)
         self._under_way = False  # between the two halves of a step
         self._interrupted = False
 
@@ -83,9 +88,24 @@ class Loop:
         IapbError, KeyboardInterrupt
             Stopped before the first step was done: there is nothing to return.
         """
-        stopped = ""
+        deadlines, stopped = self._paced(None)
+        timetable = deadlines.timetable(self._tape.steps)
+        return LiveRun(self._tape.run(world, stopped), timetable, name_of(self.simulation.link))
+
+    def stream(self) -> str:
+        """Do all ticks as `run` does, into the log; return why they are not all done, "" where they are."""
+        _, stopped = self._paced(_TICKS_KEPT)
+        try:
+            self._tape.write_log(all_of_it=True)
+        except RunFileError as error:
+            return stopped or str(error)
+        return stopped
+
+    def _paced(self, kept: int | None) -> tuple[Deadlines, str]:
+        """Do the ticks; return their timetable, of which the last `kept` are there, and what stopped them."""
+        stopped, dt = "", self.simulation.system.dt
         with self._until_interrupted(), _without_collector():
-            deadlines = Deadlines(self.simulation.system.dt, self.ticks, self.clock.now() + self.simulation.system.dt)
+            deadlines = self._tape.deadlines = Deadlines(dt, self.ticks, self.clock.now() + dt, kept)
             try:
                 while deadlines.done < self.ticks and not self._interrupted:
                     self._tick(deadlines)
@@ -99,8 +119,7 @@ class Loop:
         steps = self._tape.steps
         if steps == 0:
             raise IapbError(stopped) if stopped else KeyboardInterrupt
-        stopped = "" if steps == self.ticks else stopped or INTERRUPTED
-        return LiveRun(self._tape.run(world, stopped), deadlines.timetable(steps), _name_of(self.simulation.link))
+        return deadlines, "" if steps == self.ticks else stopped or INTERRUPTED
 
     def _tick(self, deadlines: Deadlines) -> None:
         self.clock.wait_until(deadlines.due)
@@ -118,6 +137,8 @@ class Loop:
             self.budget.learn(end - start, self._rows_used())
         if self._tape.wants_spare and self.clock.now() + _SPARE_SECONDS < deadlines.due:
             self._tape.make_spare()
+        elif self._tape.wants_log and self.clock.now() + _LOG_SECONDS < deadlines.due:
+            self._tape.write_log()
 
     def _finish(self) -> None:
         """End the step that is under way, and write it."""
@@ -175,7 +196,8 @@ def _without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _name_of(link: Any) -> str:
+def name_of(link: Any) -> str:
+    """Return the class of a device of its own, "" where there is none."""
     return "" if link is None else f"{type(link.device).__module__}:{type(link.device).__qualname__}"
 
 
@@ -186,10 +208,13 @@ class Tape:
     ----------
     simulation : at its start.
     steps : how many there can be.
+    log : takes the chunks that are full, with their ticks of `deadlines`; None: the recorder holds them.
     """
 
-    def __init__(self, simulation: Simulation, steps: int) -> None:
-        self._simulation, self._total = simulation, steps
+    def __init__(self, simulation: Simulation, steps: int, log: RunLog | None = None) -> None:
+        self._simulation, self._total, self._log = simulation, steps, log
+        self._waiting: list[tuple[Record, int, float]] = []
+        self.deadlines: Deadlines | None = None
         self._recorder = Recorder(simulation)
         self._record, self._size = self._recorder.blank(steps)
         simulation.stepper.prepare(self._record)
@@ -229,5 +254,26 @@ class Tape:
         return self._recorder.run(world, stopped)
 
     def _keep(self) -> None:
-        self._recorder.keep(self._record, self._line, self._seconds)
+        if self._log is None:
+            self._recorder.keep(self._record, self._line, self._seconds)
+        else:
+            self._waiting.append((self._record, self._line, self._seconds))
+            self._recorder.go_on(self._recorder.steps + self._line)
         self._line, self._seconds = 0, 0.0
+        if len(self._waiting) > _MOST_WAITING:
+            self.write_log()
+
+    @property
+    def wants_log(self) -> bool:
+        """Whether a full chunk waits for the log."""
+        return bool(self._waiting)
+
+    def write_log(self, *, all_of_it: bool = False) -> None:
+        """Write the oldest chunk that waits; or all of them, and what there is of the next one."""
+        if all_of_it:
+            self._keep()
+        while self._waiting and self._log is not None and self.deadlines is not None:
+            record, lines, seconds = self._waiting.pop(0)
+            self._log.write_chunk(record, lines, seconds, (self.deadlines.rows(self._log.steps, lines),))
+            if not all_of_it:
+                break

@@ -138,6 +138,6 @@ def rows_left_out(live: LiveRun) -> int:
     impacts, budget = live.run.impacts, live.timetable.budget
     if not len(impacts.step):
         return 0
-    given = budget[impacts.step]
-    short = (impacts.rank >= given) & (given < live.run.v.shape[1])
-    return int(np.maximum(impacts.approaching[short], 0).sum())
+    given = budget[impacts.step[:]]
+    short = (impacts.rank[:] >= given) & (given < live.run.v.shape[1])
+    return int(np.maximum(impacts.approaching[:][short], 0).sum())

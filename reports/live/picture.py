@@ -1,4 +1,4 @@
-"""A scene as triangles for a browser, and where its bodies are at a configuration; from its resolved values alone.
+"""A scene as triangles for a browser, and where its bodies are at a pose that the engine tells.
 
 Planar scenes are drawn in the plane z = 0, their shapes as thick as a tenth of the scene. Quaternions here are w, x,
 y, z, as the viewer has them.
@@ -39,25 +39,24 @@ def pieces(scene: Mapping[str, Any]) -> list[Piece]:
     return list(_pieces(scene, size))
 
 
-def placements(scene: Mapping[str, Any], q: Floats) -> dict[str, tuple[Floats, Floats]]:
-    """Return (quaternion, position) of every body at a configuration (nq,)."""
-    places = geometry.body_placements(scene, q)
+def placements(scene: Mapping[str, Any], pose: Floats) -> dict[str, tuple[Floats, Floats]]:
+    """Return (quaternion, position) of every body at a pose (bodies, 3 or 7)."""
+    places = geometry.body_placements(scene, pose)
     return {name: (Rotation.from_matrix(place.rotation).as_quat(scalar_first=True), place.origin)
             for name, place in places.items()}  # fmt: skip
 
 
-def held_point(scene: Mapping[str, Any], q: Floats) -> Floats | None:
+def held_point(scene: Mapping[str, Any], pose: Floats) -> Floats | None:
     """Return where the hand holds the tool (3,) [m]; None in a scene without a hand."""
     hand = scene.get("hand")
     if hand is None:
         return None
-    return geometry.body_placements(scene, q)[hand["body"]].of(np.resize([*hand["point"], 0.0], 3))
+    return geometry.body_placements(scene, pose)[hand["body"]].of(np.resize([*hand["point"], 0.0], 3))
 
 
 def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return the lower and upper corner (3,) of everything that has an end, at the start."""
-    start = np.array([x for body in scene["bodies"] for x in body["position"]], dtype=float)
-    places = geometry.body_placements(scene, start)
+    places = geometry.body_placements(scene)
     points = [place.origin[None] for place in places.values()]
     for piece in _pieces({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0):
         points.append(places[piece.body].of(piece.vertices) if piece.body else piece.vertices)

@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.haptics.device import DeviceReading
+from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import Simulation
-from reports.live.deadline import Timetable
-from reports.live.loop import LiveRun, Tape
+from reports.live.deadline import TICK_COLUMNS, Timetable, timetable_of
+from reports.live.loop import LiveRun, Tape, name_of
 from reports.resimulate import coupling_of, law_of, scene_of
-from reports.store.runs import read_run, write_run
+from reports.store.io import mark_store
+from reports.store.logs import LOG_SUFFIX, RunLog, read_log
+from reports.store.runs import read_run, store_parts, write_run
 from reports.store.tables import Column, Table, read_tables, write_tables
+from reports.streaming import log_head, log_of, parts_of, simulation_of
 
 _WRENCH = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
 _SUFFIX = "-timetable.h5"
@@ -26,18 +30,57 @@ def write_live(folder: Path | str, live: LiveRun, name: str) -> tuple[Path, Path
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     path = write_run(folder / f"{name}.h5", live.run)
-    return path, write_tables(folder / f"{name}{_SUFFIX}", (ticks_table(live.timetable, path.name), _session(live)))
+    return path, _write_timetable(path, live.timetable, live.device)
+
+
+def _write_timetable(run: Path, timetable: Timetable, device: str) -> Path:
+    tables = ticks_table(timetable, run.name), _session(timetable, device)
+    return write_tables(run.with_name(run.stem + _SUFFIX), tables)
+
+
+def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks: int) -> RunLog:
+    """Return the log of a live run that is to become ``name.h5``; the folder becomes a store, so that repair acts."""
+    mark_store(folder)
+    start = {name: values.tolist() for name, values in Recorder(simulation).start.items()}
+    more = {"device": name_of(simulation.link), "period": simulation.system.dt, "start": start}
+    return RunLog(log_of(folder / f"{name}.h5"), log_head(simulation, world, ticks, live=more))
+
+
+def finish_live(log: Path, stopped: str) -> tuple[Path, Path]:
+    """Write the run and the timetable in a log to their files, in constant memory but for 80 bytes a tick."""
+    head, _ = read_log(log)
+    told, rows = head["live"], list[Any]()
+    joiner = Recorder(simulation_of(head))
+    joiner.start = {name: np.array(values, np.float64) for name, values in told["start"].items()}
+    path = log.with_name(log.name.removesuffix(LOG_SUFFIX))
+    parts = parts_of(log, joiner, str(head["world"]), TICK_COLUMNS, rows)
+    store_parts(path, parts, stopped=stopped, key="", replace=True)
+    timetable = timetable_of(float(told["period"]), np.concatenate(rows))
+    return path, _write_timetable(path, timetable, str(told["device"]))
+
+
+def is_live(log: Path) -> bool:
+    """Whether a log is one of a live run."""
+    return "live" in read_log(log)[0]
+
+
+def read_timetable(path: Path) -> Timetable:
+    """Return the timetable beside the run file of a live run."""
+    return _timetable_and_device(path)[0]
 
 
 def read_live(path: Path | str) -> LiveRun:
     """Read a live run back from its two files; `path` is that of the run."""
     path = Path(path)
+    return LiveRun(read_run(path), *_timetable_and_device(path))
+
+
+def _timetable_and_device(path: Path) -> tuple[Timetable, str]:
     tables = read_tables(path.with_name(path.stem + _SUFFIX))
     ticks, session = tables["ticks"], tables["session"]
     wrench = np.column_stack([ticks[name] for name in _WRENCH])
     due, start, end, budget = (np.asarray(ticks[name]) for name in ("due", "start", "end", "budget"))
-    timetable = Timetable(float(session["period"][0]), due, start, end, budget, wrench)
-    return LiveRun(read_run(path), timetable, _device_in(session))
+    return Timetable(float(session["period"][0]), due, start, end, budget, wrench), _device_in(session)
 
 
 def ticks_table(timetable: Timetable, run: str = "") -> Table:
@@ -56,11 +99,10 @@ def ticks_table(timetable: Timetable, run: str = "") -> Table:
     ), title="When each step of a live run was due and done", runs=(run,) if run else ())  # fmt: skip
 
 
-def _session(live: LiveRun) -> Table:
-    device = live.device or "compiled"
+def _session(timetable: Timetable, device: str) -> Table:
     return Table("session", (
-        Column("period", np.array([live.timetable.period]), "s", "of the ticks"),
-        Column("device", (device,), "1", "the device's class; compiled: simulated in the loop"),
+        Column("period", np.array([timetable.period]), "s", "of the ticks"),
+        Column("device", (device or "compiled",), "1", "the device's class; compiled: simulated in the loop"),
     ))  # fmt: skip
 
 

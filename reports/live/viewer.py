@@ -1,6 +1,6 @@
 """The scene in a browser at about 30 Hz, from a process of its own: the paper's graphics computer.
 
-The loop only writes configurations into a shared page and reads where the mouse wants the hand (`reports.live.window`).
+The loop only writes poses into a shared page and reads where the mouse wants the hand (`reports.live.window`).
 The viewer's process starts Python anew, so that it shares nothing else with the loop, and runs at lower priority.
 
 The mouse is the hand: a spring from the held point to where the mouse is, with a limited force.
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError, IapbError
 from iapb.simulation import Simulation
 from reports.batches import starting_a_process
+from reports.figures.geometry import is_spatial
 from reports.live.browser import show_in_browser
 from reports.live.window import Window
 
@@ -101,16 +102,17 @@ class Viewer:
         self._hand = SpringHand(simulation) if simulation.system.tool_tree >= 0 else None
         self._own = simulation.port.wrench.copy()
         self._target: Floats | None = None
-        self.window = Window.made(len(simulation.state.q))
-        self.window.publish(simulation.state.q)
         self._scene, self._port = simulation.scene.resolved(), port
+        self._mechanism, self._planar = simulation.system.mechanism, not is_spatial(self._scene)
+        self.window = Window.made(self._pose(simulation.state.q).size)
+        self.publish(simulation.state.q)
         self.process: Any = None
 
     def start(self) -> str:
         """Start the process and return the address that it serves, which is secret; raise IapbError if it does not."""
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self.window.name, self.window.coordinates, self._scene, self._port, theirs)
+        arguments = (self.window.name, self.window.numbers, self._scene, self._port, theirs)
         self.process = context.Process(target=show_in_browser, args=arguments, daemon=True, name="iapb viewer")
         with starting_a_process():  # Ctrl-C is the loop's, which then ends the viewer
             self.process.start()
@@ -125,7 +127,10 @@ class Viewer:
 
     def publish(self, q: Floats) -> None:
         """Say where everything is."""
-        self.window.publish(q)
+        self.window.publish(self._pose(q))
+
+    def _pose(self, q: Floats) -> Floats:
+        return self._mechanism.poses(q[None], self._planar).ravel()
 
     def pull(self, now: float) -> Floats:
         """Return the wrench (6,) of the hand: the scene's own, and the mouse's while it holds the handle."""

@@ -29,26 +29,26 @@ _WISHES = 5
 class Window:
     """The shared page; make it with `made`, open it in the other process with `opened`."""
 
-    def __init__(self, memory: SharedMemory, coordinates: int, owner: bool) -> None:
-        self._memory, self._owner, self.coordinates = memory, owner, coordinates
+    def __init__(self, memory: SharedMemory, numbers: int, owner: bool) -> None:
+        self._memory, self._owner, self.numbers = memory, owner, numbers
         self._sequence = np.ndarray(_HEAD, np.int64, memory.buf)
-        numbers = np.ndarray(_WISHES + coordinates, np.float64, memory.buf, _HEAD * _WORD)
-        self._wishes, self._q = numbers[:_WISHES], numbers[_WISHES:]
+        page = np.ndarray(_WISHES + numbers, np.float64, memory.buf, _HEAD * _WORD)
+        self._wishes, self._pose = page[:_WISHES], page[_WISHES:]
 
     @classmethod
-    def made(cls, coordinates: int) -> Window:
-        """Make a page for configurations of so many coordinates; the maker closes it for all."""
-        size = _WORD * (_HEAD + _WISHES + coordinates)
-        window = cls(SharedMemory(create=True, size=size), coordinates, owner=True)
+    def made(cls, numbers: int) -> Window:
+        """Make a page for poses of so many numbers; the maker closes it for all."""
+        size = _WORD * (_HEAD + _WISHES + numbers)
+        window = cls(SharedMemory(create=True, size=size), numbers, owner=True)
         window._sequence[:] = 0
         window._wishes[:] = 0.0
-        window._q[:] = 0.0
+        window._pose[:] = 0.0
         return window
 
     @classmethod
-    def opened(cls, name: str, coordinates: int) -> Window:
+    def opened(cls, name: str, numbers: int) -> Window:
         """Open the page that another process has made."""
-        return cls(SharedMemory(name), coordinates, owner=False)
+        return cls(SharedMemory(name), numbers, owner=False)
 
     @property
     def name(self) -> str:
@@ -57,10 +57,10 @@ class Window:
 
     # the loop's side
 
-    def publish(self, q: Floats) -> None:
+    def publish(self, pose: Floats) -> None:
         """Write where everything is."""
         self._sequence[_SHOWN] += 1
-        self._q[:] = q
+        self._pose[:] = pose
         self._sequence[_SHOWN] += 1
 
     def target(self, now: float, before: Floats | None) -> Floats | None:
@@ -79,12 +79,12 @@ class Window:
     # the viewer's side
 
     def shown(self) -> Floats | None:
-        """Return the last configuration published whole; None: the loop is gone, in the middle of writing."""
+        """Return the last pose published whole; None: the loop is gone, in the middle of writing."""
         for _ in range(_ATTEMPTS):
             sequence = int(self._sequence[_SHOWN])
-            q = self._q.copy()
+            pose = self._pose.copy()
             if sequence % 2 == 0 and sequence == int(self._sequence[_SHOWN]):
-                return q
+                return pose
         return None
 
     def want(self, target: Floats | None, now: float) -> None:
@@ -97,7 +97,7 @@ class Window:
 
     def close(self) -> None:
         """Give the page back; nobody may use it after its maker has closed it."""
-        del self._sequence, self._wishes, self._q
+        del self._sequence, self._wishes, self._pose
         self._memory.close()
         if self._owner:
             self._memory.unlink()

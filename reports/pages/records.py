@@ -20,7 +20,7 @@ class StoredFile:
 
     used_by : the claims, figures' inputs and topics made from a run; nobody for a table
     status : "complete", "partial" where a simulation gave up, "absent" where the file is gone since
-    made_on : processor and BLAS kernel that computed it, where its file says so
+    made_on : processor, BLAS kernel and optional code of numpy that computed it, where its file says so
     """
 
     name: str

@@ -19,19 +19,23 @@ from reports.store.io import (
     WRITING,
     abandoned,
     is_aside,
+    is_locked,
     is_old,
     is_ours,
     is_store,
     mark_store,
     opened,
+    remove_unless_locked,
 )
 from reports.store.keys import SOURCES, evidence_version, is_older_engine
-from reports.store.runs import read_provenance, read_run
+from reports.store.logs import LOG_SUFFIX, is_log, read_log
+from reports.store.runs import opened_run, read_provenance
 from reports.store.schema import FORMAT, TABLE_FORMAT
 
 Progress = Callable[[int, int], None]
 
 DAMAGED_SUFFIX = ".damaged"
+_LOOKED_AT = (".h5", PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX, f".h5{LOG_SUFFIX}")
 WHOLE, DAMAGED, PARTIAL, FOREIGN, STALE, LEFTOVER = "whole", "damaged", "partial", "foreign", "stale", "leftover"
 
 
@@ -66,13 +70,16 @@ def _files(folder: Path) -> Iterator[Path]:
     if folder.is_file():  # one that is named counts, whatever its name
         yield folder
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and (path.suffix == ".h5" or path.name.endswith((PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX))):
+        if path.is_file() and path.name.endswith(_LOOKED_AT):
             yield path
 
 
 def _state(path: Path) -> FileState:
     if is_aside(path):
         return FileState(path, LEFTOVER, "not whole yet: a writer is at work, or was stopped before it was done")
+    if is_log(path):
+        why = "a process is at work on it" if is_locked(path) else "iapb run --resume goes on, repair makes it readable"
+        return FileState(path, LEFTOVER, f"a run in the making: {why}")
     if path.name.endswith(WRITING) or not is_ours(path):
         return FileState(path, FOREIGN, "no file of iapb: no seal, and nothing that says so")
     if path.name.endswith(DAMAGED_SUFFIX):
@@ -81,9 +88,9 @@ def _state(path: Path) -> FileState:
         with opened(path, expected_format=None) as file:
             kind = str(file.attrs.get("format", ""))
         if kind == FORMAT:
-            run = read_run(path)
-            if path.name.endswith(PARTIAL_SUFFIX) or not run.complete:
-                return FileState(path, PARTIAL, f"{run.steps} steps are readable; {run.stopped}")
+            with opened_run(path) as (run, _):
+                if path.name.endswith(PARTIAL_SUFFIX) or not run.complete:
+                    return FileState(path, PARTIAL, f"{run.steps} steps are readable; {run.stopped}")
         elif kind != TABLE_FORMAT:
             return FileState(path, FOREIGN, "an HDF5 file of somebody else's")
         return FileState(path, WHOLE)
@@ -159,7 +166,12 @@ def _garbage(store: Path) -> Iterator[FileState]:
     for path in abandoned(store):
         yield FileState(path, LEFTOVER, "a writer was stopped before it was done")
     for path in _files(store):
-        if path.parent != store or path.is_symlink() or path.name.endswith(WRITING) or not is_ours(path):
+        if path.parent != store or path.is_symlink():
+            continue
+        if is_log(path):
+            if is_old(path) and not is_locked(path) and (why := _useless(path)):
+                yield FileState(path, LEFTOVER, why)
+        if path.name.endswith(WRITING) or not is_ours(path):
             continue
         if path.name.endswith(DAMAGED_SUFFIX):
             yield _state(path)
@@ -168,6 +180,16 @@ def _garbage(store: Path) -> Iterator[FileState]:
                 yield FileState(path, PARTIAL, "the finished run is there")
         elif kind := _stale(path):
             yield FileState(path, STALE, f"a {kind} of older code")
+
+
+def _useless(log: Path) -> str:
+    """Why nobody can go on from a log; "" where somebody can."""
+    if _is_whole(log.with_name(log.name.removesuffix(LOG_SUFFIX))):
+        return "the log of a run that is finished"
+    try:
+        return "the log of a run of older code" if is_older_engine(str(read_log(log)[0].get("code", ""))) else ""
+    except RunFileError:
+        return ""
 
 
 def _stale(path: Path) -> str:
@@ -185,4 +207,4 @@ def _stale(path: Path) -> str:
 def collect_garbage(found: Iterable[FileState]) -> None:
     """Remove what `garbage` has found."""
     for state in found:
-        state.path.unlink(missing_ok=True)
+        remove_unless_locked(state.path)

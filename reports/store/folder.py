@@ -24,7 +24,14 @@ from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import abandoned, append_line, mark_store, read_lines, written_aside
+from reports.store.io import (
+    abandoned,
+    append_line,
+    mark_store,
+    read_lines,
+    remove_unless_locked,
+    written_aside,
+)
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
@@ -101,7 +108,7 @@ class RunStore:
         except OSError as error:
             raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
         for path in abandoned(self.folder):
-            path.unlink(missing_ok=True)
+            remove_unless_locked(path)
 
     def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
         """Return the key of `inputs`, and the file that their run has or will have.
@@ -184,8 +191,12 @@ class RunStore:
     def _keep(self, place: Place, run: Run) -> RunEntry:
         entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
         place.partial.unlink(missing_ok=True)
-        append_line(self.folder / INDEX_NAME, asdict(entry))
+        self.list_run(entry)
         return entry
+
+    def list_run(self, entry: RunEntry) -> None:
+        """Add a finished run to the index."""
+        append_line(self.folder / INDEX_NAME, asdict(entry))
 
     def entries(self) -> tuple[RunEntry, ...]:
         """Return the index: one entry per finished run in the folder, by file name."""

@@ -66,7 +66,7 @@ def impact_run(broken: BrokenImpact) -> Run:
     case, after = broken.struck.case, broken.struck.velocity_after
     d = case.coordinates
     lengths = {"time": 1, "step": 0, "step_edge": 1, "contact": 0, "axis": 3, "coordinate": 0, "velocity": d,
-               "device_coordinate": 0, "device_velocity": 0}  # fmt: skip
+               "device_coordinate": 0, "device_velocity": 0, "body": 0, "placement": 3}  # fmt: skip
     none = {"coordinate_names": (), "coordinate_units": (), "body_names": (), "scene_resolved": {}, "energy": {},
             "coupling_settings": {}, "tool_dofs": (0, 0), "tool_coordinates": (0, 0), "effects": ()}  # fmt: skip
     arrays = blank((*quantities(Run, "time"), *quantities(Run, "step")), lengths)

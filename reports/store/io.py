@@ -8,6 +8,7 @@ everything built on it ignore what stands behind the end that the file states.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -64,6 +65,7 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
     stays, and what was written aside is dropped: the first of two writers wins.
     """
     aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
+    lock = _locked(aside)
     try:
         yield aside
         sync(aside)
@@ -74,6 +76,49 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
         sync(target.parent)
     finally:
         aside.unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _locked(path: Path) -> int:
+    """Open a file and lock it, until it is closed or the process ends; wait for whoever just asks `is_locked`."""
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file), path.stat()):
+                return file
+        os.close(file)  # it was removed meanwhile, as one that a killed writer left
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process holds a file that it writes; False where the file is gone."""
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return False
+    except OSError:
+        return True
+    finally:
+        os.close(file)
+
+
+def remove_unless_locked(path: Path) -> bool:
+    """Remove a file that no process writes, under its lock: nobody can start to meanwhile; whether it is gone."""
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        return not path.exists()
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink(missing_ok=True)
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(file)
 
 
 def _move_if_absent(aside: Path, target: Path) -> None:
@@ -111,9 +156,12 @@ def is_old(path: Path) -> bool:
 
 
 def abandoned(folder: Path) -> list[Path]:
-    """Return what killed writers left in a store, by the names that writers give; files still written are younger."""
+    """Return what killed writers left in a store, by the names that writers give.
+
+    Files still written are younger; and locked, however long it takes.
+    """
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
-    return [path for path in found if is_aside(path) and not path.is_symlink() and is_old(path)]
+    return [path for path in found if is_aside(path) and not path.is_symlink() and is_old(path) and not is_locked(path)]
 
 
 def is_aside(path: Path) -> bool:
@@ -205,6 +253,27 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
 
 
 @contextmanager
+def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
+    """Give an HDF5 file to fill that may be larger than memory; else as `new_file`.
+
+    It is filled on the disk: where that fails, the HDF5 library says so.
+    """
+    import h5py
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with written_aside(path, replace=replace) as aside:
+            with h5py.File(aside, "w", rdcc_nbytes=2 * _CHUNK_BYTES, locking=False) as file:
+                yield file
+            mark = _MARK + _checksum(aside, aside.stat().st_size).encode() + b"\n"
+            with aside.open("ab") as end:
+                end.write(mark)
+    except (OSError, RuntimeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
+
+
+@contextmanager
 def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
     """Open a file of this project for reading; a format of None takes any.
 
@@ -252,8 +321,11 @@ def write_text(group: Any, name: str, text: str) -> None:
     group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
 
 
-def write_values(group: Any, name: str, values: Any) -> Any:
-    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle, gzip and fletcher32."""
+def write_values(group: Any, name: str, values: Any, *, growing: bool = False) -> Any:
+    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle, gzip and fletcher32.
+
+    A `growing` array can be extended along its first axis.
+    """
     import h5py
 
     array = np.asarray(values)
@@ -265,8 +337,8 @@ def write_values(group: Any, name: str, values: Any) -> Any:
     return group.create_dataset(
         name,
         data=array,
-        chunks=_chunk_shape(array),
-        maxshape=(None,) * array.ndim if array.size == 0 else array.shape,
+        chunks=_chunk_shape(array, growing),
+        maxshape=_largest_shape(array, growing),
         compression="gzip",
         compression_opts=_COMPRESSION_LEVEL,
         shuffle=True,
@@ -274,24 +346,39 @@ def write_values(group: Any, name: str, values: Any) -> Any:
     )
 
 
-def _chunk_shape(array: np.ndarray) -> tuple[int, ...]:
+def _chunk_shape(array: np.ndarray, growing: bool) -> tuple[int, ...]:
     width = max(int(np.prod(array.shape[1:])) * array.itemsize, 1)
-    rows = min(max(_CHUNK_BYTES // width, 1), max(array.shape[0], 1))
+    most = max(_CHUNK_BYTES // width, 1)
+    rows = most if growing else min(most, max(array.shape[0], 1))
     return (rows, *(max(length, 1) for length in array.shape[1:]))
 
 
-def write_scale(group: Any, dimension: str, values: Any, unit: str) -> None:
+def _largest_shape(array: np.ndarray, growing: bool) -> tuple[int | None, ...]:
+    if growing:
+        return (None, *(length or None for length in array.shape[1:]))
+    return (None,) * array.ndim if array.size == 0 else array.shape
+
+
+def extend(dataset: Any, values: Any) -> None:
+    """Append rows to a growing dataset."""
+    if len(values):
+        first = len(dataset)
+        dataset.resize(first + len(values), axis=0)
+        dataset[first:] = np.asarray(values)
+
+
+def write_scale(group: Any, dimension: str, values: Any, unit: str, *, growing: bool = False) -> None:
     """Write the values along a dimension, and make them its scale."""
-    scale = write_values(group, dimension, values)
+    scale = write_values(group, dimension, values, growing=growing)
     scale.attrs["units"] = unit
     scale.make_scale(dimension)
 
 
 def write_quantity(
-    group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str
+    group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str, *, growing: bool = False
 ) -> Any:
     """Write one quantity; the scales of its dimensions must be in `group` already."""
-    dataset = write_values(group, name, values)
+    dataset = write_values(group, name, values, growing=growing)
     dataset.attrs["units"] = unit
     dataset.attrs["long_name"] = meaning
     for axis, dimension in enumerate(dimensions):
@@ -318,13 +405,29 @@ def read_values(group: Any, name: str, path: str) -> Any:
     """
     import h5py
 
+    dataset = dataset_of(group, name, path)
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        return dataset[()]
+    texts = dataset.asstr()[()]
+    return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
+
+
+def dataset_of(group: Any, name: str, path: str) -> Any:
+    """Return a dataset of `group` as it is in its file; raises as `read_values`."""
+    import h5py
+
     within = isinstance(group, h5py.Group)  # "in" would read a dataset through, however long it says it is
     if not within or name not in group or not isinstance(group[name], h5py.Dataset):
         raise RunFileError(f"{path}: {group.name}/{name} is missing")
     dataset = group[name]
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():
         raise RunFileError(f"{path}: {group.name}/{name} states {dataset.size} values, more than its bytes can hold")
-    if h5py.check_string_dtype(dataset.dtype) is None:
-        return dataset[()]
-    texts = dataset.asstr()[()]
-    return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
+    return dataset
+
+
+def blocks(values: Any) -> Iterator[np.ndarray]:
+    """Yield an array, or a dataset in a file, in blocks of rows of a megabyte; an empty one as it is."""
+    width = max(int(np.prod(values.shape[1:])) * values.dtype.itemsize, 1)
+    rows = max(_BLOCK // width, 1)
+    for first in range(0, max(len(values), 1), rows):
+        yield values[first : first + rows]

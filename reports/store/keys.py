@@ -19,7 +19,7 @@ import numpy as np
 from iapb.errors import ArgumentError
 from iapb.run import Run
 from iapb.scene import scene_folder
-from reports.store.io import written_aside
+from reports.store.io import blocks, written_aside
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # What can change a number in a run: the engine, the reference worlds, and the numeric packages under them.
@@ -134,10 +134,10 @@ def is_older_engine(label: str) -> bool:
 
 def add_array(digest: Any, name: str, array: Any) -> None:
     """Feed one array to a hash: its name, type, shape and bytes (little-endian, row by row)."""
-    values = np.ascontiguousarray(array)
-    values = values.astype(values.dtype.newbyteorder("<"), copy=False)
-    digest.update(f"{name} {values.dtype.str} {values.shape}\0".encode())
-    digest.update(values.tobytes())
+    dtype = array.dtype.newbyteorder("<")
+    digest.update(f"{name} {dtype.str} {array.shape}\0".encode())
+    for block in blocks(array):
+        digest.update(np.ascontiguousarray(block, dtype).tobytes())
 
 
 def content_hash(run: Run) -> str:

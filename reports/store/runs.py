@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from operator import index
 from pathlib import Path
@@ -15,8 +16,11 @@ from iapb.errors import RunFileError
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, energy_dimension, unit_of
 from reports.provenance import collect_provenance
 from reports.store.io import (
+    dataset_of,
+    extend,
     mark_plottable,
     new_file,
+    new_large_file,
     opened,
     read_values,
     write_quantity,
@@ -87,21 +91,73 @@ def store_run(
     """Write one run as `write_run` does, with the label of its code; return what the new file says of itself."""
     path = Path(path)
     with new_file(path, replace=replace) as file:
-        _write_head(file, run, key, code)
-        for group, name, attribute in TEXTS:
-            value = getattr(run, attribute)
-            write_text(file.require_group(group), name, _json(value) if attribute in JSON_TEXTS else value)
-        _write_names(file, run)
-        for group in GROUPS:
-            _write_group(file.create_group(group), group, run)
-        _write_energy(file.create_group("energy", track_order=True), run)
-        _write_effects(file.create_group("effects"), run)
-        file.create_group("provenance", track_order=True)
-        for name, text in (collect_provenance() if provenance is None else provenance).items():
-            write_text(file["provenance"], name, text)
+        _write_run(file, run, key, code, provenance)
+        file.attrs["content_hash"] = content_hash(run)
         if more is not None:
             more(file)
         return _entry(file, path)
+
+
+def store_parts(
+    path: Path | str, parts: Iterator[Run], *, stopped: str = "", key: str, code: str = "", replace: bool = False
+) -> RunEntry:
+    """Write a run that comes in parts, each going on from the one before: in constant memory, to the same content hash.
+
+    `stopped` says why the run is not complete.
+    """
+    path = Path(path)
+    with new_large_file(path, replace=replace) as file:
+        distrust: tuple[str, ...] = ()
+        for number, part in enumerate(parts):
+            distrust = distrust or part.distrust
+            if number == 0:
+                _write_run(file, part, key, code, None, growing=True)
+            else:
+                _append(file, part)
+        file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
+                           "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
+        file.attrs["content_hash"] = content_hash(_run_in(file, path))
+        return _entry(file, path)
+
+
+def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None, *,
+               growing: bool = False) -> None:  # fmt: skip
+    _write_head(file, run, key, code)
+    for group, name, attribute in TEXTS:
+        value = getattr(run, attribute)
+        write_text(file.require_group(group), name, _json(value) if attribute in JSON_TEXTS else value)
+    _write_names(file, run)
+    for group in GROUPS:
+        _write_group(file.create_group(group), group, run, growing)
+    _write_energy(file.create_group("energy", track_order=True), run, growing)
+    _write_effects(file.create_group("effects"), run)
+    file.create_group("provenance", track_order=True)
+    for name, text in (collect_provenance() if provenance is None else provenance).items():
+        write_text(file["provenance"], name, text)
+
+
+def _append(file: Any, part: Run) -> None:
+    """Append a part whose first state is the last one in the file."""
+    for name, (quantities, record_of, _) in GROUPS.items():
+        group = file[name]
+        for quantity in quantities:
+            values = getattr(record_of(part), quantity.name)
+            if quantity.dimensions[0] == "step_edge":
+                values = values + group[quantity.name][-1]
+            extend(group[quantity.name], values[int(quantity.dimensions[0] in ("time", "step_edge")):])
+        _lengthen_scales(group, {each.dimensions[0]: each.name for each in quantities}, part)
+    energy = file["energy"]
+    dimensions = {energy_dimension(part, name): name for name in part.energy}
+    for name, values in part.energy.items():
+        extend(energy[name], values[int(energy_dimension(part, name) == "time"):])
+    _lengthen_scales(energy, dimensions, part)
+
+
+def _lengthen_scales(group: Any, dimensions: Mapping[str, str], part: Run) -> None:
+    """Bring the scales along the first dimensions to the length of what goes along them."""
+    for dimension, name in dimensions.items():
+        scale, length = group[dimension], len(group[name])
+        extend(scale, part.time[1:] if dimension == "time" else np.arange(len(scale), length))
 
 
 def _json(value: Any) -> str:
@@ -120,7 +176,6 @@ def _write_head(file: Any, run: Run, key: str, code: str) -> None:
         file.attrs[name] = json.dumps(getattr(run, name), ensure_ascii=False)
     file.attrs["run_key"] = key
     file.attrs["code"] = code
-    file.attrs["content_hash"] = content_hash(run)
     file.attrs["dt"] = float(run.dt)
     file.attrs["tool_dofs"] = run.tool_dofs
     file.attrs["tool_coordinates"] = run.tool_coordinates
@@ -135,16 +190,16 @@ def _write_names(file: Any, run: Run) -> None:
     write_scale(group, "body", run.body_names, "1")
 
 
-def _write_group(group: Any, name: str, run: Run) -> None:
+def _write_group(group: Any, name: str, run: Run, growing: bool = False) -> None:
     quantities, record_of, signal = GROUPS[name]
     record = record_of(run)
     for quantity in quantities:
         values = getattr(record, quantity.name)
         for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
             if dimension not in group:
-                write_scale(group, dimension, *coordinates_of(run, dimension, length))
+                write_scale(group, dimension, *coordinates_of(run, dimension, length), growing=growing)
         dataset = write_quantity(
-            group, quantity.name, values, quantity.dimensions, unit_of(quantity, run), quantity.meaning
+            group, quantity.name, values, quantity.dimensions, unit_of(quantity, run), quantity.meaning, growing=growing
         )
         if quantity.name == "state":
             dataset.attrs.update(STATE_ATTRIBUTES)
@@ -152,12 +207,12 @@ def _write_group(group: Any, name: str, run: Run) -> None:
             mark_plottable(group, signal, [quantity.dimensions[0], *["."] * (len(quantity.dimensions) - 1)])
 
 
-def _write_energy(group: Any, run: Run) -> None:
+def _write_energy(group: Any, run: Run, growing: bool = False) -> None:
     for name, values in run.energy.items():
         dimension = energy_dimension(run, name)
         if dimension not in group:
-            write_scale(group, dimension, *coordinates_of(run, dimension, len(values)))
-        write_quantity(group, name, values, (dimension,), "J", name.replace("_", " "))
+            write_scale(group, dimension, *coordinates_of(run, dimension, len(values)), growing=growing)
+        write_quantity(group, name, values, (dimension,), "J", name.replace("_", " "), growing=growing)
     if run.energy:
         first = next(iter(run.energy))
         mark_plottable(group, first, [energy_dimension(run, first)])
@@ -190,10 +245,28 @@ def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
     """Return the run in a file and what the file says of itself; raises as `read_run`."""
     with opened(path) as file:
         entry = _entry(file, path)
-        run = Run(**_texts(file, path), **_head(file), **_arrays(file, path))
-        if content_hash(run) != entry.content_hash:
-            raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
-        return run, entry
+        return _judged(Run(**_texts(file, path), **_head(file), **_arrays(file, path, read_values)), entry, path), entry
+
+
+def _judged(run: Run, entry: RunEntry, path: Path | str) -> Run:
+    if content_hash(run) != entry.content_hash:
+        raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
+    return run
+
+
+@contextmanager
+def opened_run(path: Path | str) -> Iterator[tuple[Run, RunEntry]]:
+    """Give a run whose arrays stay in its file, to be read in `blocks`, and what the file says of itself.
+
+    The file is judged as `read_stored` does, in constant memory.
+    """
+    with opened(path) as file:
+        run, entry = _run_in(file, path), _entry(file, path)
+        yield _judged(run, entry, path), entry
+
+
+def _run_in(file: Any, path: Path | str) -> Run:
+    return Run(**_texts(file, path), **_head(file), **_arrays(file, path, dataset_of))
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
@@ -266,24 +339,27 @@ def _head(file: Any) -> dict[str, Any]:
     }
 
 
-def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
+def _arrays(file: Any, path: Path | str, read: Callable[[Any, str, str], Any]) -> dict[str, Any]:
+    """Return names and arrays, these as `read` gives them: read_values, or dataset_of."""
     place = str(path)
     group = {
-        name: {quantity.name: _numbers(file[name], quantity.name, place) for quantity in quantities}
+        name: {quantity.name: _numbers(read, file[name], quantity.name, place) for quantity in quantities}
         for name, (quantities, _, _) in GROUPS.items()
     }
     for name, quantity in (("contacts", "is_new"), ("impacts", "solved")):  # truth values are stored as numbers
-        group[name][quantity] = group[name][quantity].astype(np.bool_)
+        group[name][quantity] = _Truths(group[name][quantity])
+        if read is read_values:
+            group[name][quantity] = group[name][quantity][:]
     return {
         "coordinate_names": read_values(file["mechanism"], "coordinate", place),
         "coordinate_units": read_values(file["mechanism"], "coordinate_unit", place),
         "velocity_names": read_values(file["mechanism"], "velocity", place),
         "velocity_units": read_values(file["mechanism"], "velocity_unit", place),
         "body_names": read_values(file["mechanism"], "body", place),
-        "time": read_values(file["trajectory"], "time", place),
+        "time": _numbers(read, file["trajectory"], "time", place),
         "contacts": ContactTable(**group["contacts"]),
         "impacts": ImpactTable(**group["impacts"]),
-        "energy": _energy(_group(file, "energy", place), place),
+        "energy": _energy(read, _group(file, "energy", place), place),
         "effects": _effects(file["effects"], place),
         **group["trajectory"],
         **group["steps"],
@@ -291,15 +367,30 @@ def _arrays(file: Any, path: Path | str) -> dict[str, Any]:
     }
 
 
-def _numbers(group: Any, name: str, path: str) -> np.ndarray:
-    values = read_values(group, name, path)
-    if not (isinstance(values, np.ndarray) and values.dtype.kind in "biuf" and values.ndim):
+class _Truths:
+    """Numbers 0 and 1, in a file or in memory, as the truth values that they stand for."""
+
+    dtype = np.dtype(np.bool_)
+
+    def __init__(self, numbers: Any) -> None:
+        self._numbers, self.shape = numbers, numbers.shape
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, rows: Any) -> np.ndarray:
+        return np.asarray(self._numbers[rows]).astype(np.bool_)
+
+
+def _numbers(read: Callable[[Any, str, str], Any], group: Any, name: str, path: str) -> Any:
+    values = read(group, name, path)
+    if not (hasattr(values, "dtype") and values.dtype.kind in "biuf" and values.ndim):
         raise RunFileError(f"{path}: {group.name}/{name} is no list of numbers")
     return values
 
 
-def _energy(group: Any, path: str) -> dict[str, Any]:
-    return {name: _numbers(group, name, path) for name in group if not group[name].is_scale}
+def _energy(read: Callable[[Any, str, str], Any], group: Any, path: str) -> dict[str, Any]:
+    return {name: _numbers(read, group, name, path) for name in group if not group[name].is_scale}
 
 
 def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:

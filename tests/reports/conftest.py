@@ -78,6 +78,7 @@ def make_run() -> Callable[..., Run]:
             "v": rng.normal(size=(steps + 1, d)),
             "device_q": rng.normal(size=(steps + 1, d_tool)),
             "device_v": rng.normal(size=(steps + 1, d_tool)),
+            "pose": rng.normal(size=(steps + 1, 1, 3)),
             "state": rng.integers(0, 3, steps).astype(np.int8),
             "contacts": _contacts(rng, steps, contacts),
             "impacts": _impacts(rng, impacts, d),

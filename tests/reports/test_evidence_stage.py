@@ -17,7 +17,7 @@ from iapb.scene import find_scene, load_scene
 from reports.evidence import depends
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage, plain_records
-from reports.provenance import linear_algebra
+from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.runner import Runner
 from reports.store import keys
 from reports.store.tables import columns_of, finding_table, read_table, read_tables, write_table
@@ -130,6 +130,16 @@ def test_another_blas_kernel_is_another_machine_and_another_number_of_threads_is
                               capture_output=True, env={**os.environ, **chosen})  # fmt: skip
         said.append(done.stdout.strip())
     assert said[0] != said[1] == said[2]
+
+
+def test_numpy_without_its_optional_code_is_another_machine():
+    if dispatched() in (UNKNOWN, "baseline"):
+        pytest.skip("numpy has no optional code for this processor")
+    program = "from reports.provenance import this_machine; print(this_machine())"
+    done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
+                          capture_output=True,
+                          env={**os.environ, "NPY_DISABLE_CPU_FEATURES": dispatched()})  # fmt: skip
+    assert done.stdout.strip() == this_machine().replace(f"numpy {dispatched()}", "numpy baseline")
 
 
 def test_a_stage_that_fails_or_is_interrupted_leaves_nothing(tmp_path):

@@ -84,9 +84,9 @@ def test_figures_are_drawn_and_can_stand_in_a_page(topic: Finding, runs: tuple[R
 def test_outlines_stand_where_the_engine_has_the_bodies(runs: tuple[Run, ...], name: str) -> None:
     run = runs[NAMES.index(name)]
     mechanism = mechanism_of(load_scene(find_scene(name)))
-    for q in (run.q[0], run.q[run.steps // 2], run.q[-1]):
-        rotation, origin = mechanism.placements(q)
-        for body, place in body_placements(run.scene_resolved, q).items():
+    for k in (0, run.steps // 2, run.steps):
+        rotation, origin = mechanism.placements(run.q[k])
+        for body, place in body_placements(run.scene_resolved, run.pose[k]).items():
             index = mechanism.index(body)
             assert np.abs(place.rotation - rotation[index]).max() < 1e-14
             assert np.abs(place.origin - origin[index]).max() < 1e-14

@@ -14,7 +14,8 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
 from functools import cache, partial
 from multiprocessing import get_context
@@ -26,11 +27,12 @@ import numpy as np
 from iapb.errors import IapbError, RunFileError
 from iapb.run import Run
 from reports.store import RunStore
-from reports.store.care import DAMAGED, WHOLE, check_store
-from reports.store.io import sealed
+from reports.store.care import DAMAGED, WHOLE, check_store, collect_garbage, garbage
+from reports.store.io import mark_store, sealed
 from reports.store.keys import content_hash
 from reports.store.runs import read_run
 from reports.store.schema import FORMAT_VERSION
+from tests.robustness.kills import KILLS
 from tests.robustness.last_result import remember
 
 
@@ -276,6 +278,34 @@ def _write_three(folder: Path) -> None:
         store.put(inputs_of(number), numbered(number), "sample")
 
 
+def collecting_writers(folder: Path, times: int) -> tuple[int, int, int, str]:
+    """Two processes write while another removes garbage without a pause, the files they write made old at once."""
+    sample_run()
+    survived, lost = 0, 0
+    for attempt in range(times):
+        place = folder / str(attempt)
+        store = open_store(place)
+        mark_store(place)
+        collector = in_child(_collect_for_ever, place)
+        writers = [in_child(_write_three, place) for _ in range(2)]
+        for writer in writers:
+            writer.join()
+        os.kill(collector.pid, signal.SIGKILL)
+        collector.join()
+        missing = sum(not whole(store, number) for number in range(_RUNS))
+        lost += missing
+        survived += missing == 0 and all(writer.exitcode == 0 for writer in writers)
+    return times, survived, lost, "nothing: what is written is locked, and gc passes it over"
+
+
+def _collect_for_ever(folder: Path) -> None:
+    while True:
+        for path in folder.glob(".*.writing"):
+            with suppress(OSError):
+                os.utime(path, (0.0, 0.0))  # as if the writer had been at it for years
+        collect_garbage(garbage(folder))
+
+
 # name -> (folder, times) -> tried, survived, lost, said
 FAULTS: dict[str, Callable[[Path, int], tuple[int, int, int, str]]] = {
     "kill -9 at a random moment": killed_writer,
@@ -285,14 +315,17 @@ FAULTS: dict[str, Callable[[Path, int], tuple[int, int, int, str]]] = {
     "a file of another format version": other_version,
     "two processes write one store": rival_writers,
     "a folder that cannot be written": forbidden_folder,
+    "gc --delete without a pause": collecting_writers,
 }
 
 
-def try_faults(folder: Path, times: int) -> tuple[FaultRecord, ...]:
+def try_faults(
+    folder: Path, times: int, faults: Mapping[str, Callable[[Path, int], tuple[int, int, int, str]]] = FAULTS
+) -> tuple[FaultRecord, ...]:
     """Do every fault `times` times, each in a folder of its own below `folder`."""
     records = []
-    for name, fault in FAULTS.items():
-        place = folder / fault.__name__
+    for number, (name, fault) in enumerate(faults.items()):
+        place = folder / str(number)
         place.mkdir(parents=True)
         records.append(FaultRecord(name, *fault(place, times)))
     return tuple(records)
@@ -302,12 +335,14 @@ def main() -> int:
     """Try the faults and keep the result; return 0 if all were survived, else 1."""
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.faults", description=__doc__.splitlines()[0])
     parser.add_argument("--times", type=int, default=120, help="how often each fault is done")
-    times = parser.parse_args().times
+    parser.add_argument("--kills", type=int, default=102, help="how often a command is killed, in all")
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        records = try_faults(Path(folder), times)
+        records = try_faults(Path(folder) / "store", given.times)
+        records += try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), KILLS)
     for one in records:
         print(f"{one.fault:<34} {one.tried:>5} tried, {one.survived:>5} survived, {one.lost} lost")
-    remember("faults", f"python -m tests.robustness.faults --times {times}",
+    remember("faults", f"python -m tests.robustness.faults --times {given.times} --kills {given.kills}",
              ("fault", "tried", "survived", "lost", "what one reads"), [astuple(one) for one in records])
     return int(any(one.survived < one.tried or one.lost for one in records))
 

@@ -11,6 +11,7 @@ import tests.robustness.faults as faults
 from iapb.errors import RunFileError
 from reports.store.runs import read_run
 from tests.robustness.faults import FAULTS, inputs_of, killed_writer, open_store, try_faults
+from tests.robustness.kills import FOREIGN, foreign_hash, killed_command
 
 
 def test_nothing_finished_is_lost(tmp_path: Path) -> None:
@@ -18,6 +19,21 @@ def test_nothing_finished_is_lost(tmp_path: Path) -> None:
     assert [record.fault for record in records] == list(FAULTS)
     for record in records:
         assert (record.survived, record.lost) == (record.tried, 0), record
+
+
+@pytest.mark.parametrize("name", ["run", "store gc"])
+def test_a_killed_command_loses_nothing_and_touches_nothing_foreign(tmp_path: Path, name: str) -> None:
+    tried, survived, lost, _ = killed_command(name, tmp_path, 1)
+    assert (tried, survived, lost) == (1, 1, 0)
+
+
+def test_a_change_of_a_foreign_file_would_be_seen(tmp_path: Path) -> None:
+    for name in FOREIGN:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    before = foreign_hash(tmp_path)
+    (tmp_path / FOREIGN[-1]).unlink()
+    assert foreign_hash(tmp_path) != before
 
 
 def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

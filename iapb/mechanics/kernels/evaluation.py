@@ -6,6 +6,7 @@ The configurations come from outside, so these kernels check them; all others tr
 from math import isfinite, sqrt
 
 from iapb.compiled import kernel
+from iapb.elementary import arc_tangent
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference
@@ -152,6 +153,46 @@ def energies_along(m, w, q, v, g, kinetic, potential):
         forward_kinematics(m, q[k], w)
         kinetic[k] = kinetic_energy(m, w, v[k])
         potential[k] = potential_energy(m, w, g)
+
+
+@kernel
+def planar_poses_along(m, w, q, out):
+    """out (n, bodies, 3) <- x, y [m] and angle [rad] of every body, in the plane, at each row of q (n, nq)."""
+    for k in range(q.shape[0]):
+        forward_kinematics(m, q[k], w)
+        for b in range(out.shape[1]):
+            out[k, b, 0], out[k, b, 1] = w.position[b, 0], w.position[b, 1]
+            out[k, b, 2] = arc_tangent(w.rotation[b, 1, 0], w.rotation[b, 0, 0])
+
+
+@kernel
+def poses_along(m, w, q, out):
+    """out (n, bodies, 7) <- position [m] and quaternion x, y, z, w >= 0 of every body, at each row of q (n, nq)."""
+    for k in range(q.shape[0]):
+        forward_kinematics(m, q[k], w)
+        for b in range(out.shape[1]):
+            out[k, b, 0], out[k, b, 1], out[k, b, 2] = load(w.position, b)
+            out[k, b, 3], out[k, b, 4], out[k, b, 5], out[k, b, 6] = quaternion_of(w.rotation[b])
+
+
+@kernel
+def quaternion_of(r):
+    """Quaternion x, y, z, w >= 0 of a rotation (3, 3), from its largest component: no cancellation."""
+    trace = r[0, 0] + r[1, 1] + r[2, 2]
+    if trace > max(r[0, 0], r[1, 1], r[2, 2]):
+        s = 2.0 * sqrt(1.0 + trace)
+        return (r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s, 0.25 * s
+    if r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2]:
+        s = 2.0 * sqrt(1.0 + r[0, 0] - r[1, 1] - r[2, 2])
+        x, y, z, w = 0.25 * s, (r[0, 1] + r[1, 0]) / s, (r[0, 2] + r[2, 0]) / s, (r[2, 1] - r[1, 2]) / s
+    elif r[1, 1] >= r[2, 2]:
+        s = 2.0 * sqrt(1.0 + r[1, 1] - r[0, 0] - r[2, 2])
+        x, y, z, w = (r[0, 1] + r[1, 0]) / s, 0.25 * s, (r[1, 2] + r[2, 1]) / s, (r[0, 2] - r[2, 0]) / s
+    else:
+        s = 2.0 * sqrt(1.0 + r[2, 2] - r[0, 0] - r[1, 1])
+        x, y, z, w = (r[0, 2] + r[2, 0]) / s, (r[1, 2] + r[2, 1]) / s, 0.25 * s, (r[1, 0] - r[0, 1]) / s
+    sign = -1.0 if w < 0.0 else 1.0
+    return sign * x, sign * y, sign * z, sign * w
 
 
 @kernel

@@ -11,10 +11,12 @@ import pytest
 from iapb.errors import IapbError
 from reference.worlds import run_world
 from reports.live.budget import RowBudget, RowCost, calibrated
+from reports.live.deadline import Timetable
 from reports.live.loop import Loop
 from reports.live.measure import made_device, rows_left_out, summary
-from reports.live.replay import replay
+from reports.live.replay import finish_live, is_live, open_log, read_live, replay
 from reports.store.keys import content_hash
+from reports.streaming import logs_of_killed
 
 PERIOD = 1e-3
 TICKS = 700  # more than one chunk of the record
@@ -104,6 +106,36 @@ def test_control_c_ends_the_loop_with_what_was_done(peg, fake_clock):
     assert live.run.stopped == "interrupted" and not live.run.complete
     assert content_hash(replay(live)) == content_hash(live.run)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_loop_that_streams_comes_to_the_files_of_one_that_holds_all(peg, fake_clock, tmp_path):
+    def late():
+        return fake_clock({50: 2.5e-3})
+
+    held, ticks = Loop(peg(), 1500, late()).run("IAPB"), 1500
+    simulation = peg()
+    log = open_log(tmp_path, "live", simulation, "IAPB", ticks)
+    assert Loop(simulation, ticks, late(), log=log).stream() == ""
+    path, _ = finish_live(log.path, "")
+    log.close(remove=True)
+    stored = read_live(path)
+    assert content_hash(stored.run) == content_hash(held.run) == content_hash(replay(stored))
+    for name in Timetable._fields:
+        assert np.array_equal(getattr(stored.timetable, name), getattr(held.timetable, name)), name
+
+
+def test_a_live_run_that_is_killed_is_there_up_to_its_last_chunk(peg, fake_clock, tmp_path):
+    process = os.fork()
+    if process == 0:
+        simulation = peg()
+        log = open_log(tmp_path, "live", simulation, "IAPB", 2000)
+        Loop(simulation, 2000, fake_clock(at={1700: lambda: os._exit(9)}), log=log).stream()
+    os.waitpid(process, 0)
+    [log] = logs_of_killed(tmp_path)
+    assert is_live(log)
+    stored = read_live(finish_live(log, "killed")[0])
+    assert stored.run.steps == 3 * 512 == len(stored.timetable.due) and stored.run.stopped == "killed"
+    assert content_hash(replay(stored)) == content_hash(stored.run)
 
 
 class Fails:

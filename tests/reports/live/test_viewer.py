@@ -151,7 +151,7 @@ def test_the_loop_does_not_wait_for_a_viewer_that_sleeps_and_lets_go_for_one_tha
         alone = paced(viewer, module_peg(), clock)
         assert np.array_equal(alone.timetable.wrench, np.tile(alone.timetable.wrench[0], (TICKS, 1)))
         assert np.any(alone.timetable.wrench != pulled.timetable.wrench)
-        assert np.array_equal(viewer.window.shown(), alone.run.q[-1])
+        assert np.array_equal(viewer.window.shown(), alone.run.pose[-1].ravel())
     finally:
         os.kill(viewer.process.pid, signal.SIGCONT)
 

@@ -1,0 +1,235 @@
+"""Runs of any length in constant memory: chunks go to a log while the loop is at work, and from there to the run file.
+
+A run that is over before its first block is due never touches the disk until it is stored. A longer one leaves a log
+beside its file from which it goes on, bit for bit, after a kill; at most `PAUSE` seconds of work are lost.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from iapb.errors import RunFileError
+from iapb.recording import Recorder
+from iapb.run import Run
+from iapb.simulation import Simulation, record
+from reports.resimulate import coupling_of, law_of, scene_of
+from reports.store.care import stores_below
+from reports.store.folder import Place
+from reports.store.io import is_locked
+from reports.store.keys import code_label, plain
+from reports.store.logs import (
+    CHUNK,
+    LOG_SUFFIX,
+    STATE,
+    LogLocked,
+    RunLog,
+    is_log,
+    put_back,
+    read_log,
+    record_of,
+)
+from reports.store.runs import RunEntry, store_parts, store_run
+
+PAUSE = 5.0  # [s] between two states in a log
+HELD = 16 << 20  # bytes of chunks that wait for the log, and of a part on its way to the run file
+_STATE_SHARE = 0.05  # of the time may go into states
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """What came of a run: its entry where complete, why it stopped, where it went on from, whether it can again."""
+
+    entry: RunEntry | None
+    stopped: str
+    resumed_at: int
+    resumable: bool
+
+
+def log_of(path: Path) -> Path:
+    """Return the log beside a run file that is in the making."""
+    return path.with_name(path.name + LOG_SUFFIX)
+
+
+def stream(place: Place, simulation: Simulation, world: str, total: int, *, resume: bool = False,
+           progress: Any = None) -> Streamed:
+    """Simulate `total` steps and store the run in its place.
+
+    Parameters
+    ----------
+    simulation : at its start.
+    resume : go on from the log in that place, where there is one.
+
+    Raises
+    ------
+    RunFileError
+        Something cannot be written, or the log belongs to another run.
+    """
+    return _Stream(place, simulation, world, total).run(resume, progress)
+
+
+class _Stream:
+    def __init__(self, place: Place, simulation: Simulation, world: str, total: int) -> None:
+        self.place, self.simulation, self.world, self.total = place, simulation, world, total
+        self.recorder, self.joiner = Recorder(simulation), Recorder(simulation)
+        self.log: RunLog | None = None
+        self._next = time.monotonic() + PAUSE
+
+    def run(self, resume: bool, progress: Any) -> Streamed:
+        try:
+            resumed_at = self._go_on() if resume else 0
+            stopped = record(self.recorder, self.total, progress, self._between)
+            if self.log is None:
+                return Streamed(self._store_held(stopped), stopped, 0, False)
+            self._spill()
+            parts = parts_of(self.log.path, self.joiner, self.world)
+            if stopped:
+                store_parts(self.place.partial, parts, stopped=stopped, key=self.place.key, replace=True)
+                return Streamed(None, stopped, resumed_at, self.simulation.keeps_no_state)
+            entry = store_parts(self.place.path, parts, key=self.place.key, code=code_label())
+            self.place.partial.unlink(missing_ok=True)
+            self.log.close(remove=True)
+            self.log = None
+            return Streamed(entry, "", resumed_at, False)
+        finally:
+            if self.log is not None:
+                self.log.close()
+
+    def _store_held(self, stopped: str) -> RunEntry | None:
+        run = self.recorder.run(self.world, stopped)
+        if stopped:
+            store_run(self.place.partial, run, key=self.place.key, replace=True)
+            return None
+        entry = store_run(self.place.path, run, key=self.place.key, code=code_label())
+        self.place.partial.unlink(missing_ok=True)
+        _forget(log_of(self.place.path))
+        return entry
+
+    def _between(self) -> None:
+        """Between two chunks: the log gets what is held where it is much, and a state now and then."""
+        due = time.monotonic() >= self._next
+        if not (due or self.recorder.held_bytes > HELD):
+            return
+        self._spill()
+        if due and self.simulation.keeps_no_state:
+            began = time.monotonic()
+            self.log.write_state(self.simulation.arrays())  # type: ignore[union-attr]
+            now = time.monotonic()
+            self._next = now + max(PAUSE, (now - began) / _STATE_SHARE)
+
+    def _spill(self) -> None:
+        """Append the chunks that are held and not yet in the log: Ctrl-C may come in the middle, and again."""
+        if self.log is None:
+            self.log = self._open()
+        first = self.recorder.first
+        for chunk, size, seconds in self.recorder.held():
+            if first >= self.log.steps:
+                self.log.write_chunk(chunk, size, seconds)
+            first += size
+        self.recorder.forget()
+
+    def _open(self) -> RunLog:
+        """Return the log in its place, emptied."""
+        head = log_head(self.simulation, self.world, self.total, key=self.place.key, code=code_label())
+        try:
+            return RunLog(log_of(self.place.path), head)
+        except LogLocked:
+            raise RunFileError(f"{self.place.path}: another process is computing this run; wait for it") from None
+
+    def _go_on(self) -> int:
+        """Restore the last state in the log; return its step, 0 where there is none."""
+        path = log_of(self.place.path)
+        if not path.is_file():
+            return 0
+        head, blocks = read_log(path)
+        if head.get("key") != self.place.key:
+            raise RunFileError(f"{path}: the log of another run")
+        states = [block for block in blocks if block.line["kind"] == STATE]
+        if not states or not self.simulation.keeps_no_state:
+            return 0
+        self.log = RunLog(path, head, anew=False)
+        put_back(path, states[-1], self.simulation.arrays())
+        self.log.go_on(states[-1])
+        self.simulation.steps_done = self.log.steps
+        self.recorder.go_on(self.log.steps)
+        return self.log.steps
+
+
+def log_head(simulation: Simulation, world: str, total: int, **more: Any) -> dict[str, Any]:
+    """Return what a log says of its run: enough to simulate it again."""
+    law, coupling = simulation.law, simulation.coupling
+    return plain({
+        "scene_resolved": simulation.scene.resolved(), "scene_source": simulation.scene.source_text, "world": world,
+        "law": law.name, "law_settings": dict(law.settings), "coupling": coupling.name,
+        "coupling_settings": dict(coupling.settings), "steps": total, **more,
+    })  # fmt: skip
+
+
+def lengths_of(recorder: Recorder) -> dict[str, int]:
+    """Return the lengths of the dimensions that depend on the scene."""
+    names = ("coordinate", "velocity", "device_coordinate", "device_velocity")
+    return dict(zip(names, recorder.coordinates, strict=True))
+
+
+def parts_of(path: Path, joiner: Recorder, world: str, more: int = 0, rows: list[Any] | None = None) -> Iterator[Run]:
+    """Yield the run in a log in parts.
+
+    joiner : a recorder of the same simulation that was made at its start; rows : takes the `more` columns of the log.
+    """
+    lengths, held = lengths_of(joiner), 0
+    for block in read_log(path)[1]:
+        if block.line["kind"] == CHUNK and block.line["steps"]:
+            chunk, own = record_of(path, block, lengths, more)
+            if rows is not None:
+                rows.append(own)
+            joiner.keep(chunk, int(block.line["steps"]), float(block.line["seconds"]))
+            held += int(block.line["bytes"])
+            if held > HELD:
+                yield joiner.take(world)
+                held = 0
+    if held:
+        yield joiner.take(world)
+
+
+def logs_of_killed(folder: Path | str) -> list[Path]:
+    """Return the logs in stores, at and below a folder, that no process is at work on."""
+    return [log for store in stores_below(folder) for log in sorted(store.glob(f"*.h5{LOG_SUFFIX}"))
+            if is_log(log) and not log.is_symlink() and not is_locked(log)]
+
+
+def recover(log: Path) -> Path:
+    """Store what a log holds as the partial run beside it, so that it can be read; the log stays, to go on from.
+
+    Raises
+    ------
+    RunFileError
+        The log is damaged.
+    ArgumentError
+        Its law or coupling is not one of ours.
+    """
+    head, _ = read_log(log)
+    simulation = simulation_of(head)
+    place = Place(str(head.get("key", "")), log.with_name(log.name.removesuffix(LOG_SUFFIX)))
+    parts = parts_of(log, Recorder(simulation), str(head["world"]))
+    store_parts(place.partial, parts, stopped="killed", key=place.key, replace=True)
+    return place.partial
+
+
+def simulation_of(head: Mapping[str, Any]) -> Simulation:
+    """Return the simulation of a log, at its start."""
+    run: Any = SimpleNamespace(**head)  # it has the names of a Run's
+    return Simulation(scene_of(run), law_of(run), coupling_of(run))
+
+
+def _forget(log: Path) -> None:
+    """Remove a log that an earlier attempt left, unless somebody writes it."""
+    if log.is_file():
+        try:
+            RunLog(log, {}, anew=False).close(remove=True)
+        except LogLocked:
+            return
+
