@@ -1,0 +1,9 @@
+"""Other engines on scenes whose outcome is known: MuJoCo, if it is installed, beside a rigid reference.
+
+Run it: python examples/another_engine.py
+"""
+
+from verification.engines import compare_engines, verdict
+
+for record in compare_engines(["mujoco", "rigid"], ["elastic_cradle", "redundant_wedge"]):
+    print(f"{record.engine:<8} {record.scene:<16} settings: {record.choice:<8} {verdict(record)}")
