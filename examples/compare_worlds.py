@@ -13,7 +13,8 @@ rate: 1000
 duration: 0.3
 gravity: [3.355, -9.218]        # a floor tilted by 20 degrees
 bodies:
-  - {name: box, joint: planar, mass: 1.0, inertia: 0.002, shapes: [{kind: box, size: [0.1, 0.1]}], position: [0, 0.05, 0]}
+  - {name: box, joint: planar, mass: 1.0, inertia: 0.002, position: [0, 0.05, 0],
+     shapes: [{kind: box, size: [0.1, 0.1]}]}
 walls:
   - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}
 contact: {stiffness: 10000, damping: 100, friction: 0.5, restitution: 0}
