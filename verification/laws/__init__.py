@@ -3,7 +3,7 @@
 from verification.impacts import ImpactCase
 from verification.laws.bounds import LawResidual
 from verification.laws.bulk import BulkImpacts, bulk_impacts
-from verification.laws.contracts import CONTRACTS, FRICTIONAL_LAWS, UNILATERAL_LAWS
+from verification.laws.contracts import CONTRACTS, EXACT_LAWS, FRICTIONAL_LAWS, UNILATERAL_LAWS
 from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
 from verification.laws.kit import PassivityReport, check_passivity
 from verification.laws.planted import PLANTED_BUGS
@@ -11,6 +11,7 @@ from verification.laws.resolver import sound_resolver
 
 __all__ = [
     "CONTRACTS",
+    "EXACT_LAWS",
     "FRICTIONAL_LAWS",
     "LAWS",
     "PLANTED_BUGS",

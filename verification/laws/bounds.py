@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,11 +14,15 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class LawResidual:
-    """How far an impact is from keeping a law; passes while value <= tolerance (an unknown value never does)."""
+    """How far an impact is from keeping a law; passes while value <= tolerance (an unknown value never does).
+
+    A law without tolerance says in `excused` how much of the value may be rounding: there it fails, but not severely.
+    """
 
     law: str
     value: float
     tolerance: float
+    excused: float = field(default=0.0, repr=False)
 
     @property
     def ratio(self) -> float:
@@ -31,6 +35,11 @@ class LawResidual:
     def passed(self) -> bool:
         """Whether the law holds to its tolerance."""
         return self.ratio <= 1.0
+
+    @property
+    def severe(self) -> bool:
+        """Whether the law is broken by more than rounding."""
+        return not self.passed and not self.value <= self.excused
 
 
 @dataclass(frozen=True)

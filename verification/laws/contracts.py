@@ -30,6 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iapb.certificate import exact_gain
 from verification.impacts import (
     Floats,
     ImpactCase,
@@ -235,6 +236,18 @@ def _friction_power(case: ImpactCase, resolver: Resolver) -> tuple[float, float]
     return float(p[1:] @ slip) / case.speed**2, limit / case.speed**2
 
 
+# Theorems 1 and 2 of the doubles themselves: a resolver may promise that no impact gains, not even in the last bit.
+def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
+    """(KE⁺ − KE⁻)/KE⁻ by rationals, against 0; infinite where motion appears from rest."""
+    v_plus = own_outcome(resolver, case)
+    gain = exact_gain(case.mass_matrix, case.velocity, v_plus)
+    before = -exact_gain(case.mass_matrix, case.velocity, np.zeros_like(v_plus))
+    relative = float(gain / before) if before else (np.inf if gain > 0 else 0.0)
+    return LawResidual("exact_energy", relative, 0.0, bounds.energy_gain(case))
+
+
+EXACT_LAWS = {"exact_energy": Law("KE⁺ ≤ KE⁻ in real arithmetic", no_gain_in_real_arithmetic)}
+
 # Laws that compare a call with another: v⁺ of contacts that only push is unique, whatever p is.
 _UNIQUE = ("free_motion", "momentum", "duplicated_rows", "row_order", "units", "coordinates", "groups")
 
@@ -274,7 +287,7 @@ class Contract(NamedTuple):
     laws, optional : by name; those of `optional` judge only where they are asked for.
     bounds, largest_condition : tolerances, and the largest κ(M) drawn, unless the caller has others.
     draw : impact of a number; first : impacts that come before the drawn ones.
-    table : name of `laws` in `verification.laws`, for a test to paste.
+    table : name of its table of laws in `verification.laws`, for a test to paste.
     """
 
     laws: dict[str, Law]
@@ -283,7 +296,7 @@ class Contract(NamedTuple):
     draw: Callable[[np.random.Generator, int, float], ImpactCase]
     first: Callable[[np.random.Generator], Iterator[ImpactCase]]
     table: str
-    optional: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ("exact_energy",)
 
 
 def _nothing(rng: np.random.Generator) -> Iterator[ImpactCase]:
@@ -291,8 +304,9 @@ def _nothing(rng: np.random.Generator) -> Iterator[ImpactCase]:
 
 
 CONTRACTS: dict[str, Contract] = {
-    "equality": Contract(LAWS, KIT, 1e8, draw_wide_case, adverse_cases, "LAWS"),
-    "unilateral": Contract(UNILATERAL_LAWS, ONE_SIDED, 1e4, draw_one_sided_case, _nothing, "UNILATERAL_LAWS"),
-    "frictional": Contract(FRICTIONAL_LAWS, ONE_SIDED, 1e2, draw_frictional_case, _nothing, "FRICTIONAL_LAWS",
-                           ("maximal_dissipation",)),
+    "equality": Contract(LAWS | EXACT_LAWS, KIT, 1e8, draw_wide_case, adverse_cases, "LAWS"),
+    "unilateral": Contract(UNILATERAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e4, draw_one_sided_case, _nothing,
+                           "UNILATERAL_LAWS"),
+    "frictional": Contract(FRICTIONAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e2, draw_frictional_case, _nothing,
+                           "FRICTIONAL_LAWS", ("exact_energy", "maximal_dissipation")),
 }

@@ -12,7 +12,7 @@ import numpy as np
 
 from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
-from verification.laws.contracts import CONTRACTS
+from verification.laws.contracts import CONTRACTS, EXACT_LAWS
 from verification.laws.engine_laws import ENGINE_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
 from verification.laws.strategies import SEARCHED, tangents_are_independent
@@ -131,7 +131,8 @@ def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = No
     """
     if law in ENGINE_LAWS:
         return _test_of_the_engine(case, law)
-    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else CONTRACTS[contract].table
+    table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
+    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
     name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
     imports = ["import numpy as np", f"from verification.laws import {table}, ImpactCase"]
     imports.append(f"from verification.laws.bounds import {name or 'Bounds'}")

@@ -35,6 +35,7 @@ class LawVerdict:
     Attributes
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
+    severe : failures by more than rounding excuses; all of them, but for ``exact_energy``.
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
     largest_case : the impact that breaks the law with the largest residual; None if none does.
@@ -52,6 +53,7 @@ class LawVerdict:
     largest_case: ImpactCase | None = None
     fault: str = ""
     error: Exception | None = None
+    severe: int = 0
 
     @property
     def passed(self) -> bool:
@@ -61,7 +63,9 @@ class LawVerdict:
     def __str__(self) -> str:
         mark = "kept  " if self.passed else "BROKEN"
         worst = f"worst {self.worst.value:.2e} of {self.worst.tolerance:.2e}" if self.worst else "-"
-        line = f"  {mark} {self.statement}: {self.failures} of {self.checked}, {worst}"
+        within = self.failures - self.severe
+        grades = f" ({self.severe} by more than rounding, {within} within it)" if within else ""
+        line = f"  {mark} {self.statement}: {self.failures} of {self.checked}{grades}, {worst}"
         return f"{line}\n         {self.fault}" if self.fault else line
 
 
@@ -174,6 +178,7 @@ class Tally:
     law: Law
     checked: int = 0
     failures: int = 0
+    severe: int = 0
     fault: str = ""
     error: Exception | None = None
     largest: float = -np.inf
@@ -195,9 +200,10 @@ class Tally:
             return
         self.checked += 1
         self.failures += not residual.passed
+        self.severe += residual.severe
         self.fault = self.fault or complaint
         self.largest = max(self.largest, residual.value)
-        if self.worst is None or residual.ratio > self.worst.ratio:
+        if self.worst is None or (residual.ratio, residual.value) > (self.worst.ratio, self.worst.value):
             self.worst, self.worst_case = residual, case
         if not residual.passed and (self.largest_case is None or residual.value > self.largest_failure):
             self.largest_failure, self.largest_case = residual.value, case
@@ -205,7 +211,7 @@ class Tally:
     def verdict(self) -> LawVerdict:
         """What became of it."""
         return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.largest_case, self.fault, self.error)
+                          self.largest, self.largest_case, self.fault, self.error, self.severe)
 
 
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
@@ -293,8 +299,8 @@ def check_passivity(
     contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only push, e in [0, 1].
         ``frictional``: also Coulomb's friction; called as resolver(mass_matrix, contact_jacobian, tangents (c, m, d),
         velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
-    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract that are not optional
-        (``maximal_dissipation`` is).
+    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract that are not optional.
+        Optional are ``exact_energy``, which excuses no rounding, and ``maximal_dissipation``.
     impacts : random impacts. ``equality``: up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
         fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
         `impacts.ADVERSE` more come first: elastic ones on nearly equal rows. The other contracts: up to 6 coordinates
