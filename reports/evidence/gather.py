@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +45,13 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
     inputs: dict[str, Any] = kept.attempt("runs of the figures", partial(runs.figure_runs, runner), {})
     inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
-    inputs["arm_energies"] = _arm_energies()
+    inputs["arm_energies"] = arm_energies()
 
     ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth, workers=claims.cores()))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], check_all)
     broken = kept.stage("counterexamples", tuple[Finding, ...], laws.counterexamples)
     hard = kept.stage("hard cases", tuple[Finding, ...], partial(hard_cases.hard_cases, runner))
-    timed = kept.stage("accuracy", Table, _methods, None)
+    timed = kept.stage("accuracy", Table, lambda done, lost: work_precision(progress=done, failures=lost), None)
     gains, properties, *others = (_topic(kept, name, runner, depth) for name in TOPICS)
     topics = (gains, kept.finding("proofs", proved, on_proofs), properties,
               kept.finding("hard cases", hard, hard_cases.on_hard_cases), *others)  # fmt: skip
@@ -66,10 +67,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     )  # fmt: skip
 
 
-def _methods(progress: Callable[[int, int], None], failures: list[Failure]) -> Table:
-    return work_precision(progress=progress, failures=failures)
-
-
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
     """One topic, or one that says why it could not be computed."""
     topic: Finding | None = kept.stage(name, Finding, lambda done, _: compute_topic(name, runner, depth, done), None)
@@ -78,14 +75,8 @@ def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
 
 def provenance() -> dict[str, str]:
     """Where the report comes from: the facts of every result, all seeds, the sources, and what is compared with."""
-    from importlib import import_module
-
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
     return collect_provenance(seeds=seeds, packages=PEERS) | {"sources": evidence_version()}
-
-
-def _arm_energies() -> Mapping[str, Any]:
-    return arm_energies()
 
 
 class _Kept:
