@@ -48,11 +48,11 @@ def test_books_close_on_what_they_leave_open(runs: dict[str, Run], name: str) ->
 
 
 def test_opposite_signs_do_not_cancel(runs: dict[str, Run]) -> None:
-    """In the sum with signs, 0.0236 J that the motion swallows hide 0.0259 J that the springs make up."""
+    """In the sum with signs, 5.5 mJ that the springs make up hide most of the 7.0 mJ that the motion swallows."""
     book = energy_book(runs["peg_hole_space"])
     assert book["open: motion"] < 0.0 < book["open: springs"]
-    assert left_open(book) > 10.0 * abs(book["open: motion"] + book["open: springs"])
-    assert book[OPEN_SHARE] == pytest.approx(23.4, abs=0.05)
+    assert left_open(book) > 5.0 * abs(book["open: motion"] + book["open: springs"])
+    assert book[OPEN_SHARE] == pytest.approx(5.97, abs=0.05)
 
 
 def test_the_step_that_is_short_enough_is_the_one_tried_or_follows_from_the_order() -> None:
