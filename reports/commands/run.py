@@ -22,7 +22,7 @@ from reports.runner import Runner
 from reports.store.folder import Place
 from reports.store.io import blocks
 from reports.store.runs import opened_run
-from reports.streaming import Streamed
+from reports.streaming import Streamed, log_of
 from reports.uses import parsed
 
 SceneName = Annotated[str, typer.Argument(
@@ -60,6 +60,9 @@ def run(
     cautions = check_scene(source, find_world(world, rendering).law)
     for caution in cautions:
         print(f"Warning: {caution}.", file=sys.stderr)
+    left = log_of(out / runner.file_of(source, world, rendering))
+    if left.is_file() and not resume:
+        print(f"Warning: {left}, of a run that was stopped, is given up; --resume goes on with it.", file=sys.stderr)
     with step_progress(f"{source.name} in {world}") as runner.progress:
         place, streamed = runner.stream(source, world, rendering, resume=resume)
     stopped = "" if streamed is None else streamed.stopped
