@@ -35,6 +35,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
 
@@ -511,13 +512,14 @@ def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str,
     dt, given = start.dt, scene.contact.model_fields_set
     choice: dict[str, float] = {}
     if "stiffness" not in given:
-        choice["stiffness"] = min(_two_digits(AUTO_K / (mobility * dt**2), math.floor), 1e9)
+        choice["stiffness"] = _two_digits(AUTO_K / (mobility * dt**2), math.floor)
     if "damping" not in given:
         K = choice.get("stiffness", scene.contact.stiffness)
         most = AUTO_B * min(1.0, math.sqrt(K * mobility * dt**2 / AUTO_K))  # softer springs want less
-        choice["damping"] = min(_two_digits(most / (mobility * dt), math.floor), 1e9)
+        choice["damping"] = _two_digits(most / (mobility * dt), math.floor)
     if "coherence_distance" not in given:
         choice["coherence_distance"] = _two_digits(2.0 * _top_speed(start) * dt, math.ceil)
+    choice = {name: min(value, LARGEST_NUMBER) for name, value in choice.items()}
     said = ("contact.auto chose " + ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
             + f": effective mass {1.0 / mobility:.3g} kg at {start.names(rows)}, {scene.rate:g} Hz")
     return scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()}), (said,)

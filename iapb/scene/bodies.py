@@ -189,12 +189,11 @@ class _AnyBody(Part):
             return given
         try:
             shapes, value = cls._shapes.validate_python(given.get("shapes") or ()), _DENSITY.validate_python(density)
-        except ValidationError:
-            return given
-        if not shapes:
+            inertial = filled(shapes, value, spatial=cls.an_axis.count(",") == 2) if shapes else {}
+        except (ValidationError, ZeroDivisionError):  # no shapes, or of an area that rounds to nothing
             return given
         plain = {name: value for name, value in given.items() if name not in ("density", *INERTIAL)}
-        return plain | filled(shapes, value, spatial=cls.an_axis.count(",") == 2)
+        return plain | inertial if inertial else given
 
     @classmethod
     def across_fields(cls, given: Any) -> list[InitErrorDetails]:
