@@ -9,7 +9,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.kernels import command, couple, observe_work, render, shape_impulse
+from iapb.haptics.kernels import command, couple, hand_out, observe_work, render, shape_impulse
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.system import System
 
@@ -163,6 +163,20 @@ def test_an_impulse_comes_in_the_shares_of_its_waveform_or_waits_while_it_would_
         balance -= world.dt * given @ (port.device_v - 0.5 * world.dt * port.acceleration)
         assert port.pulse_balance[0] == pytest.approx(balance, abs=1e-9)
     assert 0 < held < steps
+
+
+@pytest.mark.parametrize("force", [-1.0, 0.0, 2.5])
+def test_an_impulse_of_any_size_is_handed_out(force: float) -> None:
+    """Pending is weight_j × force from now on, round the ring; the power is that of what is due now."""
+    world, state, port, rng = started(", waveform: brake")
+    slots, now = len(port.pulse_weights), 2
+    assert slots > now
+    port.pulse_pending[:] = before = rng.normal(size=port.pulse_pending.shape)
+    state.impulse[3:] = force * world.dt * np.array([1.0, 0.0, 1.0])
+    power = hand_out(world, state, port, now)
+    expected = before + np.roll(np.outer(port.pulse_weights, state.impulse[3:] / world.dt), now, axis=0)
+    assert port.pulse_pending == pytest.approx(expected, abs=1e-13)
+    assert power == pytest.approx(expected[now] @ port.device_v, abs=1e-13)
 
 
 RESOLUTION = np.array([1e-3, 2e-3, 0.0])

@@ -179,6 +179,19 @@ def _check_log(state: Any, page: Page, collides: np.ndarray, v_plus: np.ndarray,
         assert log.clamp[line] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("varies", [False, True])
+def test_the_mass_matrix_and_its_factor_are_those_of_the_place_where_they_depend_on_it(varies: bool) -> None:
+    system = System(load_scene(find_scene("two_link_arm_b"))) if varies else crowd("relative")
+    world, state, m = system.world_under(Penalty()), system.make_state(), system.mechanism
+    assert world.switches.varying_inertia == varies
+    for seed in range(3):
+        state.q[:] = m.integrate(m.neutral(), np.random.default_rng(seed).normal(size=m.nv), 1.0)
+        assert locate(world, state)
+        np.testing.assert_allclose(state.body.position, m.placements(state.q)[1], atol=1e-13)
+        np.testing.assert_allclose(state.mass_matrix, m.mass_matrix(state.q), atol=1e-13)
+        np.testing.assert_allclose(state.lower, np.linalg.cholesky(state.mass_matrix), atol=1e-13)
+
+
 def test_without_impulses_what_would_collide_rests() -> None:
     system = crowd("relative")
     _, state = thrown(system, 3, False)
