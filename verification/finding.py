@@ -30,11 +30,9 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 )  # fmt: skip
 # What fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
-# Trials that confirm a region, at least, and that decide a part: were a quarter of the region wrong, ten in a row would
-# hold in one case of twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024.
+# Trials that confirm a region, at least, and that reproduce a part: were a quarter of the region wrong, ten in a row
+# would hold in one case of twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024. A failure needs no ten.
 LEAST_CONFIRMING = LEAST_DECIDED = 10
-# What held in half of all cases would fail five times in a row in one case of 32.
-LEAST_FAILING = 5
 SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
 _MOST_ENDS = 8  # more than two intervals have
 _DECADES = 1e3  # a condition that spans more is measured by decades
@@ -333,8 +331,8 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
 
     What is mixed is "reproduced where" a region is confirmed: found on one half of the trials, it must hold in all
     trials of the other half that lie inside, and in all that `fresh` draws inside. At least LEAST_CONFIRMING trials
-    must confirm it: fresh ones where they can be drawn, else those of the other half. Where fewer than LEAST_DECIDED
-    cases decide, the part is not testable here, unless at least LEAST_FAILING trials decide and all of them fail.
+    must confirm it: fresh ones where they can be drawn, else those of the other half. Where all hold, but fewer than
+    LEAST_DECIDED cases decide, the part is not testable here. What fails in some is mixed or refuted, however few.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
     held, decided = trials.holds.count(True), sum(outcome is not None for outcome in trials.holds)
@@ -348,8 +346,8 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     if decided < LEAST_DECIDED <= cases:
         part = replace(part, cases=cases)
         said = f"{said}, which stand for {cases} cases"
-    elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE and (held or decided < LEAST_FAILING):
-        part = replace(part, verdict=NOT_TESTABLE)
+    elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
+        part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
         said = f"{said}; fewer than {LEAST_DECIDED} decide"
     return replace(part, sentence=f"{said}.")
 
@@ -364,10 +362,11 @@ def _decided_cases(trials: Table) -> int:
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
     """Return the verdict of a finding: that of its worst part. What failed never counts as holding.
 
-    An optional part that is absent counts only where it is all there is.
+    An optional part in which nothing was decided counts only where it is all there is.
     """
     given = list(parts)
-    counted = [part for part in given if not (part.optional and part.verdict == NOT_TESTABLE)] or given
+    absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
+    counted = [part for part, left_out in zip(given, absent, strict=True) if not left_out] or given
     return worst([part.verdict for part in counted] + [NOT_COMPUTED] * bool(failures))
 
 

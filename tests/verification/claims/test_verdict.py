@@ -7,7 +7,6 @@ from verification.claims.claim import Claim
 from verification.finding import (
     LEAST_CONFIRMING,
     LEAST_DECIDED,
-    LEAST_FAILING,
     MIXED,
     NOT_COMPUTED,
     NOT_TESTABLE,
@@ -64,6 +63,7 @@ def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
     [
         (Part("", NOT_TESTABLE, optional=True), REPRODUCED),
         (Part("", NOT_TESTABLE), NOT_TESTABLE),
+        (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
         (Part("", REFUTED, optional=True), REFUTED),
     ],
 )
@@ -117,18 +117,21 @@ def test_trials_that_cannot_tell_are_counted_apart():
     [
         (LEAST_DECIDED - 1, 0, NOT_TESTABLE),
         (LEAST_DECIDED, 0, REPRODUCED),
-        (1, 3, NOT_TESTABLE),
-        (3, 1, NOT_TESTABLE),
-        (0, LEAST_FAILING - 1, NOT_TESTABLE),
-        (0, LEAST_FAILING, REFUTED),
+        (1, 0, NOT_TESTABLE),
+        (8, 1, MIXED),
+        (3, 1, MIXED),
+        (1, 3, REFUTED),
+        (1, 8, REFUTED),
+        (0, 1, REFUTED),
+        (0, 4, REFUTED),
         (1, LEAST_DECIDED - 1, REFUTED),
     ],
 )
-def test_few_trials_decide_nothing(held, failed, verdict):
+def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, verdict):
     outcomes = (True,) * held + (False,) * failed + (None,) * 3
     part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * len(outcomes), holds=outcomes))
     assert part.verdict == verdict
-    assert ("fewer than 10 decide" in part.sentence) == (verdict == NOT_TESTABLE)
+    assert ("fewer than 10 decide" in part.sentence) == (held + failed < LEAST_DECIDED)
 
 
 def test_a_trial_may_stand_for_many_cases():
