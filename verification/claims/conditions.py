@@ -78,7 +78,7 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
-# A second grid for what depends on the grid: the tilts at even distances, where those above crowd at small ones.
+# A subset for what depends on the grid: the full tilts that lie at even distances; those above crowd at small ones.
 EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
 # 1e-6 takes every contact that approaches at all, as the paper does. An old contact that creeps into its wall under
