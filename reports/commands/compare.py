@@ -190,7 +190,7 @@ def _scene_lines(found: Finding) -> list[str]:
           1e3 * row["velocity, rms"], row["impulse, rms"], row["impulse, end"]) for row in others.records()], 3)
     rest = ("world", "energy lost", "most above start and work", "deepest overlap", "impacts", "time per step",
             "times the fastest")  # fmt: skip
-    lines += ["", f"Distance from {against} (impulse: resultant of all contacts)", *table_lines(far)]
+    lines += ["", f"Distance from {against} (impulse: {found.details['impulse']})", *table_lines(far)]
     lines += ["", "Energy, penetration, time", *table_lines(table.select(rest))]
     if "solvers" in found.tables:
         every = found.tables["solvers"]

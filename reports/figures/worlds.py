@@ -30,8 +30,9 @@ _PANELS = {
 @recipe(
     "worlds", "One scene in several worlds", "worlds", "over time",
     caption="Distances from the reference world in the kinetic metric, for the whole mass: root mean square "
-    "displacement and velocity of its particles, and the resultant of all that contacts have given so far. Then the "
-    "energy, the deepest penetration since the instant before, and the processor time of a step.",
+    "displacement and velocity of its particles, and the impulse of all contacts so far: their resultant where the "
+    "mass matrix is constant, else the sum of their generalized impulses. Then the energy, the deepest penetration "
+    "since the instant before, and the processor time of a step.",
 )  # fmt: skip
 def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""

@@ -5,8 +5,9 @@ m, so that joints and free bodies, metres and radians count alike:
 
     configuration  √(Δqᵀ M Δq / m)   [m]     root mean square over all mass of how far it is displaced (to first order)
     velocity       √(Δvᵀ M Δv / m)   [m/s]   the same of its velocity
-    impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   of P, all that contacts have given so far: their resultant, not contact by
-                                             contact, which is not unique
+    impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   of P, all that contacts have given so far, not contact by contact, which
+                                             is not unique: their resultant where M is constant; else the sum of
+                                             generalized impulses, each with the Jacobian of its own pose
 
 The scene's impacts in IAPB are then problems for every complementarity solver, judged by recomputed residuals.
 """
@@ -50,10 +51,11 @@ Progress = Callable[[str, int, int], None]
 INSTANTS = 1000  # of the motion, at most, at which worlds are compared
 QUESTION = (
     "The scene is simulated in each world. Distances from the reference world are in the kinetic metric, for the whole "
-    "mass: root mean square displacement and velocity of its particles, and the resultant of all that contacts have "
-    "given. The impacts of IAPB are then given to every complementarity solver."
+    "mass: root mean square displacement and velocity of its particles, and the impulse of all contacts so far. "
+    "The impacts of IAPB are then given to every complementarity solver."
 )
 DISTANCES = ("configuration", "velocity", "impulse")
+RESULTANT, GENERALIZED = "resultant of all contacts", "generalized, no resultant: M(q) varies"
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}
 
 
@@ -91,7 +93,8 @@ def compare_worlds(
     Returns
     -------
     Finding
-        with the tables "worlds" (a row for each), "over time", and, where there are impacts, "solvers" and "problems"
+        with the tables "worlds" (a row for each), "over time", and, where there are impacts, "solvers" and "problems";
+        the answer ranks the worlds that ran to the end and are to be trusted, and names the others with the reason
 
     Raises
     ------
@@ -109,17 +112,21 @@ def compare_worlds(
         reason = next((one.reason for one in failures if one.case == f"world {against}"), "")
         raise IapbError(f"{scene.name} cannot be simulated in the world {against}, which others were to be compared "
                         f"with: {reason}; name another with against")
-    series = {name: _series(mechanism_of(scene), found.run, runs[against].run) for name, found in runs.items()}
-    tables = {"worlds": _worlds_table(runs, series, against), "over time": _series_table(series)}
-    parts = [_part_of_runs(scene, runs)]
+    mechanism = mechanism_of(scene)
+    impulse = RESULTANT if mechanism.has_constant_mass_matrix else GENERALIZED
+    unfit = {name: why for name, found in runs.items() if (why := _unfit(scene, found.run))}
+    series = {name: _series(mechanism, found.run, runs[against].run) for name, found in runs.items()}
+    tables = {"worlds": _worlds_table(runs, series, against, impulse), "over time": _series_table(series)}
+    parts = [_part_of_runs(scene, runs, unfit)]
     if impacts:
         struck = runs["IAPB"].run if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
         judged = attempt("impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures)
         tables |= judged[1] if judged else {}
         parts += judged[0] if judged else []
     finding = finding_of(f"worlds of {scene.name}", scene.title or scene.name, QUESTION,
-                         _answer(runs, series, against), parts, tables, failures)
-    return replace(finding, details={"scene": scene.name, "worlds": ", ".join(runs), "against": against})
+                         _answer(runs, series, against, unfit), parts, tables, failures)
+    return replace(finding, details={"scene": scene.name, "worlds": ", ".join(runs), "against": against,
+                                     "impulse": impulse})  # fmt: skip
 
 
 def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> tuple[tuple[str, ...], str]:
@@ -191,7 +198,9 @@ def _deepest_until(run: Run, at: NDArray[np.int64]) -> Floats:
     return np.maximum.reduceat(depth, np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps))
 
 
-def _worlds_table(runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str) -> Table:
+def _worlds_table(
+    runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, impulse: str
+) -> Table:
     fastest = min(found.seconds for found in runs.values())
     rows = []
     for name, found in runs.items():
@@ -205,8 +214,8 @@ def _worlds_table(runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]
         ("world", "law", "ignores", "until [s]", *far_titles, "kinetic energy at the end [J]", "work done [J]",
          "energy lost [J]", "most above start and work [J]", "deepest overlap [mm]", "impacts", "time per step [µs]",
          "times the fastest"), rows, 3,
-        f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. Lost: "
-        "start and work done, minus the end. The time is the processor's, without set-up.",
+        f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. Impulse: "
+        f"{impulse}. Lost: start and work done, minus the end. The time is the processor's, without set-up.",
         timed=("time per step [µs]", "times the fastest"))  # fmt: skip
 
 
@@ -232,25 +241,36 @@ def _series_table(series: dict[str, dict[str, Floats]]) -> Table:
     return titled(("world", *(f"{key} [{unit}]" for key, unit in units.items())), rows)
 
 
-def _part_of_runs(scene: Scene, runs: dict[str, WorldRun]) -> Part:
+def _unfit(scene: Scene, run: Run) -> str:
+    """Why a run says nothing about its world; empty where it ran to the end and is to be trusted."""
+    if not run.complete or run.steps < scene.steps:
+        return f"stopped after {run.time[-1]:g} s" + (f": {run.stopped}" if run.stopped else "")
+    return f"not to be trusted: {'; '.join(run.distrust)}" if run.distrust else ""
+
+
+def _part_of_runs(scene: Scene, runs: dict[str, WorldRun], unfit: dict[str, str]) -> Part:
     """Whether every world ran to the end, and is to be trusted."""
-    short = [f"{name} after {found.run.time[-1]:g} s: {found.run.stopped}"
-             for name, found in runs.items() if not found.run.complete]  # fmt: skip
-    doubtful = [f"{name}: {reason}" for name, found in runs.items() for reason in found.run.distrust]
-    said = f"{len(runs) - len(short)} of {len(runs)} worlds ran to the end of {scene.duration:g} s"
-    said += f"; stopped: {'; '.join(short)}" if short else ""
-    said += f"; not to be trusted: {'; '.join(doubtful)}" if doubtful else ""
-    return Part(f"{said}.", MIXED if short or doubtful else REPRODUCED, "runs", len(runs) - len(short), len(runs))
+    fit = len(runs) - len(unfit)
+    said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
+    said += "".join(f"; {name} {why}" for name, why in unfit.items())
+    return Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))
 
 
-def _answer(runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str) -> str:
-    """Which world is closest to the reference, and how far it is."""
-    others = {name: found for name, found in series.items() if name != against}
-    if not others:
+def _answer(
+    runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, unfit: dict[str, str]
+) -> str:
+    """Which world is closest to the reference, and how far it is; only worlds that are fit to be ranked."""
+    if len(series) == 1:
         return f"Only {against} was simulated."
+    if against in unfit:
+        return f"No world is called closest: the reference {against} {unfit[against]}."
+    others = {name: found for name, found in series.items() if name != against and name not in unfit}
+    left_out = f" Not ranked: {'; '.join(f'{name} {why}' for name, why in unfit.items())}." if unfit else ""
+    if not others:
+        return f"No world can be compared with {against}.{left_out}"
     closest = min(others, key=lambda name: _sizes(others[name]["configuration"])[0])
     rms, most, _ = _sizes(others[closest]["configuration"])
     ratio = runs[against].seconds / runs[closest].seconds
     speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
     return (f"Closest to {against} is {closest}: {1e3 * rms:.3g} mm apart (rms over mass and time), "
-            f"{1e3 * most:.3g} mm at most; its step is {speed}.")  # fmt: skip
+            f"{1e3 * most:.3g} mm at most; its step is {speed}.{left_out}")  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -46,14 +47,17 @@ def _motion(run: Run, scene: Scene, failures: list[Failure]) -> Part:
 
 
 def _solved(study: ProblemStudy) -> Part:
-    """How many pairs of solver and problem are solved, and which are not, by name."""
-    asked = [row for row in study.rows if row.verdict not in ("missing", "left out")]
-    wrong = [row for row in asked if row.verdict != "solved"]
+    """How many answers are solutions, and whose are not; a refusal or an error is no answer."""
+    solved = [row for row in study.rows if row.verdict == "solved"]
+    wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
+    answers = len(solved) + wrong.total()
     unsolved = [line.problem for line in study.lines if "solved" not in dict(line.verdicts).values()]
-    sentence = (f"{len(asked) - len(wrong)} of {len(asked)} answers are solutions, by residuals recomputed from the "
-                f"problem; {len(study.lines) - len(unsolved)} of {len(study.lines)} problems have one.")
-    return Part(sentence, MIXED if unsolved else REPRODUCED, "solvers", len(study.lines) - len(unsolved),
-                len(study.lines), timed=True)  # fmt: skip
+    sentence = (f"{len(solved)} of {answers} answers are solutions, by residuals recomputed from the problem; "
+                f"{len(study.lines) - len(unsolved)} of {len(study.lines)} problems have one.")
+    if wrong:
+        sentence += f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
+    verdict = MIXED if unsolved or wrong else REPRODUCED
+    return Part(sentence, verdict, "solvers", len(solved), answers, timed=True)
 
 
 def _solvers(study: ProblemStudy) -> Table:

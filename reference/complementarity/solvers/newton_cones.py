@@ -80,6 +80,8 @@ def _admm(unit: _Unit) -> tuple[Floats, str]:
     shape = (len(unit.mu), -1)
     values, vectors = np.linalg.eigh(unit.W)
     values = np.clip(values, 0.0, None)
+    if values.max() == 0.0:
+        return np.zeros_like(unit.b).reshape(shape), "W = 0: no impulse changes a velocity"
     rho = float(np.sqrt(values.max() * max(values[values > _DEPENDENT * values.max()].min(initial=1.0), 1e-6)))
     z, y, shift = np.zeros_like(unit.b), np.zeros_like(unit.b), np.zeros_like(unit.b)
     best, least, tried = z.reshape(shape), np.inf, _TRIED

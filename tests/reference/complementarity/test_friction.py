@@ -16,6 +16,7 @@ from reference.complementarity.solution import (
     distance_to_dual_cone,
     project_on_cone,
 )
+from reference.complementarity.solvers import newton_cones
 from reference.datasets import problem_files, read_problem
 from reference.one_thread import one_thread
 
@@ -38,6 +39,14 @@ def test_a_mass_sticks_or_slides_as_coulomb_says(solver: str) -> None:
     # the friction impulse 0.5 · 2 N s takes 0.5 m/s off the 5 m/s of sliding, along its direction
     assert slides.solved(1e-7)
     assert slides.velocity_plus == pytest.approx([0.0, 2.7, 3.6], abs=1e-6)
+
+
+@pytest.mark.parametrize(("gamma", "solved"), [((1.0, 0.0, 0.0), True), ((0.0, 0.0, 0.0), True),
+                                               ((-1.0, 0.0, 0.0), False)])  # fmt: skip
+def test_newton_gives_no_impulse_where_none_can_act(gamma: tuple[float, ...], solved: bool) -> None:
+    problem = ImpactProblem(np.zeros((3, 3)), np.array(gamma), np.zeros(1), np.array([0.5]), contact_size=3)
+    solution = newton_cones.solve(problem)  # `solve` knows some of these without a solver
+    assert not solution.impulse.any() and Solution(problem, solution.impulse).solved() == solved
 
 
 RELAXED_SOLVERS = ("nsgs", "newton_cones", "cvxpy_socp", "pinocchio_admm")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,9 +91,36 @@ def test_a_world_that_stops_early_is_compared_until_then_and_said(monkeypatch):
         return run_world(scene, world, **options | ({"steps": 7} if world == "PB" else {}))
 
     monkeypatch.setattr(comparison, "run_world", stops)
-    found = compare_worlds(SLOPE.with_values({"duration": 0.02}), ["IAPB", "PB"], "IAPB", impacts=0)
+    short = SLOPE.with_values({"duration": 0.02})
+    found = compare_worlds(short, ["IAPB", "PB", "ideal"], "IAPB", impacts=0)
     assert row(found, "PB")["until"] == pytest.approx(0.007)
     assert len(found.tables["over time"].where(world="PB").rows) == 8
+    assert row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]  # nearest, for it stopped
+    assert "Closest to IAPB is ideal" in found.answer and "Not ranked: PB stopped after 0.007 s" in found.answer
+    (part,) = found.parts
+    assert (part.verdict, part.held, part.decided) == (MIXED, 2, 3)
+    assert "No world can be compared with IAPB" in compare_worlds(short, ["IAPB", "PB"], "IAPB", impacts=0).answer
+    assert "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
+
+
+def test_a_world_that_is_not_to_be_trusted_is_not_ranked(monkeypatch):
+    def doubted(scene, world, **options):
+        run = run_world(scene, world, **options)
+        return replace(run, distrust=("the box flew",)) if world == "PB" else run
+
+    monkeypatch.setattr(comparison, "run_world", doubted)
+    found = compare_worlds(SLOPE.with_values({"duration": 0.02}), ["IAPB", "PB", "ideal"], "IAPB", impacts=0)
+    assert "Closest to IAPB is ideal" in found.answer
+    assert "Not ranked: PB not to be trusted: the box flew." in found.answer
+    (part,) = found.parts
+    assert (part.verdict, part.held, part.decided) == (MIXED, 2, 3)
+
+
+def test_the_impulse_is_a_resultant_only_where_the_mass_matrix_is_constant():
+    short = {"duration": 0.002}
+    for scene, said in ((SLOPE, "resultant of all contacts"), (load_scene(HERE / "arm.yaml"), "no resultant")):
+        found = compare_worlds(scene.with_values(short), ["IAPB", "PB"], "IAPB", impacts=0)
+        assert said in found.details["impulse"] and said in found.tables["worlds"].note
 
 
 def wrong(problem):
@@ -118,7 +146,11 @@ def test_every_solver_is_judged_on_the_impacts_by_residuals(monkeypatch):
     found = asked(kept)
     rows = {one["solver"]: (one["solved"], one["failed"], one["problems"]) for one in found.tables["solvers"].records()}
     assert rows == {"gauss_seidel": (1, 0, 1), "nsgs": (1, 0, 1), "wrong": (0, 1, 1), "wrong with friction": (0, 1, 1)}
-    assert {part.name: part.verdict for part in found.parts} == dict.fromkeys(("runs", "motion", "solvers"), REPRODUCED)
+    part = {part.name: part for part in found.parts}["solvers"]
+    assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
+    assert "2 of 4 answers" in part.sentence and "Wrong answers: wrong 1, wrong with friction 1." in part.sentence
+    right = asked(["gauss_seidel", "nsgs"])
+    assert {part.name: part.verdict for part in right.parts} == dict.fromkeys(("runs", "motion", "solvers"), REPRODUCED)
     alone = asked(["wrong", "wrong with friction"])
     assert {part.name: part.verdict for part in alone.parts}["solvers"] == MIXED
 
