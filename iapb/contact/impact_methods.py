@@ -221,19 +221,24 @@ def _ldexp(array: Floats, exponent: Exponents) -> Floats:
         return np.ldexp(array, exponent)
 
 
+def scaling(diagonal: Floats, J: Floats, v: Floats) -> tuple[Exponents, Exponents, Exponents]:
+    """Exponents s (..., d), r (..., c) and k (...) of `ImpactInput`, of one impact or many; `diagonal`: of M."""
+    s = -(np.frexp(diagonal)[1] // 2)
+    k = (_exponents(v) - s).max(axis=-1, initial=_LOWEST_EXPONENT)
+    row = -(_exponents(J) + s[..., None, :]).max(axis=-1, initial=_LOWEST_EXPONENT)
+    row[np.abs(row) > abs(_LOWEST_EXPONENT) // 2] = 0  # a row of zeros
+    return s, row, np.where(k <= _LOWEST_EXPONENT // 2, 0, k)
+
+
 def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -> ImpactInput:
     diagonal = M.diagonal()
     if not diagonal.min() > 0.0:
         k = int(np.argmin(diagonal))
         raise ArgumentError(f"mass_matrix[{k}, {k}]", float(diagonal[k]), "a positive diagonal entry")
-    s = -(np.frexp(diagonal)[1] // 2)
+    s, row, of_velocity = scaling(diagonal, J, v)
     mass, lower = _factored(M, _ldexp(M, s[:, None] + s))
-    size = _exponents(v) - s
-    k = int(size.max(initial=_LOWEST_EXPONENT))
-    k = 0 if k <= _LOWEST_EXPONENT // 2 else k
+    size, k = _exponents(v) - s, int(of_velocity)
     underflows = bool(((size < k - _EXACT) & (size > _LOWEST_EXPONENT // 2)).any())
-    row = -(_exponents(J) + s).max(axis=1, initial=_LOWEST_EXPONENT)
-    row[np.abs(row) > abs(_LOWEST_EXPONENT) // 2] = 0  # a row of zeros
     return ImpactInput(
         mass_matrix=mass, lower=lower, contact_jacobian=_ldexp(J, row[:, None] + s), velocity=_ldexp(v, -(s + k)),
         restitution=e, unequal=unequal, coordinate_exponent=s, row_exponent=row, velocity_exponent=k,
