@@ -17,6 +17,8 @@ import pytest
 
 from iapb import find_scene, load_scene
 from iapb.run import Run
+from iapb.scene.mechanism import mechanism_of
+from iapb.scene.model import SpatialScene
 from reports.figures import RECIPES
 from reports.figures.two_link_arm import arm_energies
 from reports.pages.records import Evidence
@@ -84,12 +86,14 @@ def opened(started: Any, path: Path, size: tuple[int, int] = DESK, **context: An
 
 def _run(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
     """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
-    resolved = load_scene(find_scene(scene)).resolved()
+    loaded = load_scene(find_scene(scene))
+    resolved = loaded.resolved()
     start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
     time = np.arange(STEPS + 1) / 512
     swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
-    run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, scene_name=scene,
-                   scene_resolved=resolved)
+    pose = mechanism_of(loaded).poses(start + swing, planar=not isinstance(loaded, SpatialScene))
+    run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
+                   scene_name=scene, scene_resolved=resolved)
     return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
 
 

@@ -36,7 +36,7 @@ def test_playback_shows_the_poses_of_the_run(desk: Any, evidence: Evidence) -> N
     runs = [evidence.inputs[name] for name in UNLIMITED.values()]
     made = film(runs[0], None, runs)
     ring = made.parts.rings[0]
-    (place,) = frames(runs[0].scene_resolved, made.parts.seen, runs[0].q[-1])
+    (place,) = frames(runs[0].scene_resolved, made.parts.seen, runs[0].pose[-1])
     expected = made.flat(place.of(ring.corners))
     slider = desk.page.locator("#film-corner input[type=range]")
     slider.evaluate(TO_THE_END)
