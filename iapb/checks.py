@@ -32,6 +32,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.laws import FRICTION, PENALTY, ContactLaw, ImpulseAugmented
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.rotations import rotation_of
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
@@ -543,7 +544,8 @@ def distrust_of(run: Run) -> tuple[str, ...]:
     """Say why a result is not to be trusted, from the record alone; empty where nothing is wrong."""
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
-    return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _flew(run)) if found)
+    return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _passed(run), _squeezed(run),
+                                   _flew(run)) if found)
 
 
 def _at_hand(run: Run) -> tuple[float, float]:
@@ -615,6 +617,87 @@ def _sank(run: Run) -> str:
     a, b = (run.body_names[x] if x >= 0 else "a wall" for x in (run.contacts.body_a[i], run.contacts.body_b[i]))
     return (f"{a} and {b} overlap by {_length(-float(run.contacts.gap[i]))} at {run.time[k]:.4g} s, more than half of "
             f"{_length(float(thinner[i]))}")
+
+
+def _passed(run: Run) -> str:
+    """Circles and balls whose centre goes through a wall of flat faces between two states, and is in it at neither."""
+    scene = run.scene_resolved
+    walls = [(wall["name"], *_faces(wall)) for wall in scene.get("walls", ()) if "size" in wall or "vertices" in wall]
+    if not walls or not run.steps or len(scene.get("bodies", ())) != len(run.body_names):
+        return ""
+    for b, body in enumerate(scene["bodies"]):
+        for shape in body.get("shapes", ()):
+            if "radius" not in shape:
+                continue
+            center = _carried(run.pose[:, b], np.array(shape["center"], np.float64))
+            for wall, normals, offsets in walls:
+                k = _crossed(center @ normals.T - offsets)
+                if k >= 0:
+                    return f"{run.body_names[b]} passes through {wall} in the step to {run.time[k + 1]:.4g} s"
+    return ""
+
+
+def _faces(wall: dict[str, Any]) -> tuple[Floats, Floats]:
+    """Unit outward normals (e, dim) and offsets (e,) of a box or polygon: n·x <= offset inside."""
+    if "size" in wall:
+        dim = len(wall["size"])
+        normals = np.vstack([np.eye(dim), -np.eye(dim)])
+        offsets = 0.5 * np.array([*wall["size"], *wall["size"]])
+    else:
+        corners = np.array(wall["vertices"], np.float64)
+        edges = np.roll(corners, -1, axis=0) - corners
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+        offsets = np.sum(normals * corners, axis=1)
+    turn = rotation_of(wall.get("rpy", (0.0, 0.0, wall.get("angle", 0.0))))
+    normals = normals @ turn[: normals.shape[1], : normals.shape[1]].T
+    return normals, offsets + normals @ np.array(wall["center"], np.float64)
+
+
+def _carried(pose: Floats, point: Floats) -> Floats:
+    """A point of a body along its poses (n, 3 or 7): (n, 2 or 3)."""
+    if pose.shape[1] == 3:
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        return pose[:, :2] + np.column_stack([c * point[0] - s * point[1], s * point[0] + c * point[1]])
+    axis, w = pose[:, 3:6], pose[:, 6:]
+    return np.asarray(pose[:, :3] + point + 2.0 * np.cross(axis, np.cross(axis, point) + w * point), np.float64)
+
+
+def _crossed(height: Floats) -> int:
+    """First step whose straight way goes in and out of a convex shape, by heights over its faces (n, e); -1: none."""
+    before, after = height[:-1], height[1:]
+    outside = (before.max(axis=1) > 0.0) & (after.max(axis=1) > 0.0) & ~((before > 0.0) & (after > 0.0)).any(axis=1)
+    k = np.flatnonzero(outside)  # all faces that these are beyond, they cross
+    before, after = before[k], after[k]
+    share = before / np.where(before == after, 1.0, before - after)
+    enters = np.where((before > 0.0) & (after <= 0.0), share, 0.0).max(axis=1)
+    leaves = np.where((before <= 0.0) & (after > 0.0), share, 1.0).min(axis=1)
+    through = k[leaves - enters > ROUNDED]
+    return int(through[0]) if len(through) else -1
+
+
+def _squeezed(run: Run) -> str:
+    """Circles and balls that go on by their size between walls that leave them a tenth too little room."""
+    bodies, table = run.scene_resolved.get("bodies", []), run.contacts
+    if not len(table.gap) or len(bodies) != len(run.body_names):
+        return ""
+    for b, body in enumerate(bodies):
+        shapes = body.get("shapes", ())
+        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
+        if len(rows) < 2 or any("radius" not in shape for shape in shapes):
+            continue
+        step = np.searchsorted(table.offsets, rows, "right") - 1
+        one, other = rows[:-1], rows[1:]
+        facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
+        narrow, size = -(table.gap[one] + table.gap[other]), _size(shapes)
+        caught = np.flatnonzero((step[:-1] == step[1:]) & facing & (narrow > SAG * size))
+        if not len(caught):
+            continue
+        place = run.pose[step[caught], b, : 2 if run.pose.shape[-1] == 3 else 3]
+        far = float(np.linalg.norm(place - place[0], axis=1).max())
+        if far > size:
+            wide = _length(float(narrow[caught].max()))
+            return f"{run.body_names[b]} goes on by {_length(far)} in a gap that is {wide} narrower than it"
+    return ""
 
 
 def _flew(run: Run) -> str:

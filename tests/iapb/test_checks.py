@@ -11,7 +11,7 @@ import pytest
 
 from iapb.checks import Start, check_scene, distrust_of, settled, step_limits
 from iapb.contact.laws import ImpulseAugmented
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text, scene_names
+from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text, scene_names
 from iapb.simulation import simulate
 
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
@@ -170,6 +170,48 @@ def test_a_run_that_gains_energy_says_so() -> None:
     run = run_of(scene(box(height=0.05), stiffness=1e9, duration=0.2))
     assert any("above start and work" in why for why in run.distrust)
     assert "not to be trusted" in repr(run) and "Not to be trusted" in run._repr_html_()
+
+
+def ball(position: Any, velocity: Any = (0, 0, 0), radius: float = 0.005) -> dict[str, Any]:
+    return {"name": "ball", "joint": "planar", "mass": MASS, "inertia": 1e-3,
+            "shapes": [{"kind": "circle", "radius": radius, "center": [0.01, 0]}], "position": position,
+            "velocity": velocity}
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.5, -2.0])
+@pytest.mark.parametrize("kind", ["box", "polygon"])
+def test_a_ball_that_tunnels_is_not_trusted(kind: str, turned: float) -> None:
+    """40 mm in a step, through a plate of 4 mm; beside the plate's end it may pass."""
+    corners = [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]
+    form = {"size": [0.2, 0.004]} if kind == "box" else {"vertices": corners}
+    plate = {"name": "plate", "kind": kind, "center": [0.3, 0.2], "angle": turned, **form}
+    c, s = math.cos(turned), math.sin(turned)
+
+    def told(along: float) -> list[str]:
+        start = [0.3 + c * along - s * 0.1 - 0.01, 0.2 + s * along + c * 0.1, 0.0]  # the circle is 10 mm beside
+        run = run_of(scene(ball(start, [40.0 * s, -40.0 * c, 0.0]), walls=[plate], gravity=(0, 0), duration=0.02,
+                           stiffness=1e4))  # fmt: skip
+        return [why for why in run.distrust if "passes through plate" in why]
+
+    assert told(0.05) and told(0.05)[0].endswith("in the step to 0.003 s") and not told(0.12)
+
+
+def test_a_ball_that_tunnels_in_space_is_not_trusted() -> None:
+    made = {"name": "made", "dimensions": 3, "rate": 1000.0, "duration": 0.02,
+            "bodies": [{"name": "ball", "joint": "free_flyer", "mass": 1.0, "inertia": [1e-3, 1e-3, 1e-3],
+                        "shapes": [{"kind": "sphere", "radius": 0.005, "center": [0, 0, 0.03]}],
+                        "position": [0, 0, 0.13, 1, 0, 0, 0], "velocity": [0, 0, 40.0, 0, 0, 0]}],  # upside down
+            "walls": [{"name": "plate", "kind": "box", "size": [0.2, 0.2, 0.004], "rpy": [0.2, 0.1, 0.3]}],
+            "contact": {"stiffness": 1e4}}  # fmt: skip
+    assert any("passes through plate" in why for why in run_of(SpatialScene.model_validate(made)).distrust)
+
+
+@pytest.mark.parametrize(("wide", "said"), [(0.07, True), (0.0602, False)])
+def test_a_ball_that_falls_through_a_gap_too_narrow_for_it_is_not_trusted(wide: float, said: bool) -> None:
+    walls = [{"name": name, "kind": "box", "size": [0.2, 4], "center": [x, 0]}
+             for name, x in (("l", -0.13), ("r", 0.13))]
+    run = run_of(scene(ball([-0.01, 1.0, 0.0], radius=0.5 * wide), walls=walls, stiffness=1e4, duration=0.4))
+    assert any("narrower than it" in why for why in run.distrust) == said
 
 
 def test_a_run_that_is_right_is_trusted_and_each_reason_is_found_in_its_arrays() -> None:
