@@ -151,6 +151,8 @@ class PassivityReport(str):
         if self.unfinished:
             lines.append(f"  {self.unfinished}")
         lines += [str(verdict) for verdict in self.verdicts]
+        if self.passed and CONTRACTS[self.contract].unjudged:
+            lines.append(f"  not judged: {CONTRACTS[self.contract].unjudged}")
         worst = self.worst
         if worst.worst is not None and worst.worst_case is not None:
             family = worst.worst_case.family or "an impact"
@@ -299,8 +301,8 @@ def check_passivity(
     contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only push, e in [0, 1].
         ``frictional``: also Coulomb's friction; called as resolver(mass_matrix, contact_jacobian, tangents (c, m, d),
         velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
-    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract that are not optional.
-        Optional are ``exact_energy``, which excuses no rounding, and ``maximal_dissipation``.
+    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract but ``exact_energy``,
+        which excuses no rounding.
     impacts : random impacts. ``equality``: up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
         fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
         `impacts.ADVERSE` more come first: elastic ones on nearly equal rows. The other contracts: up to 6 coordinates

@@ -59,6 +59,11 @@ def _slow_contacts_ignored(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return newton(M, J[J @ v < -0.01], v, e)
 
 
+def _plastic_where_some_separate(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Forgets e where some contacts separate."""
+    return newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e)
+
+
 # Friction: Moreau's law. The plastic impact obeys Coulomb's law, and e returns a share of all of it; so it is passive.
 def _plastic(M: Floats, J: Floats, T: Floats, v: Floats, mu: Floats, e: float = 0.0) -> tuple[Floats, Floats]:
     """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over the contacts."""
@@ -126,6 +131,11 @@ def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Flo
     return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * share[:, None] * p_t)
 
 
+def _friction_of_one_alone(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """No friction where there is more than one contact."""
+    return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
+
+
 SOUND = {"unilateral": (newton, poisson), "frictional": (moreau,)}
 
 PLANTED: dict[str, dict[str, PlantedBug]] = {
@@ -137,6 +147,7 @@ PLANTED: dict[str, dict[str, PlantedBug]] = {
         "squared_restitution": plain(_squared_restitution, "restitution"),
         "too_bouncy": plain(_too_bouncy, "complementarity"),
         "one_sweep": plain(_one_sweep, "no_penetration"),
+        "plastic_where_some_separate": plain(_plastic_where_some_separate, "mixed_restitution"),
         "slow_contacts_ignored": plain(_slow_contacts_ignored, "restitution"),
     },
     "frictional": {
@@ -148,5 +159,6 @@ PLANTED: dict[str, dict[str, PlantedBug]] = {
         "pulls": plain(_pulls, "cone"),
         "strikes_what_separates": plain(_strikes_what_separates, "separating"),
         "weak_friction": plain(_weak_friction, "maximal_dissipation"),
+        "friction_of_one_alone": plain(_friction_of_one_alone, "maximal_dissipation"),
     },
 }

@@ -42,11 +42,15 @@ def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> Non
 
 
 def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
-    """`resolve_frictional_impact` takes every normal as an equality, so it may pull and holds what separates."""
-    kept = [name for name in CONTRACTS["frictional"].laws if name not in ("cone", "separating")]  # exact_energy too
+    """`resolve_frictional_impact` takes every normal as an equality, so it may pull and holds what separates.
+
+    A contact that pushes only because of the friction at another one slides without friction: 1 of 78 impacts.
+    """
+    broken = ("cone", "separating", "maximal_dissipation")
+    kept = [name for name in CONTRACTS["frictional"].laws if name not in broken]  # exact_energy too
     assert check_passivity(resolve_frictional_impact, contract="frictional", laws=kept, impacts=100).passed
-    report = check_passivity(resolve_frictional_impact, contract="frictional", impacts=20, search=0)
-    assert set(report.broken_laws) == {"cone", "separating"}
+    report = check_passivity(resolve_frictional_impact, contract="frictional", laws=broken, impacts=100, search=0)
+    assert set(report.broken_laws) == set(broken)
 
 
 def test_the_distance_from_the_cones_is_known_for_one_contact_in_space() -> None:
@@ -60,11 +64,15 @@ def test_the_distance_from_the_cones_is_known_for_one_contact_in_space() -> None
     assert distance_from_cone(case, np.array([-1.0, 0.0, 0.0])) == pytest.approx(1.0)
 
 
-def test_maximal_dissipation_is_asked_for_by_name() -> None:
-    weak = PLANTED["frictional"]["weak_friction"].make()
-    assert "maximal_dissipation" not in check_passivity(weak, contract="frictional", impacts=10, search=0).broken_laws
-    report = check_passivity(weak, contract="frictional", laws=["maximal_dissipation"], impacts=40, search=0)
-    assert report.broken_laws == ("maximal_dissipation",)
+def test_friction_at_several_contacts_is_judged_without_being_named() -> None:
+    alone = PLANTED["frictional"]["friction_of_one_alone"].make()
+    assert check_passivity(alone, contract="frictional", impacts=40, search=0).broken_laws == ("maximal_dissipation",)
+
+
+def test_a_passed_report_says_what_it_does_not_judge() -> None:
+    report = check_passivity(moreau, contract="frictional", impacts=3)
+    assert report.passed and "not judged: how much friction there is with e > 0" in report
+    assert "not judged" not in check_passivity(newton, contract="unilateral", impacts=3)
 
 
 def test_gains_in_real_arithmetic_are_graded() -> None:
@@ -137,7 +145,7 @@ def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
 
 @pytest.mark.parametrize("number", range(8))
 def test_sliding_is_at_the_limit_of_coulombs_law(number: int) -> None:
-    """The optional law on the sound resolver by itself: 0 to rounding, and not for half of the friction."""
+    """The law on the sound resolver by itself: 0 to rounding, and not for half of the friction."""
     case = draw_frictional_case(np.random.default_rng(number), number)
     found = sliding_dissipates_most(case, moreau, ONE_SIDED)
     assert found is None or found.passed
