@@ -26,16 +26,18 @@ def certify(
     """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
     found = {path: certificate_of(path) for given in files for path in _files(given)}
     table = Table(title="Impacts, judged in real arithmetic")
-    for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "restitution"):
+    for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "sum − impulse",
+                    "restitution"):
         table.add_column(heading, justify="left" if heading == "file" else "right")
     for path, one in found.items():
-        sizes = ("–" if np.isnan(x) else f"{x:.1e}" for x in (one.momentum, one.span, one.restitution))
+        residuals = one.momentum, one.span, one.total, one.restitution
+        sizes = ("not judged" if np.isnan(x) else f"{x:.1e}" for x in residuals)
         table.add_row(path.name, str(one.impacts), str(one.gains), str(one.by_integers + one.checked), *sizes)
     Console().print(table)
     failed = [path for path, one in found.items() if not one.passed]
     impacts, gains = sum(one.impacts for one in found.values()), sum(one.gains for one in found.values())
     print(f"{impacts} impacts of {len(found)} files: {gains} gained energy (exact).")
-    for path in failed:
+    for path in found:
         print(f"{path}: {found[path].words()}")
     for path in failed[:1]:
         if found[path].counterexample:

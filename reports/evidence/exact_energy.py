@@ -44,7 +44,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         row = attempt(name, lambda name=name: _certified(runner, name), failures)  # type: ignore[misc]
         if row is not None and row["impacts"] and row["law"] in ENGINE_LAWS:
             rows.append(row)
-    drawn = []
+    drawn: list[dict[str, Any]] = []
     for done, family in enumerate(FAMILIES):
         progress(len(files) + done, len(files) + len(FAMILIES))
         one = exact_energy(family, _DRAWN[depth])

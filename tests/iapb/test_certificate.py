@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction
 
 import numpy as np
@@ -12,6 +12,7 @@ import iapb.certificate
 from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene, load_scene, simulate
 from iapb.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
+from iapb.run import Run
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -88,7 +89,8 @@ def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(("change", "argument"), [
     ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"), ({"mass_matrix": np.eye(3)}, "mass_matrix"),
-    ({"v_minus": [[np.nan, 1.0]]}, "not finite")])  # fmt: skip
+    ({"v_minus": [[np.nan, 1.0]]}, "not finite"), ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
+    ({"impulse": [[np.nan, 1.0]]}, "impulse"), ({"impulse": [[1.0]]}, "impulse")])  # fmt: skip
 def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
     good: dict[str, object] = {"mass_matrix": np.eye(2), "v_minus": [[1.0, 1.0]], "v_plus": [[0.5, 0.5]]}
     with pytest.raises(ArgumentError, match=argument):
@@ -124,3 +126,78 @@ def test_a_group_scaled_to_a_device_gains_nothing() -> None:
     run = simulate(limited, ImpulseAugmented(rendering="scale"))
     assert (run.impacts.scale < 1.0).any() or not scene.hand
     assert certify(run).passed and certify(run).gains == 0
+
+
+def test_plain_vectors_are_one_impact() -> None:
+    found = certify_impacts(np.eye(2), [1.0, 2.0], [1.0, 2.1], [0.0, 0.1])
+    assert (found.impacts, found.gains, found.first_gain) == (1, 1, 0)
+    assert found.momentum < 1e-12 and "v_plus = [1.0, 2.1]" in found.counterexample
+    kept = certify_impacts(np.eye(2), [1.0, 2.0], [1.0, -2.0])
+    assert kept.passed and kept.impacts == 1 and "Not judged: momentum" in kept.words()
+
+
+@pytest.fixture(scope="module")
+def cradle() -> Run:
+    return simulate(load_scene(find_scene("newton_cradle")))
+
+
+@pytest.mark.parametrize("name", ["v_minus", "v_plus", "impulse", "scale"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_impacts_that_are_not_finite_are_refused_by_name(cradle: Run, name: str, value: float) -> None:
+    array = getattr(cradle.impacts, name).copy()
+    array.flat[0] = value
+    with pytest.raises(ArgumentError, match=f"impacts.{name}"):
+        certify(replace(cradle, impacts=replace(cradle.impacts, **{name: array})))
+
+
+def test_contacts_and_steps_that_are_not_finite_are_refused_by_name(cradle: Run) -> None:
+    struck = int(np.flatnonzero(cradle.contacts.impulse)[0])
+    for name in ("impulse", "normal", "point"):
+        array = getattr(cradle.contacts, name).copy()
+        array[struck] = np.nan
+        with pytest.raises(ArgumentError, match=f"contacts.{name}"):
+            certify(replace(cradle, contacts=replace(cradle.contacts, **{name: array})))
+    with pytest.raises(ArgumentError, match="impulse"):
+        certify(replace(cradle, impulse=np.full_like(cradle.impulse, np.nan)))
+    beyond = np.full_like(cradle.impacts.step, len(cradle.impulse))
+    with pytest.raises(ArgumentError, match="impacts.step"):
+        certify(replace(cradle, impacts=replace(cradle.impacts, step=beyond)))
+
+
+def test_impulses_of_steps_need_their_impacts(cradle: Run) -> None:
+    table = cradle.impacts
+    assert certify(cradle).total < 1e-12
+    for kept in (0, 1, len(table.step) - 1):
+        fewer = replace(table, **{f.name: getattr(table, f.name)[:kept] for f in fields(table)})
+        found = certify(replace(cradle, impacts=fewer))
+        assert found.total == 1.0 and not found.passed and "sum of a step's impulses" in found.words()
+    more = cradle.impulse.copy()
+    more[table.step[0]] *= 1.0 + 1e-6
+    assert not certify(replace(cradle, impulse=more)).passed
+
+
+def test_contact_impulses_that_are_erased_are_missed(cradle: Run) -> None:
+    erased = replace(cradle.contacts, impulse=np.zeros_like(cradle.contacts.impulse))
+    found = certify(replace(cradle, contacts=erased))
+    assert not found.passed and "impulses in range(Jᵀ)" in found.words().split("do not fit")[1]
+
+
+def test_restitution_is_judged_under_the_plain_law(cradle: Run) -> None:
+    """Half of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the scene's e."""
+    assert certify(cradle).restitution_judged and "restitution" in certify(cradle).words().split("Not judged")[0]
+    table, contacts = cradle.impacts, cradle.contacts
+    halved = replace(table, v_plus=0.5 * (table.v_minus + table.v_plus), impulse=0.5 * table.impulse)
+    forged = replace(cradle, impacts=halved, impulse=0.5 * cradle.impulse,
+                     contacts=replace(contacts, impulse=0.5 * contacts.impulse))
+    found = certify(forged)
+    assert max(found.momentum, found.span, found.total) < 1e-12 and found.gains == 0
+    assert not found.passed and "do not fit: restitution" in found.words()
+    budgeted = certify(replace(forged, impacts=replace(halved, rank=halved.rows - 1)))
+    assert not budgeted.restitution_judged and "restitution (only reported)" in budgeted.words()
+    pushing = certify(simulate(load_scene(find_scene("newton_cradle")), ImpulseAugmented(pushing=True)))
+    assert pushing.passed and "Not judged: restitution" in pushing.words()
+
+
+def test_a_share_that_overflows_does_not_pass() -> None:
+    found = certify_impacts(np.diag([1e300, 1.0]), [[1e200, 1.0]], [[-1e200, 1.0]], [[-1e308, 0.0]])
+    assert found.momentum == np.inf and not found.passed
