@@ -122,16 +122,18 @@ def processor() -> str:
 
 
 def linear_algebra() -> str:
-    """Return the BLAS that numpy has loaded: name, version, kernel family and threads."""
+    """Return the BLAS of numpy: name, version, kernel family and threads.
+
+    Other packages bring a BLAS of their own; whether one of them is loaded yet must not change a key.
+    """
     import numpy as np
     from threadpoolctl import threadpool_info
 
     np.linalg.norm(np.ones(2))  # a BLAS is listed once it is loaded
-    found = {
-        f"{pool['internal_api']} {pool.get('version')} {pool.get('architecture', '')} x{pool['num_threads']}"
-        for pool in threadpool_info()
-        if pool["user_api"] == "blas"
-    }
+    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
+    own = [pool for pool in pools if "numpy" in Path(pool["filepath"]).parent.name] or pools
+    found = {f"{pool['internal_api']} {pool.get('version')} {pool.get('architecture', '')} x{pool['num_threads']}"
+             for pool in own}  # fmt: skip
     return "; ".join(sorted(found)) or UNKNOWN
 
 

@@ -49,6 +49,7 @@ class Runner:
         self.store = RunStore(folder)
         self.progress = progress
         self.used: dict[str, UsedRun] = {}  # by file name, in the order of use
+        self._outside: list[dict[str, UsedRun]] = []  # what was used before each `recording` that is open
         self.user = ""  # who is said to use what is asked for now
         self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
@@ -101,12 +102,18 @@ class Runner:
         outside, user_outside = self.used, self.user
         inside: dict[str, UsedRun] = {}
         self.used, self.user = inside, user
+        self._outside.append(outside)
         try:
             yield inside
         finally:
+            self._outside.pop()
             self.used, self.user = outside, user_outside
             for run in inside.values():
                 add_use(outside, run)
+
+    def used_so_far(self) -> list[str]:
+        """Names of all run files used, also outside of the `recording` that is open, in order."""
+        return sorted({file for used in (*self._outside, self.used) for file in used})
 
     def use_again(self, file: str) -> None:
         """Say that the present user also uses a run that was asked for before."""

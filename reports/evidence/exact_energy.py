@@ -38,11 +38,11 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     Rigid worlds are left out: they solve impulses and forces of a step together and record no impact alone.
     """
     failures: list[Failure] = []
-    files, rows = sorted(runner.used), []
+    files, rows = runner.used_so_far(), []
     for done, name in enumerate(files):
         progress(done, len(files) + len(FAMILIES))
         row = attempt(name, lambda name=name: _certified(runner, name), failures)  # type: ignore[misc]
-        if row is not None and row["impacts"] and row["law"] in ENGINE_LAWS:
+        if row:
             rows.append(row)
     drawn: list[dict[str, Any]] = []
     for done, family in enumerate(FAMILIES):
@@ -69,7 +69,10 @@ def verdict_of_families(holds: list[bool | None]) -> str:
 
 
 def _certified(runner: Runner, name: str) -> dict[str, Any]:
+    """The row of a run; empty where its law is not the engine's or it has no impact."""
     run = read_run(runner.store.folder / name)
+    if run.law not in ENGINE_LAWS or not len(run.impacts.step):
+        return {}
     one: Certificate = certify(run)
     return {"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains, "largest gain": one.largest_gain,
             "M Δv − impulse": _known(one.momentum), "Jᵀp − impulse": _known(one.span),

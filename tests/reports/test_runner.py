@@ -11,6 +11,7 @@ import pytest
 import reference.worlds
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED
+from reports.evidence import exact_energy
 from reports.runner import Runner
 from reports.store import read_run
 
@@ -147,3 +148,15 @@ def test_a_run_is_listed_under_every_claim_that_uses_it_though_it_is_made_once(t
         claims.compute(runner, "quick", lambda done, total: None, [])
     assert computed == ["IAPB", "PB"]
     assert [run.used_by for run in used.values()] == [("A", "B"), ("A", "B")]
+
+
+def test_every_engine_run_used_before_is_certified(tmp_path, monkeypatch):
+    monkeypatch.setattr(exact_energy, "_DRAWN", {"quick": 20})
+    runner = Runner(tmp_path)
+    run = runner(PEG, "IAPB")
+    runner(PEG, "PB")
+    with runner.recording("a topic") as inside:
+        found = exact_energy.compute(runner, "quick", lambda done, total: None)
+    table = found.tables["certified runs"]
+    assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
+    assert not inside and len(runner.used_so_far()) == 2
