@@ -172,9 +172,18 @@ def certify(run: Run) -> Certificate:
     M is made again at the recorded configuration by the engine's kernels, which give the same bits on every x86-64
     processor; the recorded generalized impulses, which must be M(v⁺ − v⁻), show that it is the one of the impact.
 
+    Parameters
+    ----------
+    run : a run of the engine, simulated or read from its file
+
     Returns
     -------
     Certificate
+
+    Raises
+    ------
+    ArgumentError
+        The record holds a number that is not finite, or steps that the run does not have.
     """
     table = run.impacts
     _check_finite(run)
@@ -220,7 +229,23 @@ def _totals(run: Run) -> float:
 
 def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike,
                     impulse: ArrayLike | None = None) -> Certificate:
-    """Judge n impacts of any engine: M (d, d) or (n, d, d), v⁻, v⁺ and, where known, M(v⁺ − v⁻) as recorded (n, d)."""
+    """Judge n impacts of any engine exactly.
+
+    Parameters
+    ----------
+    mass_matrix : M, (d, d) for all or (n, d, d), as it was used
+    v_minus, v_plus : velocities before and after, (n, d), or (d,) of one impact
+    impulse : M(v⁺ − v⁻) as recorded, (n, d), where it is known
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ArgumentError
+        A shape does not fit, or a number is not finite.
+    """
     judged = judge_gains(mass_matrix, v_minus, v_plus)
     masses = np.asarray(mass_matrix, np.float64)
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
