@@ -61,7 +61,7 @@ def _last(part: str) -> tuple[Table, str] | None:
         return None
     found = kept[part]
     table = titled(tuple(found["columns"]), tuple(tuple(row) for row in found["rows"]))
-    return table, f"{found['command']}, {found['date']}, commit {found['commit']}"
+    return table, f"make fuzz, {found['date']}, commit {found['commit'][:7]}"
 
 
 def _of_table(table: Table, column: str) -> int:
@@ -86,8 +86,8 @@ def _faults(table: Table, made: str) -> Part:
 
 def _repetitions(repeated: Any) -> Part:
     same = sum(repetition.same for _, repetition in repeated)
-    return Part(f"{same} of {len(repeated)} runs of the figures, simulated again from nothing but their own files, "
-                   "came out the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
+    return Part(f"{same} of {len(repeated)} runs of the figures, simulated again from their own files alone, "
+                   "are the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
 
 
 def _repeated_table(repeated: Any) -> Table:

@@ -143,7 +143,7 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
         subject = say.__name__.removeprefix("_say_")
         parts += attempt(f"sentences on {subject}", lambda say=say: list(say(tables)), failures) or []  # type: ignore[misc]
     met = sum(part.verdict == REPRODUCED for part in parts)
-    answer = f"{met} of {len(parts)} questions on speed are answered as asked for"
+    answer = f"{met} of {len(parts)} speed targets met"
     for contacts, _, _, ratio in list(_printed_over_factored(tables))[-1:]:
         answer += f"; with {contacts} contacts the factored impact is {ratio:.0f} times as fast as the printed formula"
     return finding_of(KEY, TITLE, QUESTION, f"{answer}.", parts, tables, failures)

@@ -104,8 +104,8 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = ()) 
     table = table_of(columns, rows)
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     sentence = (f"{proved} of {len(rows)} statements are proved by certificates that a machine expanded; "
-                f"SymPy expands those of {sum(one.sympy == YES for one in records)} to the same end; "
-                f"{twins} wrong twins are refuted by exact counterexamples.")
+                f"SymPy confirms {sum(one.sympy == YES for one in records)}; "
+                f"{twins} deliberately altered statements are refuted by exact counterexamples.")
     parts = (Part(sentence, REPRODUCED if proved == len(rows) else REFUTED),)
     return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, parts, {"statements": table},
                       failures)  # fmt: skip
