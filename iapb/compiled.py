@@ -16,6 +16,7 @@ import struct
 import warnings
 from collections import namedtuple
 from collections.abc import Callable, Mapping
+from functools import cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -158,7 +159,13 @@ class Block:
 
 def columns(name: str, arrays: Mapping[str, Any]) -> Any:
     """Return a NamedTuple of arrays by name, to be laid out by `block`."""
-    return namedtuple(name, arrays)(**arrays)
+    return _columns_of(name, tuple(arrays))(**arrays)
+
+
+@cache
+def _columns_of(name: str, fields: tuple[str, ...]) -> Any:
+    """Make the class once: a class is garbage that only Python's collector finds, and a live loop keeps that off."""
+    return namedtuple(name, fields)
 
 
 def block(content: Any) -> Any:
