@@ -17,8 +17,10 @@ DEAD_ANCHORS = """() => [...document.querySelectorAll("a[href^='#']")].map((a) =
     .filter((id) => !document.getElementById(id))"""
 OUT_OF_SIGHT = """() => [...document.querySelectorAll("main figure svg")]
     .filter((svg) => !svg.closest("details:not([open])") && !svg.parentElement.closest("svg"))
-    .map((svg) => [svg.getAttribute("aria-label") || svg.className.baseVal, svg.getBoundingClientRect()])
-    .filter(([, box]) => box.width < 5 || box.height < 5 || box.left < -1 || box.right > innerWidth + 1)
+    .map((svg) => [svg.getAttribute("aria-label") || svg.className.baseVal, svg.getBoundingClientRect(),
+                   svg.closest(".wide") !== null])  // a wide panel scrolls by itself
+    .filter(([, box, scrolls]) => box.width < 5 || box.height < 5
+                                  || (!scrolls && (box.left < -1 || box.right > innerWidth + 1)))
     .map(([name]) => name)"""
 OVERFLOW = """() => document.documentElement.scrollWidth - innerWidth"""
 CLIPPED = """() => [...document.querySelectorAll("main p, main h2, main h3, main li, main dd, button, summary")]
