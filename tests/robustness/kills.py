@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from reports.store.care import DAMAGED, WHOLE, check_store
+from reports.store.io import mark_store
 
 ROOT = Path(__file__).resolve().parents[2]
 OWN = "own"  # folder of a command's results, in the foreign tree
@@ -46,6 +47,7 @@ COMMANDS: dict[str, Sequence[str]] = {
 def killed_command(name: str, folder: Path, times: int) -> tuple[int, int, int, str]:
     """Start a command and kill it with its children within the time that it takes undisturbed."""
     _make_foreign(folder)
+    mark_store(folder / OWN)  # iapb store gc touches marked folders only
     before, rng, survived, lost = foreign_hash(folder), np.random.default_rng(0), 0, 0
     began = time.monotonic()
     assert _start(name, folder).wait() == 0, f"iapb {name} does not run"

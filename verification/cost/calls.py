@@ -14,6 +14,7 @@ from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_
 from iapb.errors import MissingDependencyError, SolverError
 from iapb.mechanics.kernels.cholesky import cholesky
 from reference.complementarity import ImpactProblem, solve
+from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase
 
 Floats = NDArray[Any]
@@ -84,7 +85,7 @@ class LemkeCall:
 
     def __init__(self, case: ImpactCase) -> None:
         try:
-            import quantecon  # noqa: F401
+            import_lcp_lemke()
         except ImportError as error:
             raise MissingDependencyError("quantecon", "Lemke kernel", "pip install quantecon") from error
         self.case = case

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from quantecon.optimize import lcp_lemke
 
 from iapb.mechanics.kernels.cholesky import cholesky
+from reference.complementarity.solvers.lemke import import_lcp_lemke
+
+lcp_lemke = import_lcp_lemke()
 
 
 @njit(cache=True)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +18,7 @@ from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, s
 from reference.complementarity.solvers import SolverEntry, siconos
 from reference.complementarity.solvers.enumeration import all_solutions
 
+ROOT = Path(__file__).resolve().parents[3]
 # What each solver reaches on small redundant problems, relative velocity, with a factor ten of room.
 REACHED = {"proxqp": 1e-5, "cvxpy_scs": 1e-5, "cvxpy_osqp": 1e-6, "cvxpy_clarabel": 1e-8}
 # quadprog and Lemke can end without an answer on exactly redundant rows, Gauss-Seidel can be too slow on
@@ -140,3 +147,26 @@ def test_border(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(SOLVERS, "absent", SolverEntry("nowhere", "not_a_package", "", "lcp"))
     with pytest.raises(MissingDependencyError, match="pip install not_a_package"):
         solve(ImpactProblem.from_delassus([[1.0]], [0.0]), "absent")
+
+
+def test_processes_that_import_quantecon_for_the_first_time_at_once_do_not_spoil_its_cache(tmp_path: Path) -> None:
+    """Without `import_lcp_lemke`'s lock some of them abort, and so does every later import, most of the time."""
+    found = find_spec("quantecon")
+    assert found is not None and found.origin is not None
+    shutil.copytree(Path(found.origin).parent, tmp_path / "quantecon", ignore=shutil.ignore_patterns("*.nb?"))
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    script = """
+import sys
+from numba import njit
+for _ in range(int(sys.argv[1])):  # numba numbers what it compiles: the processes' numbers differ
+    njit(lambda x: x)(1)
+from reference.complementarity.solvers.lemke import import_lcp_lemke
+import_lcp_lemke()
+import quantecon
+assert quantecon.__file__.startswith(sys.argv[2]), quantecon.__file__
+"""
+    command = [sys.executable, "-c", script]
+    started = [subprocess.Popen([*command, str(4 * k), str(tmp_path)], env=environment, cwd=tmp_path) for k in range(3)]
+    assert [process.wait() for process in started] == [0, 0, 0]
+    assert subprocess.run([*command, "0", str(tmp_path)], env=environment, cwd=tmp_path).returncode == 0
