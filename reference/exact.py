@@ -6,8 +6,8 @@ of the rows (33). The subset is found without rounding: redundant rows are decid
 are redundant only up to rounding *are* independent here; give fractions where exact redundancy is meant.
 
 For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error bound:
-2 (KE⁺ − KE⁻) = (v⁺ − v⁻)ᵀ M (v⁺ + v⁻), where the difference and the sum are exact double-doubles, so nothing cancels
-before it is known to 106 bits.
+2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so nothing cancels before it is
+known to 106 bits. Where M is not symmetric to the last bit, it is ½(ΔᵀMs + sᵀMΔ).
 Source: Dekker, Numerische Mathematik 18 (1971); Ogita, Rump, Oishi, SIAM J. Sci. Comput. 26 (2005).
 """
 
@@ -322,6 +322,15 @@ def _bilinear(mass, ah, al, bh, bl):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, fastmath=False)
+def _symmetric(mass):  # type: ignore[no-untyped-def]
+    for i in range(len(mass)):
+        for j in range(i):
+            if mass[i, j] != mass[j, i]:
+                return False
+    return True
+
+
+@numba.njit(cache=True, fastmath=False)
 def _gains(masses, before, after, gain, bound):  # type: ignore[no-untyped-def]
     """Write the relative gain and its bound for each impact."""
     n, d = before.shape
@@ -331,7 +340,10 @@ def _gains(masses, before, after, gain, bound):  # type: ignore[no-untyped-def]
         for i in range(d):
             difference[i], difference_low[i] = _two_sum(after[k, i], -before[k, i])
             total[i], total_low[i] = _two_sum(after[k, i], before[k, i])
-        change, _, size = _bilinear(masses[k], difference, difference_low, total, total_low)
+        change, low, size = _bilinear(masses[k], difference, difference_low, total, total_low)
+        if not _symmetric(masses[k]):
+            turned, turned_low, turned_size = _bilinear(masses[k], total, total_low, difference, difference_low)
+            change, size = 0.5 * _add(change, low, turned, turned_low)[0], 0.5 * (size + turned_size)
         energy, _, energy_size = _bilinear(masses[k], before[k], zero, before[k], zero)
         if not energy > d * d * _ROUNDING * energy_size:
             gain[k], bound[k] = np.nan, np.inf

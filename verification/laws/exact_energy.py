@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.certificate import judge_gains
-from iapb.compiled import block, copy_into, kernel
+from iapb.compiled import kernel
 from iapb.contact.impact_methods import scaling
-from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.contact.kernels.passive import gain, never_gains, passive_step
 from iapb.double_double import kinetic_energies
-from iapb.mechanics.kernels.cholesky import cholesky
+from verification.proofs.attack_kernel import resolve_batch
 
 Floats = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -67,26 +66,10 @@ class ExactEnergy:
         return False if self.gains else True if self.moved >= LEAST_MOVED else None
 
 
-@kernel
-def resolve_all(masses, rows, v, restitution, clamped, columns, lower, work, v_plus, momentum, clamps):  # type: ignore[no-untyped-def]
-    """Resolve n impacts; a mass matrix that is not positive definite to rounding leaves v as it is, clamp −1."""
-    n, d, c = rows.shape
-    for k in range(n):
-        for i in range(d):
-            for j in range(c):
-                work.columns[i, j] = rows[k, i, j]
-        if cholesky(masses[k], lower) != 0:
-            clamps[k] = -1.0
-            copy_into(v_plus[k], v[k])
-            continue
-        clamps[k] = factored_impact(masses[k], lower, v[k], restitution[k], c, rank_tolerance(lower), d, clamped,
-                                    work, v_plus[k], momentum)[1]
-
-
 def resolved(impacts: Impacts, clamped: bool = True, *, scale: bool = False) -> tuple[Floats, Floats]:
     """Return v⁺ (n, d) and the clamps (n,); `scale`: by powers of two before and after, as `resolve_impact` does."""
-    n, d, c = impacts.rows.shape
-    v_plus, clamps, given, back = np.empty((n, d)), np.empty(n), impacts, np.zeros((n, d), np.int32)
+    n, d, _ = impacts.rows.shape
+    given, back = impacts, np.zeros((n, d), np.int32)
     if scale:
         diagonal = np.diagonal(impacts.mass, axis1=1, axis2=2)
         s, row, k = scaling(diagonal, impacts.rows.transpose(0, 2, 1), impacts.v)
@@ -94,8 +77,7 @@ def resolved(impacts: Impacts, clamped: bool = True, *, scale: bool = False) -> 
         given = impacts._replace(
             mass=np.ldexp(impacts.mass, s[:, :, None] + s[:, None, :]), v=np.ldexp(impacts.v, -back),
             rows=np.ldexp(impacts.rows, s[:, :, None] + row[:, None, :]))  # fmt: skip
-    resolve_all(given.mass, given.rows, given.v, given.restitution, clamped, np.empty((d, c)),
-                np.empty((d, d)), block(make_impact_work(d, c)), v_plus, np.empty(d), clamps)
+    v_plus, clamps = resolve_batch(given.mass, given.rows, given.v, given.restitution, clamped)
     v_plus = np.ldexp(v_plus, back)
     if scale and clamped:  # scaling back may round v⁺ the wrong way: the last step again
         for i, (mass, v, after) in enumerate(zip(impacts.mass, impacts.v, v_plus, strict=True)):

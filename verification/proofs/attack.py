@@ -157,8 +157,5 @@ def engine_resolver(method: str = "factored", clamp: bool | None = None) -> Bulk
 
 def factored_in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
     """The engine's compiled kernel as the simulation step calls it, without the public call around it."""
-    v_plus = np.empty_like(velocity)
-    lower = np.linalg.cholesky(mass_matrix)
     columns = np.ascontiguousarray(np.swapaxes(contact_jacobian, 1, 2))
-    resolve_batch(mass_matrix, lower, columns, velocity, restitution, v_plus)
-    return v_plus
+    return resolve_batch(mass_matrix, columns, velocity, restitution)[0]

@@ -1,36 +1,41 @@
-"""Calls the engine's impact kernel on a batch, so that a million impacts take seconds."""
+"""Calls the engine's impact kernel on a batch, as the simulation step calls it: a million impacts take seconds."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iapb.compiled import kernel
+from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
+from iapb.mechanics.kernels.cholesky import cholesky
+
+Floats = NDArray[np.float64]
 
 
-def resolve_batch(mass_matrix, lower, columns, velocity, restitution, v_plus) -> None:  # type: ignore[no-untyped-def]
-    """v⁺ (n, d) of n impacts: M, L (n, d, d), the rows of J as columns (n, d, c), v (n, d), e (n,)."""
+def resolve_batch(
+    mass_matrix: Floats, columns: Floats, velocity: Floats, restitution: Floats, clamped: bool = True
+) -> tuple[Floats, Floats]:
+    """Return v⁺ (n, d) and the clamps (n,) of n impacts: M (n, d, d), Jᵀ (n, d, c), v (n, d), e (n,).
+
+    Where M is not positive definite to rounding, v⁺ = v and the clamp is −1.
+    """
     d, c = columns.shape[1:]
-    _resolve(mass_matrix, lower, columns, velocity, restitution, make_impact_work(d, c), np.empty(d), v_plus)
+    v_plus, clamps = np.empty_like(velocity), np.empty(len(velocity))
+    _resolve(mass_matrix, columns, velocity, restitution, clamped, np.empty((d, d)), block(make_impact_work(d, c)),
+             np.empty(d), v_plus, clamps)  # fmt: skip
+    return v_plus, clamps
 
 
 @kernel
-def _resolve(mass_matrix, lower, columns, velocity, restitution, work, momentum, v_plus):  # type: ignore[no-untyped-def]
-    d, c = columns.shape[1], columns.shape[2]
-    for n in range(velocity.shape[0]):
-        for k in range(d):
-            for i in range(c):
-                work.columns[k, i] = columns[n, k, i]
-        factored_impact(
-            mass_matrix[n],
-            lower[n],
-            velocity[n],
-            restitution[n],
-            c,
-            rank_tolerance(lower[n]),
-            d,
-            True,
-            work,
-            v_plus[n],
-            momentum,
-        )
+def _resolve(mass_matrix, columns, velocity, restitution, clamped, lower, work, momentum, v_plus, clamps):  # type: ignore[no-untyped-def]
+    n, d, c = columns.shape
+    for k in range(n):
+        for i in range(d):
+            for j in range(c):
+                work.columns[i, j] = columns[k, i, j]
+        if cholesky(mass_matrix[k], lower) != 0:
+            clamps[k] = -1.0
+            copy_into(v_plus[k], velocity[k])
+            continue
+        clamps[k] = factored_impact(mass_matrix[k], lower, velocity[k], restitution[k], c, rank_tolerance(lower), d,
+                                    clamped, work, v_plus[k], momentum)[1]
