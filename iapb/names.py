@@ -19,3 +19,8 @@ def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
     names = [str(name) for name in known]
     near = nearest(wrong, names)
     return lead + ", ".join(names) + (f"; did you mean {near}?" if near else "")
+
+
+def in_metres(length: float) -> str:
+    """Return a length [m] for readers: in millimetres below a metre."""
+    return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.checks import distrust_of
 from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
+from iapb.distrust import distrust_of
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities

@@ -174,7 +174,7 @@ class Run:
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run ends where it does; empty for a complete one
     remarks: tuple[str, ...] = ()  # what was chosen for the scene, such as by contact.auto
-    distrust: tuple[str, ...] = ()  # why the result is not to be trusted (`iapb.checks`); empty where nothing is wrong
+    distrust: tuple[str, ...] = ()  # why the result is not to be trusted (`iapb.distrust`); empty: it is
 
     @property
     def steps(self) -> int:

@@ -31,7 +31,7 @@ def import_lcp_lemke() -> Callable[..., Any]:
     with open(found.origin) as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         from quantecon.optimize import lcp_lemke
-    return lcp_lemke  # type: ignore[no-any-return]
+    return lcp_lemke
 
 
 def solve(problem: ImpactProblem) -> Answer:

@@ -1,0 +1,201 @@
+"""Look in a run, from its record alone, for what makes its result worthless: energy, overlap, tunnelling, positions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.mechanics.rotations import rotation_of
+from iapb.names import in_metres
+from iapb.run import Run
+
+Floats = NDArray[np.float64]
+
+UNACCOUNTED = 0.02  # share of the energy at hand that a first-order step may make up
+DEEP = 0.5  # of the thinner shape: an overlap beyond is no contact of rigid bodies
+NARROW = 0.1  # of the body: a gap that much too narrow lets no rigid body through
+ROUNDED = 1e-9  # share of a step by which rounding may move a crossing
+WILD = 10.0  # times the farthest that start, speed and acceleration can carry a body
+
+
+def distrust_of(run: Run) -> tuple[str, ...]:
+    """Say why a result is not to be trusted, from the record alone; empty where nothing is wrong."""
+    if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
+        return ("positions or velocities are not finite",)
+    return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _passed(run), _squeezed(run),
+                                   _flew(run)) if found)
+
+
+def _at_hand(run: Run) -> tuple[float, float]:
+    """Energy in springs at the start, and all that the run may show [J]: start, springs, fallen through, worked in."""
+    energy, contact = run.energy, run.scene_resolved.get("contact", {})
+    first = slice(int(run.contacts.offsets[0]), int(run.contacts.offsets[1])) if run.steps else slice(0, 0)
+    stored = 0.5 * contact.get("stiffness", 0.0) * float(np.sum(np.minimum(run.contacts.gap[first], 0.0) ** 2))
+    fallen = float(energy["potential"][0] - energy["potential"].min())
+    worked = sum(float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work"))
+    return stored, float(energy["kinetic"][0]) + stored + fallen + worked
+
+
+def _made_energy(run: Run) -> str:
+    """Energy above start plus work."""
+    energy = run.energy
+    if not {"kinetic", "potential", "hand_work", "coupling_work"} <= set(energy) or not run.steps:
+        return ""
+    stored, at_hand = _at_hand(run)
+    total = energy["kinetic"] + energy["potential"]
+    allowed = total[0] + stored + energy["hand_work"] + energy["coupling_work"]
+    excess = total[1:] - allowed
+    k = int(np.argmax(excess))
+    if excess[k] <= UNACCOUNTED * at_hand + _trifle(run):
+        return ""
+    return (f"its energy is {excess[k]:.3g} J above start and work at {run.time[k + 1]:.4g} s, where these are "
+            f"{at_hand:.3g} J")
+
+
+def _trifle(run: Run) -> float:
+    """Energy too small to count [J]: of lifting the bodies by a thousandth of their size."""
+    gravity = float(np.linalg.norm(run.scene_resolved.get("gravity") or [0.0]))
+    return 1e-3 * gravity * sum(body.get("mass", 0.0) * _size(body.get("shapes", ()), 0.0)
+                                for body in run.scene_resolved.get("bodies", ()))
+
+
+def _friction_drove(run: Run) -> str:
+    """Friction that did work on the bodies."""
+    work = run.energy.get("friction_work")
+    if work is None or not len(work) or not {"hand_work", "coupling_work"} <= set(run.energy):
+        return ""
+    most, (_, at_hand) = float(work.max()), _at_hand(run)
+    return f"friction drove the bodies, by {most:.3g} J" if most > UNACCOUNTED * at_hand + _trifle(run) else ""
+
+
+def _size(shapes: Iterable[dict[str, Any]], without: float = math.inf) -> float:
+    """Smallest extent among plain shapes of the scene [m]."""
+    sizes = []
+    for shape in shapes:
+        if "radius" in shape:
+            sizes.append(2.0 * shape["radius"])
+        elif "size" in shape:
+            sizes.append(min(shape["size"]))
+        elif "vertices" in shape:
+            sizes.append(float(np.ptp(np.array(shape["vertices"]), axis=0).min()))
+    return min(sizes, default=without)
+
+
+def _sank(run: Run) -> str:
+    """Penetration above half a shape."""
+    bodies = run.scene_resolved.get("bodies", [])
+    if not len(run.contacts.gap) or len(bodies) != len(run.body_names):
+        return ""
+    sizes = np.array([*(_size(body.get("shapes", ())) for body in bodies), math.inf])  # the world is -1, the last
+    thinner = np.minimum(sizes[run.contacts.body_a], sizes[run.contacts.body_b])
+    i = int(np.argmin(run.contacts.gap / thinner))
+    if -run.contacts.gap[i] <= DEEP * thinner[i]:
+        return ""
+    k = int(np.searchsorted(run.contacts.offsets, i, "right")) - 1
+    a, b = (run.body_names[x] if x >= 0 else "a wall" for x in (run.contacts.body_a[i], run.contacts.body_b[i]))
+    return (f"{a} and {b} overlap by {in_metres(-float(run.contacts.gap[i]))} at {run.time[k]:.4g} s, more than half "
+            f"of {in_metres(float(thinner[i]))}")
+
+
+def _passed(run: Run) -> str:
+    """Circles and balls whose centre goes through a wall of flat faces between two states, and is in it at neither."""
+    scene = run.scene_resolved
+    walls = [(wall["name"], *_faces(wall)) for wall in scene.get("walls", ()) if "size" in wall or "vertices" in wall]
+    if not walls or not run.steps or len(scene.get("bodies", ())) != len(run.body_names):
+        return ""
+    for b, body in enumerate(scene["bodies"]):
+        for shape in body.get("shapes", ()):
+            if "radius" not in shape:
+                continue
+            center = _carried(run.pose[:, b], np.array(shape["center"], np.float64))
+            for wall, normals, offsets in walls:
+                k = _crossed(center @ normals.T - offsets)
+                if k >= 0:
+                    return f"{run.body_names[b]} passes through {wall} in the step to {run.time[k + 1]:.4g} s"
+    return ""
+
+
+def _faces(wall: dict[str, Any]) -> tuple[Floats, Floats]:
+    """Unit outward normals (e, dim) and offsets (e,) of a box or polygon: n·x <= offset inside."""
+    if "size" in wall:
+        dim = len(wall["size"])
+        normals = np.vstack([np.eye(dim), -np.eye(dim)])
+        offsets = 0.5 * np.array([*wall["size"], *wall["size"]])
+    else:
+        corners = np.array(wall["vertices"], np.float64)
+        edges = np.roll(corners, -1, axis=0) - corners
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+        offsets = np.sum(normals * corners, axis=1)
+    turn = rotation_of(wall.get("rpy", (0.0, 0.0, wall.get("angle", 0.0))))
+    normals = normals @ turn[: normals.shape[1], : normals.shape[1]].T
+    return normals, offsets + normals @ np.array(wall["center"], np.float64)
+
+
+def _carried(pose: Floats, point: Floats) -> Floats:
+    """A point of a body along its poses (n, 3 or 7): (n, 2 or 3)."""
+    if pose.shape[1] == 3:
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        return pose[:, :2] + np.column_stack([c * point[0] - s * point[1], s * point[0] + c * point[1]])
+    axis, w = pose[:, 3:6], pose[:, 6:]
+    return np.asarray(pose[:, :3] + point + 2.0 * np.cross(axis, np.cross(axis, point) + w * point), np.float64)
+
+
+def _crossed(height: Floats) -> int:
+    """First step whose straight way goes in and out of a convex shape, by heights over its faces (n, e); -1: none."""
+    before, after = height[:-1], height[1:]
+    outside = (before.max(axis=1) > 0.0) & (after.max(axis=1) > 0.0) & ~((before > 0.0) & (after > 0.0)).any(axis=1)
+    k = np.flatnonzero(outside)  # all faces that these are beyond, they cross
+    before, after = before[k], after[k]
+    share = before / np.where(before == after, 1.0, before - after)
+    enters = np.where((before > 0.0) & (after <= 0.0), share, 0.0).max(axis=1)
+    leaves = np.where((before <= 0.0) & (after > 0.0), share, 1.0).min(axis=1)
+    through = k[leaves - enters > ROUNDED]
+    return int(through[0]) if len(through) else -1
+
+
+def _squeezed(run: Run) -> str:
+    """Circles and balls that go on by their size between walls that leave them a tenth too little room."""
+    bodies, table = run.scene_resolved.get("bodies", []), run.contacts
+    if not len(table.gap) or len(bodies) != len(run.body_names):
+        return ""
+    for b, body in enumerate(bodies):
+        shapes = body.get("shapes", ())
+        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
+        if len(rows) < 2 or any("radius" not in shape for shape in shapes):
+            continue
+        step = np.searchsorted(table.offsets, rows, "right") - 1
+        one, other = rows[:-1], rows[1:]
+        facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
+        narrow, size = -(table.gap[one] + table.gap[other]), _size(shapes)
+        caught = np.flatnonzero((step[:-1] == step[1:]) & facing & (narrow > NARROW * size))
+        if not len(caught):
+            continue
+        place = run.pose[step[caught], b, : 2 if run.pose.shape[-1] == 3 else 3]
+        far = float(np.linalg.norm(place - place[0], axis=1).max())
+        if far > size:
+            wide = in_metres(float(narrow[caught].max()))
+            return f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is {wide} narrower than it"
+    return ""
+
+
+def _flew(run: Run) -> str:
+    """Positions that no start, speed and acceleration explain."""
+    lengths = [i for i, unit in enumerate(run.coordinate_units) if unit == "m"]
+    if not lengths or not run.steps:
+        return ""
+    scene, time = run.scene_resolved, float(run.time[-1])
+    masses = [body["mass"] for body in scene.get("bodies", ()) if body.get("mass")]
+    push = float(np.linalg.norm(((scene.get("hand") or {}).get("force") or [0.0])[:2])) / min(masses, default=1.0)
+    acceleration = float(np.linalg.norm(scene.get("gravity") or [0.0])) + push
+    reach = float(np.abs(run.q[0]).max() + np.abs(run.v[0]).max() * time + 0.5 * acceleration * time**2)
+    reach += max((_size(body.get("shapes", ()), 0.0) for body in scene.get("bodies", ())), default=0.0)
+    moved = np.abs(run.q[:, lengths] - run.q[0, lengths]).max(axis=0)
+    i = int(moved.argmax())
+    if moved[i] <= WILD * reach:
+        return ""
+    far = in_metres(float(moved[i]))
+    return f"{run.coordinate_names[lengths[i]]} moves by {far}, where {in_metres(reach)} can be explained"
