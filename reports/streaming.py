@@ -86,7 +86,7 @@ class _Stream:
             if self.log is None:
                 return Streamed(self._store_held(stopped), stopped, 0, False)
             self._spill()
-            parts = parts_of(self.log.path, self.joiner, self.world)
+            parts = parts_of(self.log.path, self.joiner, self.world, self.log.steps)
             if stopped:
                 store_parts(self.place.partial, parts, stopped=stopped, key=self.place.key, replace=True)
                 return Streamed(None, stopped, resumed_at, self.simulation.keeps_no_state)
@@ -148,12 +148,14 @@ class _Stream:
         head, blocks = read_log(path)
         if head.get("key") != self.place.key:
             raise RunFileError(f"{path}: the log of another run")
-        states = [block for block in blocks if block.line["kind"] == STATE]
-        if not states or not self.simulation.keeps_no_state:
+        last = None
+        for block in blocks:
+            last = block if block.line["kind"] == STATE else last
+        if last is None or not self.simulation.keeps_no_state:
             return 0
         self.log = RunLog(path, head, anew=False)
-        put_back(path, states[-1], self.simulation.arrays())
-        self.log.go_on(states[-1])
+        put_back(path, last, self.simulation.arrays())
+        self.log.go_on(last)
         self.simulation.steps_done = self.log.steps
         self.recorder.go_on(self.log.steps)
         return self.log.steps
@@ -175,10 +177,17 @@ def lengths_of(recorder: Recorder) -> dict[str, int]:
     return dict(zip(names, recorder.coordinates, strict=True))
 
 
-def parts_of(path: Path, joiner: Recorder, world: str, more: int = 0, rows: list[Any] | None = None) -> Iterator[Run]:
+def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int = 0,
+             rows: list[Any] | None = None) -> Iterator[Run]:
     """Yield the run in a log in parts.
 
-    joiner : a recorder of the same simulation that was made at its start; rows : takes the `more` columns of the log.
+    joiner : a recorder of the same simulation that was made at its start; steps : that must be there;
+    rows : takes the `more` columns of the log.
+
+    Raises
+    ------
+    RunFileError
+        Fewer steps are whole.
     """
     lengths, held = lengths_of(joiner), 0
     for block in read_log(path)[1]:
@@ -191,6 +200,8 @@ def parts_of(path: Path, joiner: Recorder, world: str, more: int = 0, rows: list
             if held > HELD:
                 yield joiner.take(world)
                 held = 0
+    if joiner.steps < max(steps, 1):
+        raise RunFileError(f"{path}: damaged: {joiner.steps} steps of {max(steps, 1)} are whole")
     if held:
         yield joiner.take(world)
 

@@ -14,12 +14,11 @@ from iapb.simulation import INTERRUPTED, Simulation
 from reference.worlds import find_world
 from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
 from reports.live.budget import calibrated
-from reports.live.loop import LiveRun, Loop
-from reports.live.measure import Pace, live_simulation, summary
-from reports.live.replay import finish_live, open_log, read_timetable
+from reports.live.loop import Loop
+from reports.live.measure import Pace, live_simulation
+from reports.live.replay import finish_live, open_log
 from reports.live.viewer import Viewer
 from reports.store.logs import RunLog
-from reports.store.runs import opened_run
 
 LONGEST = 1e8  # ticks: at 1 kHz more than a day
 
@@ -53,15 +52,13 @@ def live(
         log = open_log(out, name, simulation, world, ticks)
         try:
             stopped = _held(simulation, ticks, budget, port if view else None, log)
-            files = finish_live(log.path, stopped)
+            run, timetable, pace = finish_live(log.path, stopped, log.steps)
         except BaseException:
             log.close(remove=log.steps == 0)
             raise
         log.close(remove=True)
-    with opened_run(files[0]) as (run, _):
-        result = LiveRun(run, read_timetable(files[0]))
-        describe(summary(result), result)
-    print(f"Run: {files[0]}\nTimetable: {files[1]}")
+    describe(pace)
+    print(f"Run: {run}\nTimetable: {timetable}")
     if stopped:
         print(f"Stopped: {stopped}. What was done is in the files.")
         raise typer.Exit(130 if stopped == INTERRUPTED else 1)
@@ -84,7 +81,7 @@ def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, lo
         viewer.stop()
 
 
-def describe(pace: Pace, live: LiveRun) -> None:
+def describe(pace: Pace) -> None:
     """Say in sentences how the loop kept to the clock."""
     print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
     for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
@@ -92,7 +89,7 @@ def describe(pace: Pace, live: LiveRun) -> None:
         print(f"{what} {half} in the median; {ninety} at 90 %, {hundredth} at 99 %, {thousandth} at 99.9 %, "
               f"{worst} at worst.")
     print(_misses(pace))
-    print(_rows(pace, live))
+    print(_rows(pace))
 
 
 def _misses(pace: Pace) -> str:
@@ -104,13 +101,12 @@ def _misses(pace: Pace) -> str:
             f"after was done that much later, and simulated time is {duration(pace.behind)} behind the clock.")
 
 
-def _rows(pace: Pace, live: LiveRun) -> str:
+def _rows(pace: Pace) -> str:
     if not pace.collisions:
         return "No collision was resolved by an impulse."
-    least = int(live.timetable.budget[live.run.impacts.step[:]].min())
     collisions, left_out = counted(pace.collisions, "collision"), pace.rows_left_out
     if not left_out:
-        return f"{collisions}, each with all the rows it needed (the least budget was {least})."
+        return f"{collisions}, each with all the rows it needed (the least budget was {pace.least_rows})."
     were = "was" if left_out == 1 else "were"
-    return (f"{collisions}; the time left gave them {counted(least, 'row')} at the least, and "
+    return (f"{collisions}; the time left gave them {counted(pace.least_rows, 'row')} at the least, and "
             f"{counted(left_out, 'row')} that still approached {were} left to the next steps.")

@@ -28,6 +28,7 @@ from reports.store.care import (
     mark_stores,
     repair_store,
 )
+from reports.store.logs import is_whole
 from reports.store.runs import read_provenance
 from reports.streaming import logs_of_killed, recover
 
@@ -83,13 +84,24 @@ def _repair(where: Path) -> None:
         states = repair_store(where, partial(progress, "files read whole"))
     _tell(states)
     for log in logs_of_killed(where):
-        if is_live(log):
-            print(f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable")
-            log.unlink()
-        else:
-            print(f"{recover(log)}: what a killed run did; iapb run --resume goes on")
+        try:
+            _tell_recovered(log)
+        except IapbError as error:
+            print(f"{log}: left as it is: {str(error).removeprefix(f'{log}: ')}")
     aside = sum(not state.path.exists() for state in states)
     print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
+
+
+def _tell_recovered(log: Path) -> None:
+    """Make what is whole in a log readable, and say so."""
+    if not is_live(log):
+        print(f"{recover(log)}: what a killed run did; iapb run --resume goes on")
+        return
+    print(f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable")
+    if is_whole(log):
+        log.unlink()
+    else:
+        print(f"{log}: kept, for its end is cut off or damaged")
 
 
 def _tell(states: Sequence[FileState]) -> None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.device import Device, SimulatedDevice
+from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import Simulation
 from iapb.system import System
 from reference.worlds import World, find_world
 from reports.by_name import function_named
 from reports.live.budget import calibrated
-from reports.live.deadline import Clock, percentiles
+from reports.live.deadline import Clock, Spread, Timetable
 from reports.live.loop import LiveRun, Loop
 
 _SIMULATED = "simulated"  # the word for `simulated_device`
@@ -77,6 +76,7 @@ class Pace:
     missed: int
     behind: float  # [s] that simulated time fell behind the clock
     collisions: int
+    least_rows: int  # that the time left gave a collision
     rows_left_out: int  # rows that still approached after impacts that had used up their budget
 
 
@@ -124,20 +124,37 @@ def pace(scene: Scene, rate: float, seconds: float, *, world: str = "IAPB", budg
 
 def summary(live: LiveRun) -> Pace:
     """The numbers of a live run."""
-    table = live.timetable
-    return Pace(
-        scene=live.run.scene_name, rate=1.0 / table.period, ticks=live.run.steps,
-        work=tuple(percentiles(table.work).tolist()), lateness=tuple(percentiles(table.lateness).tolist()),
-        missed=int(table.missed.sum()), behind=table.behind, collisions=len(live.run.impacts.step),
-        rows_left_out=rows_left_out(live),
-    )  # fmt: skip
+    tally = Tally()
+    tally.add(live.run, live.timetable)
+    return tally.pace()
 
 
-def rows_left_out(live: LiveRun) -> int:
-    """Rows that approached still after an impact that had used up a budget below the number of velocities."""
-    impacts, budget = live.run.impacts, live.timetable.budget
-    if not len(impacts.step):
-        return 0
-    given = budget[impacts.step[:]]
-    short = (impacts.rank[:] >= given) & (given < live.run.v.shape[1])
-    return int(np.maximum(impacts.approaching[:][short], 0).sum())
+class Tally:
+    """The numbers of a live run that comes in parts, in constant memory."""
+
+    def __init__(self) -> None:
+        self._scene, self._period, self._ticks, self._behind = "", 1.0, 0, 0.0
+        self._work, self._lateness = Spread(), Spread()
+        self._missed = self._collisions = self._left_out = 0
+        self._least: int | None = None
+
+    def add(self, run: Run, table: Timetable) -> None:
+        """Count a part of the run and the ticks that it is of."""
+        impacts = run.impacts
+        given = table.budget[impacts.step[:] - self._ticks]
+        short = (impacts.rank[:] >= given) & (given < run.v.shape[1])
+        self._left_out += int(impacts.approaching[:][short].clip(0).sum())
+        self._collisions += len(given)
+        if len(given):
+            self._least = min(int(given.min()), self._least or int(given.min()))
+        self._scene, self._period, self._ticks = run.scene_name, table.period, self._ticks + len(table.due)
+        self._work.add(table.work)
+        self._lateness.add(table.lateness)
+        self._missed += int(table.missed.sum())
+        self._behind += table.behind
+
+    def pace(self) -> Pace:
+        """Return what was counted."""
+        return Pace(self._scene, 1.0 / self._period, self._ticks, self._work.percentiles(),
+                    self._lateness.percentiles(), self._missed, self._behind, self._collisions, self._least or 0,
+                    self._left_out)  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ from iapb.run import Run
 from iapb.simulation import Simulation
 from reports.live.deadline import TICK_COLUMNS, Timetable, timetable_of
 from reports.live.loop import LiveRun, Tape, name_of
+from reports.live.measure import Pace, Tally
 from reports.resimulate import coupling_of, law_of, scene_of
 from reports.store.io import mark_store
 from reports.store.logs import LOG_SUFFIX, RunLog, read_log
 from reports.store.runs import read_run, store_parts, write_run
-from reports.store.tables import Column, Table, read_tables, write_tables
+from reports.store.tables import Column, Table, growing_table, read_tables, write_tables
 from reports.streaming import log_head, log_of, parts_of, simulation_of
 
 _WRENCH = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
@@ -30,12 +32,12 @@ def write_live(folder: Path | str, live: LiveRun, name: str) -> tuple[Path, Path
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     path = write_run(folder / f"{name}.h5", live.run)
-    return path, _write_timetable(path, live.timetable, live.device)
+    tables = ticks_table(live.timetable, path.name), _session(live.timetable.period, live.device)
+    return path, write_tables(_timetable_of(path), tables)
 
 
-def _write_timetable(run: Path, timetable: Timetable, device: str) -> Path:
-    tables = ticks_table(timetable, run.name), _session(timetable, device)
-    return write_tables(run.with_name(run.stem + _SUFFIX), tables)
+def _timetable_of(run: Path) -> Path:
+    return run.with_name(run.stem + _SUFFIX)
 
 
 def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks: int) -> RunLog:
@@ -46,27 +48,37 @@ def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks:
     return RunLog(log_of(folder / f"{name}.h5"), log_head(simulation, world, ticks, live=more))
 
 
-def finish_live(log: Path, stopped: str) -> tuple[Path, Path]:
-    """Write the run and the timetable in a log to their files, in constant memory but for 80 bytes a tick."""
+def finish_live(log: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path, Pace]:
+    """Write the run and the timetable in a log to their files, in constant memory; return both, and their numbers.
+
+    Raises
+    ------
+    RunFileError
+        Fewer ticks than `ticks` are whole in the log.
+    """
     head, _ = read_log(log)
-    told, rows = head["live"], list[Any]()
+    told, rows, tally = head["live"], list[Any](), Tally()
+    period = float(told["period"])
     joiner = Recorder(simulation_of(head))
     joiner.start = {name: np.array(values, np.float64) for name, values in told["start"].items()}
     path = log.with_name(log.name.removesuffix(LOG_SUFFIX))
-    parts = parts_of(log, joiner, str(head["world"]), TICK_COLUMNS, rows)
-    store_parts(path, parts, stopped=stopped, key="", replace=True)
-    timetable = timetable_of(float(told["period"]), np.concatenate(rows))
-    return path, _write_timetable(path, timetable, str(told["device"]))
+
+    def parts(append: Callable[[Table], None]) -> Iterator[Run]:
+        for part in parts_of(log, joiner, str(head["world"]), ticks, TICK_COLUMNS, rows):
+            timetable = timetable_of(period, np.concatenate(rows))
+            rows.clear()
+            append(ticks_table(timetable, path.name))
+            tally.add(part, timetable)
+            yield part
+
+    with growing_table(_timetable_of(path), (_session(period, str(told["device"])),)) as append:
+        store_parts(path, parts(append), stopped=stopped, key="", replace=True)
+    return path, _timetable_of(path), tally.pace()
 
 
 def is_live(log: Path) -> bool:
     """Whether a log is one of a live run."""
     return "live" in read_log(log)[0]
-
-
-def read_timetable(path: Path) -> Timetable:
-    """Return the timetable beside the run file of a live run."""
-    return _timetable_and_device(path)[0]
 
 
 def read_live(path: Path | str) -> LiveRun:
@@ -76,7 +88,7 @@ def read_live(path: Path | str) -> LiveRun:
 
 
 def _timetable_and_device(path: Path) -> tuple[Timetable, str]:
-    tables = read_tables(path.with_name(path.stem + _SUFFIX))
+    tables = read_tables(_timetable_of(path))
     ticks, session = tables["ticks"], tables["session"]
     wrench = np.column_stack([ticks[name] for name in _WRENCH])
     due, start, end, budget = (np.asarray(ticks[name]) for name in ("due", "start", "end", "budget"))
@@ -99,9 +111,9 @@ def ticks_table(timetable: Timetable, run: str = "") -> Table:
     ), title="When each step of a live run was due and done", runs=(run,) if run else ())  # fmt: skip
 
 
-def _session(timetable: Timetable, device: str) -> Table:
+def _session(period: float, device: str) -> Table:
     return Table("session", (
-        Column("period", np.array([timetable.period]), "s", "of the ticks"),
+        Column("period", np.array([period]), "s", "of the ticks"),
         Column("device", (device or "compiled",), "1", "the device's class; compiled: simulated in the loop"),
     ))  # fmt: skip
 

@@ -1,11 +1,12 @@
 """A run in the making, on disk: a log that only grows, so that a kill loses no more than its last block.
 
     a line of JSON: what this is, and what run it is of
-    blocks, each a line of JSON (kind, counts, bytes and sha256 of what follows) and its numbers:
+    blocks, each a line of JSON (kind, counts, bytes that follow) and its numbers:
         chunk   lines of the loop's record: the columns of `iapb.recording`, one after another
         state   everything that the next step depends on (`Simulation.arrays`), after the chunks before it
 
-Who writes holds a lock that the kernel releases with the process. A block that is cut off or damaged ends the log.
+Each line holds a sha256 of itself, its numbers and the sha256 before it: what is changed, lost or exchanged shows.
+A block that is cut off or damaged ends the log. Who writes holds a lock that the kernel releases with the process.
 The log is for going on and for recovery (`reports.streaming`); results are read from run files alone.
 """
 
@@ -15,7 +16,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -31,23 +32,21 @@ from iapb.run import Quantity
 
 LOG_SUFFIX = ".log"
 CHUNK, STATE = "chunk", "state"
-_FORMAT, _VERSION = "iapb log", 1
+_FORMAT, _VERSION = "iapb log", 2
+_SEAL = "sha256"
+_OWN = ("format", "format_version", _SEAL)  # of a head; the rest is the caller's
 _BEGINNING = f'{{"format": "{_FORMAT}"'.encode()
 _LONGEST_LINE = 1 << 24  # bytes of a line of JSON: a scene of ten thousand bodies is a tenth of that
 
 
 @dataclass(frozen=True)
 class Block:
-    """One block of a log: its line, and where it and its numbers are in the file."""
+    """One whole block of a log: its line, its numbers as bytes, and where it starts and ends in the file."""
 
     line: Mapping[str, Any]
+    numbers: bytes
     start: int
-    numbers: int
-
-    @property
-    def end(self) -> int:
-        """Where the next block starts."""
-        return self.numbers + int(self.line["bytes"])
+    end: int
 
 
 class LogLocked(RunFileError):
@@ -79,14 +78,15 @@ class RunLog:
             raise LogLocked(f"{path}: another process is at work on this run") from error
         self.steps = 0
         self.end = 0
+        self._seal = ""
         if anew:
             os.ftruncate(self._file, 0)
-            self.end = self._put(0, _line({"format": _FORMAT, "format_version": _VERSION, **head}))
+            self._write({"format": _FORMAT, "format_version": _VERSION, **head}, b"")
 
     def go_on(self, block: Block) -> None:
         """Continue behind a block; what follows it is dropped."""
         os.ftruncate(self._file, block.end)
-        self.steps, self.end = int(block.line["steps"]), block.end
+        self.steps, self.end, self._seal = int(block.line["steps"]), block.end, block.line[_SEAL]
 
     def write_chunk(self, record: Any, steps: int, seconds: float, more: Sequence[NDArray[Any]] = ()) -> None:
         """Append the lines of a chunk of which `steps` are written; `more`: further columns, of the caller's."""
@@ -96,18 +96,22 @@ class RunLog:
         columns += [getattr(record.contacts, each.name)[:contacts] for each in CONTACTS]
         columns += [getattr(record.impacts, each.name)[:impacts] for each in IMPACTS]
         line = {"kind": CHUNK, "steps": steps, "contacts": contacts, "impacts": impacts, "seconds": seconds}
-        end = self._write(line, [*columns, *(column[:steps] for column in more)])
-        self.steps, self.end = self.steps + steps, end
+        self._write_block(line, [*columns, *(column[:steps] for column in more)])
+        self.steps += steps
 
     def write_state(self, arrays: Sequence[NDArray[Any]]) -> None:
         """Append everything that the next step depends on."""
-        self.end = self._write({"kind": STATE, "steps": self.steps}, arrays)
+        self._write_block({"kind": STATE, "steps": self.steps}, arrays)
 
-    def _write(self, line: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> int:
-        """Write a block at the end and return where it ends: until that is noted, the next one overwrites it."""
+    def _write_block(self, line: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> None:
         numbers = b"".join(array.tobytes() for array in arrays)
-        whole = {**line, "bytes": len(numbers), "sha256": hashlib.sha256(numbers).hexdigest()}
-        return self._put(self.end, _line(whole) + numbers)
+        self._write({**line, "bytes": len(numbers)}, numbers)
+
+    def _write(self, line: Mapping[str, Any], numbers: bytes) -> None:
+        """Write a line and its numbers at the end: until they are whole, the next ones overwrite them."""
+        seal = _seal_of(self._seal, line, numbers)
+        self.end = self._put(self.end, _line({**line, _SEAL: seal}) + numbers)
+        self._seal = seal
 
     def _put(self, place: int, content: bytes) -> int:
         view = memoryview(content)
@@ -128,7 +132,15 @@ class RunLog:
 
 
 def _line(record: Mapping[str, Any]) -> bytes:
-    return json.dumps(record, ensure_ascii=False).encode() + b"\n"
+    return json.dumps(record, ensure_ascii=False).encode(errors="surrogatepass") + b"\n"
+
+
+def _seal_of(before: str, line: Mapping[str, Any], numbers: bytes) -> str:
+    """Return what the line of a block says of all that it covers; `before` is what the line before it says."""
+    unsealed = {name: value for name, value in line.items() if name != _SEAL}
+    digest = hashlib.sha256(before.encode() + _line(unsealed))
+    digest.update(numbers)
+    return digest.hexdigest()
 
 
 def is_log(path: Path) -> bool:
@@ -140,38 +152,54 @@ def is_log(path: Path) -> bool:
         return False
 
 
-def read_log(path: Path) -> tuple[dict[str, Any], list[Block]]:
-    """Return the head of a log, and its whole blocks in order; numbers are read, and checked, by `numbers_of`.
+def read_log(path: Path) -> tuple[dict[str, Any], Iterator[Block]]:
+    """Return the head of a log, and its whole blocks one by one, up to the first that is cut off or damaged.
 
     Raises
     ------
     RunFileError
-        The file is no log that this version knows.
+        The file is no log that this version knows, or its head is damaged.
     """
     if not is_log(path):
         raise RunFileError(f"{path}: no log of a run")
-    blocks: list[Block] = []
-    size = path.stat().st_size
     with path.open("rb") as file:
         head = _parsed(file.readline(_LONGEST_LINE))
-        if head is None or head.get("format_version") != _VERSION:
-            raise RunFileError(f"{path}: a log of another version: this one reads {_VERSION}")
-        while True:
-            start = file.tell()
-            line = _parsed(file.readline(_LONGEST_LINE))
-            if line is None or not _is_block(line):
-                return head, blocks
-            block = Block(line, start, file.tell())
-            if block.end > size:
-                return head, blocks
-            blocks.append(block)
-            file.seek(block.end)
+        first = file.tell()
+    if head is not None and head.get("format_version") != _VERSION:
+        raise RunFileError(f"{path}: a log of another version: this one reads {_VERSION}")
+    if head is None or head.get(_SEAL) != _seal_of("", head, b""):
+        raise RunFileError(f"{path}: its first line is damaged, and with it the log; run without --resume")
+    return {name: value for name, value in head.items() if name not in _OWN}, _blocks_from(path, first, head[_SEAL])
+
+
+def _blocks_from(path: Path, start: int, before: str) -> Iterator[Block]:
+    """Yield the blocks of a log that are whole; `before` is the seal of its head."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(start)
+        while (line := _parsed(file.readline(_LONGEST_LINE))) is not None:
+            if not _is_block(line) or line["bytes"] > size - file.tell():
+                return
+            numbers = file.read(line["bytes"])
+            if line.get(_SEAL) != _seal_of(before, line, numbers):
+                return
+            block = Block(line, numbers, start, file.tell())
+            yield block
+            start, before = block.end, line[_SEAL]
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a log is whole up to its last byte."""
+    end = 0
+    for block in read_log(path)[1]:
+        end = block.end
+    return end == path.stat().st_size
 
 
 def _parsed(text: bytes) -> dict[str, Any] | None:
     try:
         found = json.loads(text) if text.endswith(b"\n") else None
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
 
@@ -182,22 +210,6 @@ def _is_block(line: Mapping[str, Any]) -> bool:
         isinstance(line.get(name), int) and line[name] >= 0 for name in counts)
 
 
-def numbers_of(path: Path, block: Block) -> bytes:
-    """Return the bytes of a block.
-
-    Raises
-    ------
-    RunFileError
-        They are not those that were written.
-    """
-    with path.open("rb") as file:
-        file.seek(block.numbers)
-        numbers = file.read(int(block.line["bytes"]))
-    if hashlib.sha256(numbers).hexdigest() != block.line.get("sha256"):
-        raise RunFileError(f"{path}: damaged at byte {block.start}")
-    return numbers
-
-
 def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 0) -> tuple[Any, NDArray[np.float64]]:
     """Return the chunk in a block as a record that `Recorder.keep` takes, and the `more` columns of the caller's.
 
@@ -205,7 +217,7 @@ def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 
     """
     steps, contacts, impacts = (int(block.line[name]) for name in ("steps", "contacts", "impacts"))
     rows = {**lengths, "time": steps, "step": steps, "contact": contacts, "impact": impacts, "axis": 3}
-    numbers, place = numbers_of(path, block), 0
+    numbers, place = block.numbers, 0
 
     def column(shape: Sequence[int], dtype: Any) -> NDArray[Any]:
         nonlocal place
@@ -235,9 +247,9 @@ def put_back(path: Path, block: Block, arrays: Sequence[NDArray[Any]]) -> None:
     Raises
     ------
     RunFileError
-        It is damaged, or of another scene.
+        It is of another scene.
     """
-    numbers, place = numbers_of(path, block), 0
+    numbers, place = block.numbers, 0
     if len(numbers) != sum(array.nbytes for array in arrays):
         raise RunFileError(f"{path}: a state of another scene at byte {block.start}")
     for array in arrays:

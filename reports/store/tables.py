@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,10 @@ from iapb.errors import ArgumentError, RunFileError
 from iapb.names import one_of
 from reports.provenance import collect_provenance
 from reports.store.io import (
+    extend,
     mark_plottable,
     new_file,
+    new_large_file,
     opened,
     read_values,
     write_quantity,
@@ -90,15 +93,45 @@ def write_tables(
     for table in tables:
         _check_columns(table)
     with new_file(path, replace=True) as file:
-        file.attrs.update(
-            {"NX_class": "NXroot", "default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
-        )
         for table in tables:
             _write(file.create_group(table.name, track_order=True), table)
-        for name, text in (collect_provenance() if provenance is None else provenance).items():
-            write_text(file.require_group("provenance"), name, text)
-        file.attrs["content_hash"] = tables_hash(tables)
+        _write_head(file, tables, provenance)
     return path
+
+
+@contextmanager
+def growing_table(path: Path, others: Sequence[Table]) -> Iterator[Callable[[Table], None]]:
+    """Give a function that appends a part of a table of numbers; the others are written behind it, whole.
+
+    The parts have one name and the same columns, of which the first counts up. They come to the file of `write_tables`
+    in constant memory.
+    """
+    with new_large_file(path, replace=True) as file:
+        parts: list[Table] = []
+
+        def append(part: Table) -> None:
+            if not parts:
+                _write(file.create_group(part.name, track_order=True), part, growing=True)
+                parts.append(part)
+                return
+            for column in part.columns:
+                extend(file[part.name][column.name], _hashable(column.values))
+
+        yield append
+        for table in others:
+            _write(file.create_group(table.name, track_order=True), table)
+        stored = [replace(part, columns=tuple(replace(column, values=file[part.name][column.name])
+                                              for column in part.columns)) for part in parts]  # fmt: skip
+        _write_head(file, [*stored, *others], None)
+
+
+def _write_head(file: Any, tables: Sequence[Table], provenance: Mapping[str, str] | None) -> None:
+    file.attrs.update(
+        {"NX_class": "NXroot", "default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
+    )
+    for name, text in (collect_provenance() if provenance is None else provenance).items():
+        write_text(file.require_group("provenance"), name, text)
+    file.attrs["content_hash"] = tables_hash(tables)
 
 
 def read_table(path: Path | str, name: str | None = None) -> Table:
@@ -144,7 +177,7 @@ def _hashable(values: Any) -> Any:
     """What a column is after a trip to a file: texts as bytes, truth values as small integers."""
     if _is_text(values):
         return np.frombuffer("\0".join(values).encode(), np.uint8)
-    array = np.asarray(values)
+    array = values if hasattr(values, "dtype") else np.asarray(values)  # what is in a file stays there
     return array.astype(np.uint8) if array.dtype == np.bool_ else array
 
 
@@ -161,18 +194,19 @@ def _check_columns(table: Table) -> None:
         raise ArgumentError(f"columns of {table.name}", shape, f"columns of one length, none named {ROW!r}")
 
 
-def _write(group: Any, table: Table) -> None:
+def _write(group: Any, table: Table, *, growing: bool = False) -> None:
+    """Write a table; a `growing` one has no texts, and counts up in its first column."""
     first = table.columns[0]
     distinct = not _is_text(first.values) and len(np.unique(first.values)) == len(first.values) > 0
     dimension = first.name if distinct else ROW
     if distinct:
-        write_scale(group, dimension, first.values, first.unit)
+        write_scale(group, dimension, first.values, first.unit, growing=growing)
         group[dimension].attrs["long_name"] = first.description
     else:
         write_scale(group, dimension, np.arange(len(first.values), dtype=np.int64), "1")
     for column in table.columns[1:] if distinct else table.columns:
         values = tuple(column.values) if _is_text(column.values) else column.values
-        write_quantity(group, column.name, values, (dimension,), column.unit, column.description)
+        write_quantity(group, column.name, values, (dimension,), column.unit, column.description, growing=growing)
     group.attrs["title"] = table.title
     group.attrs["command"] = table.command
     group.attrs["runs"] = "\n".join(table.runs)

@@ -16,7 +16,7 @@ from reference.worlds import run_world
 from reports.runner import Runner
 from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage
 from reports.store.keys import content_hash
-from reports.store.logs import STATE, LogLocked, RunLog, read_log
+from reports.store.logs import CHUNK, STATE, LogLocked, RunLog, read_log
 from reports.store.runs import opened_run, read_run
 from reports.streaming import logs_of_killed, recover
 
@@ -105,15 +105,31 @@ def test_what_a_kill_cut_off_anywhere_is_computed_again(tmp_path: Path) -> None:
         place.path.unlink()
 
 
-def test_a_damaged_log_is_refused_and_a_run_from_the_start_ignores_it(tmp_path: Path) -> None:
+def test_a_damaged_log_goes_on_from_before_the_damage(tmp_path: Path) -> None:
     log, scene = killed(tmp_path)
-    content, last = bytearray(log.read_bytes()), read_log(log)[1][-1]
-    content[last.numbers + 5] ^= 1
-    log.write_bytes(content)
-    with pytest.raises(RunFileError, match="damaged at byte"):
-        Runner(tmp_path).stream(scene, "IAPB", resume=True)
-    _, streamed = Runner(tmp_path).stream(scene, "IAPB")
-    assert streamed.entry.content_hash == whole("peg_corner", "IAPB", 4000)
+    content, blocks = log.read_bytes(), list(read_log(log)[1])
+    states = [number for number, block in enumerate(blocks) if block.line["kind"] == STATE]
+    for number in (states[-1], states[-1] - 1, states[0] + 1):
+        block = blocks[number]
+        for place in (block.start + 30, block.end - 5):  # in its line, in its numbers
+            log.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1:])
+            place, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
+            assert streamed.resumed_at == 512 * sum(each < number for each in states)
+            assert streamed.entry.content_hash == whole("peg_corner", "IAPB", 4000)
+            place.path.unlink()
+
+
+def test_a_block_that_is_lost_doubled_or_exchanged_ends_the_log(tmp_path: Path) -> None:
+    log, _ = killed(tmp_path)
+    content, blocks = log.read_bytes(), list(read_log(log)[1])
+    head, pieces = content[: blocks[0].start], [content[each.start : each.end] for each in blocks]
+    chunks = [number for number, each in enumerate(blocks) if each.line["kind"] == CHUNK]
+    first, second = chunks[1:3]
+    swapped = [*pieces]
+    swapped[first], swapped[second] = pieces[second], pieces[first]
+    for wrong in (pieces[:first] + pieces[first + 1 :], [*pieces[:first], pieces[first - 1], *pieces[first:]], swapped):
+        log.write_bytes(head + b"".join(wrong))
+        assert len(list(read_log(log)[1])) == first
 
 
 def test_a_log_of_another_run_or_of_nobody_is_refused(tmp_path: Path) -> None:

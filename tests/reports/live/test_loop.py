@@ -11,9 +11,9 @@ import pytest
 from iapb.errors import IapbError
 from reference.worlds import run_world
 from reports.live.budget import RowBudget, RowCost, calibrated
-from reports.live.deadline import Timetable
+from reports.live.deadline import PERCENTILES, Timetable
 from reports.live.loop import Loop
-from reports.live.measure import made_device, rows_left_out, summary
+from reports.live.measure import made_device, summary
 from reports.live.replay import finish_live, is_live, open_log, read_live, replay
 from reports.store.keys import content_hash
 from reports.streaming import logs_of_killed
@@ -64,7 +64,7 @@ def test_a_run_short_of_time_keeps_to_its_budgets_is_passive_and_repeats_exactly
     impacts = live.run.impacts
     assert np.all(live.timetable.budget == 1) and len(impacts.step)
     assert np.all(impacts.rank <= live.timetable.budget[impacts.step])
-    assert impacts.rows.max() > 1 and rows_left_out(live) > 0
+    assert impacts.rows.max() > 1 and summary(live).rows_left_out > 0
     assert impacts.energy_lost.min() >= 0.0
     assert content_hash(replay(live)) == content_hash(live.run)
 
@@ -92,7 +92,7 @@ def test_with_time_enough_every_impact_gets_all_its_rows(peg, fake_clock):
     simulation = peg()
     dofs = simulation.system.mechanism.nv
     live = Loop(simulation, TICKS, fake_clock(), RowBudget(RowCost(0.0, 1e-6), PERIOD, dofs, 1)).run("IAPB")
-    assert np.all(live.timetable.budget == dofs) and rows_left_out(live) == 0
+    assert np.all(live.timetable.budget == dofs) and summary(live).rows_left_out == 0
 
 
 def test_a_row_is_measured_to_take_some_time(peg):
@@ -108,7 +108,9 @@ def test_control_c_ends_the_loop_with_what_was_done(peg, fake_clock):
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_loop_that_streams_comes_to_the_files_of_one_that_holds_all(peg, fake_clock, tmp_path):
+def test_a_loop_that_streams_comes_to_the_files_of_one_that_holds_all(peg, fake_clock, tmp_path, monkeypatch):
+    monkeypatch.setattr("reports.streaming.HELD", 1)  # a part for each chunk
+
     def late():
         return fake_clock({50: 2.5e-3})
 
@@ -116,10 +118,11 @@ def test_a_loop_that_streams_comes_to_the_files_of_one_that_holds_all(peg, fake_
     simulation = peg()
     log = open_log(tmp_path, "live", simulation, "IAPB", ticks)
     assert Loop(simulation, ticks, late(), log=log).stream() == ""
-    path, _ = finish_live(log.path, "")
+    path, _, pace = finish_live(log.path, "")
     log.close(remove=True)
     stored = read_live(path)
     assert content_hash(stored.run) == content_hash(held.run) == content_hash(replay(stored))
+    assert pace == summary(stored) == summary(held)
     for name in Timetable._fields:
         assert np.array_equal(getattr(stored.timetable, name), getattr(held.timetable, name)), name
 
@@ -179,3 +182,4 @@ def test_the_summary_counts_what_the_timetable_says(peg, fake_clock):
     pace = summary(live)
     assert (pace.ticks, pace.missed, pace.rows_left_out) == (TICKS, 1, 0)
     assert pace.work[-1] == live.timetable.work.max() and list(pace.lateness) == sorted(pace.lateness)
+    assert pace.work == pytest.approx(np.percentile(live.timetable.work, PERCENTILES), rel=2e-3)
