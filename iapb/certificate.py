@@ -8,7 +8,7 @@ wrote are not used, so another engine's impacts are judged alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -25,6 +25,7 @@ from iapb.scene.model import Scene, scene_kind
 
 Floats = NDArray[np.float64]
 
+EXPORT_HEAD = "iapb impacts 1"  # first line of a file of exported impacts
 _CHECKED = 100  # of so many impacts that a bound decides, one is judged by integers as well
 _BATCH = 4096  # impacts whose mass matrices are at hand at once
 # M (v⁺ − v⁻) and the recorded impulse, or Jᵀp of the recorded contacts, agree to rounding of a well-built record.
@@ -192,15 +193,44 @@ def certify(run: Run) -> Certificate:
         return replace(certify_impacts(np.zeros((1, 1)), np.zeros((0, 1)), np.zeros((0, 1))), total=total)
     scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
     mechanism = mechanism_of(scene)
-    parts = []
-    for start in range(0, len(table.step), _BATCH):
-        chosen = slice(start, start + _BATCH)
-        masses = mechanism.mass_matrices(run.q[table.step[chosen]])
-        parts.append(certify_impacts(masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]))
+    parts = [certify_impacts(*batch) for batch in _batches(run, mechanism)]
     span, restitution = _contacts(run, scene, mechanism)
     every_row = bool((table.rank >= table.rows).all())  # a row budget leaves some out, and the record cannot tell why
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(_joined(parts), span=span, restitution=restitution, total=total, restitution_judged=judged)
+
+
+def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
+    """M, v⁻, v⁺ and the generalized impulse of the recorded impacts, some thousand at a time."""
+    table = run.impacts
+    for start in range(0, len(table.step), _BATCH):
+        chosen = slice(start, start + _BATCH)
+        masses = mechanism.mass_matrices(run.q[table.step[chosen]])
+        yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
+
+
+def exported_run(run: Run) -> Iterator[str]:
+    """The impacts of a run as `exported` writes them."""
+    if len(run.impacts.step):
+        mechanism = mechanism_of(scene_kind(run.scene_resolved).model_validate(run.scene_resolved))
+        for mass_matrix, v_minus, v_plus, _ in _batches(run, mechanism):
+            yield from exported(mass_matrix, v_minus, v_plus)
+
+
+def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:
+    """Write each impact as a line of integers, for a judge that shares no code with this one.
+
+    A line is d and then a mantissa and an exponent of two for each entry of M, row by row, of v⁻ and of v⁺. Nothing is
+    rounded. The file starts with `EXPORT_HEAD`. Arguments are those of `judge_gains`, for n impacts.
+    """
+    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
+    masses = np.asarray(mass_matrix, np.float64)
+    masses = masses if len(masses) == len(before) and masses.ndim == 3 else np.broadcast_to(
+        masses, (len(before), *masses.shape[-2:]))
+    for mass, *velocities in zip(masses, before, after, strict=True):
+        mantissas, exponents = np.frexp(np.concatenate((mass.ravel(), *velocities)))
+        pairs = np.stack(((mantissas * 2.0**53).astype(np.int64), exponents - 53), axis=1)
+        yield " ".join(map(str, (len(mass), *pairs.ravel().tolist())))
 
 
 def _check_finite(run: Run) -> None:

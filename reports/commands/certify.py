@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import zipfile
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import numpy as np
 import typer
@@ -13,6 +14,7 @@ from rich.table import Table
 
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
+from iapb.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import RunFileError
 from reports.store.runs import read_run
 
@@ -22,9 +24,15 @@ _GIVEN = ("mass_matrix", "v_minus", "v_plus")
 def certify(
     files: Annotated[list[Path], typer.Argument(
         metavar="RUN...", help="Run files (.h5), folders of them, or impacts of another engine (.npz).")],
+    export: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Write every impact as a line of integers, for the checker that Coq proves.")] = None,
 ) -> None:
     """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
-    found = {path: certificate_of(path) for given in files for path in _files(given)}
+    with ExitStack() as stack:
+        target = stack.enter_context(export.open("w", encoding="utf-8")) if export else None
+        if target:
+            target.write(f"{EXPORT_HEAD}\n")
+        found = {path: certificate_of(path, target) for given in files for path in _files(given)}
     table = Table(title="Impacts, judged in real arithmetic")
     for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "sum − impulse",
                     "restitution"):
@@ -46,10 +54,20 @@ def certify(
         raise typer.Exit(1)
 
 
-def certificate_of(path: Path) -> Certificate:
-    """Return the certificate of a run file, or of an archive of impacts of any engine."""
+def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:
+    """Return the certificate of a run file, or of an archive of impacts of any engine; `export` takes its impacts."""
     if path.suffix != ".npz":
-        return certify_run(read_run(path))
+        run = read_run(path)
+        certificate, lines = certify_run(run), exported_run(run)
+    else:
+        arrays = _archived(path)
+        certificate, lines = certify_impacts(**arrays), exported(*(arrays[name] for name in _GIVEN))
+    if export:
+        export.writelines(f"{line}\n" for line in lines)
+    return certificate
+
+
+def _archived(path: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in (*_GIVEN, "impulse") if name in archive.files}
@@ -58,7 +76,7 @@ def certificate_of(path: Path) -> Certificate:
     missing = [name for name in _GIVEN if name not in arrays]
     if missing:
         raise RunFileError(f"{path}: {', '.join(missing)} missing; docs/report.md states the format")
-    return certify_impacts(**arrays)
+    return arrays
 
 
 def _files(given: Path) -> list[Path]:

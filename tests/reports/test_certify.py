@@ -29,6 +29,21 @@ def test_runs_and_archives_are_certified(tmp_path: Path, capsys: pytest.CaptureF
     assert "of 2 files: 0 gained energy (exact)" in said and "run.h5" in said
 
 
+def test_impacts_of_runs_and_archives_are_exported_as_integers(tmp_path: Path) -> None:
+    run = simulate(load_scene(find_scene("newton_cradle")), steps=400)
+    write_run(tmp_path / "run.h5", run)
+    np.savez(tmp_path / "other.npz", mass_matrix=[[1.0]], v_minus=[[1.5]], v_plus=[[-1.5]])
+    files = str(tmp_path / "run.h5"), str(tmp_path / "other.npz")
+    assert main(["certify", *files, "--export", str(tmp_path / "impacts.txt")]) == 0
+    head, *impacts = (tmp_path / "impacts.txt").read_text(encoding="utf-8").splitlines()
+    assert head == "iapb impacts 1" and len(impacts) == len(run.impacts.step) + 1 > 1
+    size, *numbers = map(float, impacts[-1].split())
+    assert size == 1.0 and [m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)] == [1.0, 1.5, -1.5]
+    d, *numbers = map(int, impacts[0].split())
+    after = [np.ldexp(float(m), e) for m, e in zip(numbers[-2 * d::2], numbers[-2 * d + 1::2], strict=True)]
+    assert after == run.impacts.v_plus[0].tolist()
+
+
 def test_a_gain_of_the_last_bit_is_shown_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["certify", str(archive(tmp_path / "other.npz", True))]) == 1
     said = capsys.readouterr().out

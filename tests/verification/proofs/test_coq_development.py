@@ -1,0 +1,94 @@
+"""Coq accepts the development without assumptions beyond the reals; its extracted checker judges as our judge does."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.certificate import EXPORT_HEAD, exported, judge_gains
+from iapb.errors import IapbError
+from verification.proofs import coq_development
+from verification.proofs.coq_development import FOLDER, build_checker, compiled, lacking
+
+IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
+needs_ocaml = pytest.mark.skipif(
+    bool(lacking("Checker")) or shutil.which("ocamlopt") is None, reason="coqc or ocamlopt is not installed")
+
+
+@pytest.fixture(scope="module")
+def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_checker(tmp_path_factory.mktemp("checker"))
+
+
+def near_the_border(n: int, d: int, rng: np.random.Generator, decades: float) -> tuple[np.ndarray, ...]:
+    """M asymmetric in the last bit, v and w = ±v with one unit in the last place planted in one entry: gain or loss."""
+    root = rng.normal(size=(n, d, d))
+    mass = np.nextafter(root @ root.transpose(0, 2, 1), np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf))
+    v = rng.normal(size=(n, d)) * 10.0 ** rng.uniform(-decades, decades, (n, 1))
+    w = np.where(rng.random((n, 1)) < 0.5, v, -v)
+    entry, towards = rng.integers(0, d, n), np.where(rng.random(n) < 0.5, np.inf, -np.inf)
+    w[np.arange(n), entry] = np.nextafter(w[np.arange(n), entry], towards)
+    same = rng.random(n) < 0.1  # w = −v gains nothing and loses nothing
+    w[same] = -v[same]
+    return mass, v, w
+
+
+@needs_ocaml
+def test_the_extracted_checker_judges_as_the_exact_judge_does(checker: Path, tmp_path: Path) -> None:
+    rng, lines, gained = np.random.default_rng(11), [EXPORT_HEAD], []
+    for d, decades in ((3, 0.0), (3, 150.0), (1, 300.0), (6, 10.0)):
+        impacts = near_the_border(IMPACTS // 4, d, rng, decades)
+        lines += exported(*impacts)
+        gained += judge_gains(*impacts).gained.tolist()
+    (tmp_path / "impacts.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
+    *answers, total = done.stdout.splitlines()
+    assert [answer == "no" for answer in answers] == gained and 0.3 * IMPACTS < sum(gained) < 0.6 * IMPACTS
+    assert done.returncode == 1 and total == f"{len(gained)} impacts: {sum(gained)} gained energy"
+
+
+@needs_ocaml
+@pytest.mark.parametrize(("text", "said"), [
+    ("", "empty"), ("1 1 0 1 0 1 0\n", "first line"), (f"{EXPORT_HEAD}\n1 1 0 1 0 1\n", "line 2: too few"),
+    (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0 5\n", "too many"), (f"{EXPORT_HEAD}\n1 0.5 0 1 0 1 0\n", "whole number"),
+    (f"{EXPORT_HEAD}\n\n", "empty line"), (f"{EXPORT_HEAD}\n0\n", "below 1")])  # fmt: skip
+def test_what_is_no_file_of_impacts_is_refused(checker: Path, tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "impacts.txt").write_text(text, encoding="utf-8")
+    done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
+    assert done.returncode == 2 and said in done.stderr
+
+
+def test_exported_integers_are_the_doubles() -> None:
+    mass, v, w = np.array([[2.0, 5e-324], [-0.0, 1e308]]), np.array([[1.5, -0.1]]), np.array([[0.0, 3.0]])
+    (line,) = exported(mass, v, w)
+    size, *numbers = map(int, line.split())
+    values = [np.ldexp(float(m), e) for m, e in zip(numbers[::2], numbers[1::2], strict=True)]
+    assert size == 2 and values == [*mass.ravel(), *v.ravel(), *w.ravel()]
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.v")))
+def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, tmp_path: Path) -> None:
+    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
+    assert not any(word in source for word in ("Admitted", "admit.", "Axiom ", "Parameter ", "Abort"))
+    if reason := lacking(name):
+        pytest.skip(reason)
+    theorems = compiled(name, tmp_path)
+    assert all(theorem.holds for theorem in theorems), theorems
+
+
+def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if reason := lacking("Checker"):
+        pytest.skip(reason)
+    (tmp_path / "Wrong.v").write_text(
+        "Axiom easy : forall n : nat, n = 0.\nTheorem all : 1 = 0.\nProof. apply easy. Qed.\nPrint Assumptions all.\n")
+    (tmp_path / "Open.v").write_text("Theorem all : 1 = 0.\nProof. reflexivity. Qed.\nPrint Assumptions all.\n")
+    (folder := tmp_path / "out").mkdir()
+    monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
+    (theorem,) = compiled("Wrong", folder)
+    assert theorem.name == "all" and theorem.axioms == {"easy"} and not theorem.holds
+    with pytest.raises(IapbError, match="Unable to unify"):
+        compiled("Open", folder)

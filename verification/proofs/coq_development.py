@@ -1,0 +1,103 @@
+"""The Coq development in `verification/proofs/coq`: compiled, the assumptions it prints, and the checker made from it.
+
+`Checker.v` proves an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
+`iapb certify --export` writes. `Passive.v` proves with Flocq what the last step of the resolver rests on. What is
+missing (coqc, Flocq, OCaml) is said by name; nothing is claimed then.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from iapb.errors import IapbError, MissingDependencyError
+
+FOLDER = Path(__file__).with_name("coq")
+PATIENCE = 600.0  # seconds for one file
+# What `Print Assumptions` may name: the axioms from which Coq's library builds the real numbers.
+AXIOMS_OF_THE_REALS = frozenset({
+    "ClassicalDedekindReals.sig_forall_dec", "ClassicalDedekindReals.sig_not_dec",
+    "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
+_HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
+
+
+@dataclass(frozen=True)
+class Theorem:
+    """A theorem that Coq accepted, and the axioms that it leans on."""
+
+    name: str
+    axioms: frozenset[str]
+
+    @property
+    def holds(self) -> bool:
+        """Nothing is assumed beyond the real numbers."""
+        return self.axioms <= AXIOMS_OF_THE_REALS
+
+
+def lacking(name: str) -> str:
+    """Name what is missing to compile a file of the development; empty where nothing is."""
+    if shutil.which("coqc") is None:
+        return "coqc is not installed"
+    if "Flocq" in (FOLDER / f"{name}.v").read_text(encoding="utf-8"):
+        library = subprocess.run(["coqc", "-where"], capture_output=True, text=True, check=True).stdout.strip()
+        if not Path(library, "user-contrib", "Flocq").exists():
+            return "Flocq is not installed"
+    return ""
+
+
+def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
+    """Compile a file in `folder` and return each theorem whose assumptions it prints.
+
+    Raises
+    ------
+    MissingDependencyError
+        Coq or Flocq is not installed.
+    IapbError
+        Coq refuses the file.
+    """
+    if reason := lacking(name):
+        raise MissingDependencyError(reason.partition(" ")[0], "the Coq development", _HINT)
+    shutil.copy(FOLDER / f"{name}.v", folder)
+    said = _run(["coqc", "-q", f"{name}.v"], folder)
+    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
+    asked = [line.split()[2].rstrip(".") for line in source.splitlines() if line.startswith("Print Assumptions")]
+    answers = _assumptions(said)
+    if not asked or len(asked) != len(answers):
+        raise IapbError(f"{name}.v asks for the assumptions of {len(asked)} theorems; Coq answers {len(answers)}")
+    return tuple(Theorem(one, axioms) for one, axioms in zip(asked, answers, strict=True))
+
+
+def build_checker(folder: Path) -> Path:
+    """Extract the judge of `Checker.v` and compile the checker; return the program.
+
+    Raises
+    ------
+    MissingDependencyError
+        Coq or OCaml is not installed.
+    """
+    if shutil.which("ocamlopt") is None:
+        raise MissingDependencyError("ocamlopt", "the extracted checker", _HINT)
+    compiled("Checker", folder)
+    shutil.copy(FOLDER / "checker.ml", folder)
+    _run(["ocamlopt", "judge.mli", "judge.ml", "checker.ml", "-o", "checker"], folder)
+    return folder / "checker"
+
+
+def _run(command: list[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE)
+    if done.returncode:
+        raise IapbError(f"{' '.join(command)}: {' '.join(done.stderr.split())}")
+    return done.stdout
+
+
+def _assumptions(said: str) -> list[frozenset[str]]:
+    """The axioms that each `Print Assumptions` names: lines that start at the margin, after the word "Axioms:"."""
+    found: list[set[str]] = []
+    for line in said.splitlines():
+        if line.startswith(("Axioms:", "Closed under the global context")):
+            found.append(set())
+        elif line and not line[0].isspace() and found:
+            found[-1].add(line.split(":")[0].strip())
+    return [frozenset(one) for one in found]
