@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from iapb.certificate import certify_impacts as certify_impacts
     from iapb.checks import check_scene as check_scene
     from iapb.contact.impact import Impact as Impact
+    from iapb.contact.impact import Impacts as Impacts
     from iapb.contact.impact import resolve_impact as resolve_impact
+    from iapb.contact.impact import resolve_impacts as resolve_impacts
     from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
     from iapb.contact.impact_laws import resolve_frictional_impact as resolve_frictional_impact
     from iapb.effects import Effect as Effect
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
 _HOME = {
     "iapb.certificate": ("Certificate", "certify", "certify_impacts"),
     "iapb.checks": ("check_scene",),
-    "iapb.contact.impact": ("Impact", "resolve_impact"),
+    "iapb.contact.impact": ("Impact", "Impacts", "resolve_impact", "resolve_impacts"),
     "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
     "iapb.effects": ("Effect", "decide_effects"),
     "iapb.errors": (

@@ -141,7 +141,7 @@ class Block:
         members = [block(value) if _is_named_tuple(value) else value for value in content]
         self._content = content._replace(**dict(zip(content._fields, members, strict=True)))
         kinds = tuple(member.block_type if isinstance(member, Block) else _kind(member) for member in members)
-        self.block_type = BlockType(type(content).__name__, tuple(zip(content._fields, kinds, strict=True)))
+        self.block_type = _block_type_of(type(content).__name__, content._fields, kinds)
         words = [word for member in members for word in _layout(member)]
         self._memory = np.array(words, dtype=np.int64)
         self.address = self._memory.ctypes.data
@@ -177,10 +177,27 @@ def _is_named_tuple(value: Any) -> bool:
     return isinstance(value, tuple) and hasattr(value, "_fields")
 
 
+# Types that were found before: numba takes 20 µs to find that of an array, and a simulation has hundreds.
+_KINDS: dict[Any, types.Type] = {}
+_BLOCK_TYPES: dict[Any, tuple[BlockType, tuple[types.Type, ...]]] = {}
+
+
 def _kind(value: Any) -> types.Type:
+    if type(value) is np.ndarray:
+        known = value.dtype.str, value.ndim, value.flags.num
+        if known not in _KINDS:
+            _KINDS[known] = typeof(value)
+        return _KINDS[known]
     if isinstance(value, bool | np.bool_):
         return types.boolean
     return typeof(value)
+
+
+def _block_type_of(name: str, fields: tuple[str, ...], kinds: tuple[types.Type, ...]) -> BlockType:
+    known = name, fields, tuple(map(id, kinds))
+    if known not in _BLOCK_TYPES:  # with the kinds, so that their ids stay theirs
+        _BLOCK_TYPES[known] = BlockType(name, tuple(zip(fields, kinds, strict=True))), kinds
+    return _BLOCK_TYPES[known][0]
 
 
 def _words(kind: types.Type) -> int:
@@ -191,7 +208,8 @@ def _words(kind: types.Type) -> int:
 def _layout(value: Any) -> list[int]:
     """The field as words; an array has no reference counter: the block keeps it alive."""
     if isinstance(value, np.ndarray):
-        return [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
+        place = value.__array_interface__["data"][0]
+        return [0, 0, value.size, value.itemsize, place, *value.shape, *value.strides]
     if isinstance(value, Block):
         return [value.address]
     if isinstance(value, float):

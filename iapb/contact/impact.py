@@ -7,25 +7,31 @@ the row space of A. `factored` applies P through an orthonormal basis; `gram_pin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.compiled import Entry, block
 from iapb.contact.impact_methods import (
+    Given,
     ImpactInput,
     Method,
     Whitened,
-    check_input,
+    as_given,
     damped,
-    factored,
     gram_cholesky,
     gram_pinv,
     outcome,
     poisson,
+    refusal,
+    scaled,
+    stacked,
     svd,
 )
+from iapb.contact.kernels.border import make_border_work, whole_impact, whole_impacts
 from iapb.errors import ArgumentError, RangeError
 from iapb.names import one_of
 
@@ -33,7 +39,7 @@ Floats = NDArray[np.float64]
 
 # To add a method: write its function in a file of its own, and a line here.
 METHODS: dict[str, Method] = {
-    "factored": Method(factored, True),
+    "factored": Method(None, True),
     "gram_pinv": Method(gram_pinv, False),
     "gram_cholesky": Method(gram_cholesky, False),
     "damped": Method(damped, True),
@@ -126,23 +132,116 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     with a bound that shows it, for M as given (`iapb.contact.kernels.passive`).
     Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
-    problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)
+    given = as_given(mass_matrix, contact_jacobian, velocity, restitution)
     solve, clamped_by_default = _method(method)
-    if method == "poisson" and problem.unequal is None:
-        if problem.restitution < 0.0:
-            raise ArgumentError("restitution", problem.restitution, "a number in [0, 1] with method 'poisson'")
-        problem = replace(problem, unequal=np.full(problem.contacts, problem.restitution))
-    _check_options(method, budget, rank_tolerance, problem)
-    if clamp is not None and not isinstance(clamp, bool | np.bool_):
-        raise ArgumentError("clamp", clamp, "True, False or None")
-    clamped = clamped_by_default if clamp is None else bool(clamp)
-    limit = problem.coordinates if budget is None else int(budget)
-    if problem.unequal is not None:
-        solve, law, clamped = METHODS["poisson"].solve, "Poisson, two LCPs", clamp is None or bool(clamp)
-    else:
-        law = "Newton, equality"
+    if method == "poisson" and given.unequal is None:
+        if given.restitution < 0.0:
+            raise ArgumentError("restitution", given.restitution, "a number in [0, 1] with method 'poisson'")
+        given = given._replace(unequal=np.full(len(given.contact_jacobian), given.restitution))
+    _check_options(method, budget, rank_tolerance, given.unequal is None)
+    clamped = clamped_by_default if clamp is None else _checked_clamp(clamp)
+    limit = len(given.velocity) if budget is None else int(budget)
+    rows_used = None if budget is None else limit
+    law = "Newton, equality"
+    if given.unequal is not None:
+        solve, law, clamped = poisson, "Poisson, two LCPs", clamp is None or bool(clamp)
+    elif solve is None or not len(given.contact_jacobian):
+        return _factored(given, rank_tolerance, limit, clamped, method, rows_used)
+    problem = scaled(given)
     answer = solve(problem, limit, clamped, rank_tolerance)
-    return _as_impact(problem, answer, clamped, method=method, law=law, rows_used=None if budget is None else limit)
+    return _as_impact(problem, answer, clamped, method=method, law=law, rows_used=rows_used)
+
+
+# How the kernel says that an impact ends.
+_STATUS = ("complete", "budget", "cancelled")
+
+
+def _factored(given: Given, tolerance: float | None, limit: int, clamped: bool, method: str,
+              rows_used: int | None) -> Impact:
+    """(21) through an orthonormal basis of A's row space: checks, scaling, impact and energy in one compiled call."""
+    M, J, v, e, _ = given
+    d, c = len(v), len(J)
+    v_plus, momentum, impulses = np.empty(d), np.empty(d), np.empty(c)
+    wrong, (rank, status), factor, (change, lower, upper) = _entries()[0](
+        M, J, v, e, 0.0 if tolerance is None else float(tolerance), limit, clamped, _scratch(d, c), v_plus, momentum,
+        impulses)
+    if wrong[0]:
+        raise refusal(wrong, given, method=method)
+    return Impact(v_plus, momentum, impulses, rank, change, (lower, upper), factor, _STATUS[status], method,
+                  "Newton, equality", rows_used)
+
+
+@lru_cache(maxsize=8)
+def _scratch(coordinates: int, contacts: int) -> Any:
+    """Scratch that calls share: a kernel holds the interpreter's lock from start to end."""
+    return block(make_border_work(coordinates, contacts))
+
+
+@lru_cache(maxsize=1)
+def _entries() -> tuple[Any, Any]:
+    """The machine code of one impact and of many, entered without numba's look-up of types."""
+    work, e, count = block(make_border_work(1, 1)), np.zeros(1), np.zeros((1, 2), np.int64)
+    flat, deep = np.zeros((1, 1)), np.zeros((1, 1, 1))
+    one = Entry(whole_impact).taking(flat, flat, e, 0.0, 0.0, 1, True, work, e, e, e)
+    many = Entry(whole_impacts).taking(deep, deep, flat, e, 0.0, 1, True, work, flat, flat, flat, count, flat)
+    return one, many
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """What n impacts of d coordinates and c contacts do: the attributes of `Impact`, one line per impact.
+
+    Attributes
+    ----------
+    velocity, generalized_impulse : (n, d).
+    impulses : (n, c).
+    rank, energy_change, clamp : (n,).
+    energy_interval : (n, 2).
+    status : (n,) texts.
+    """
+
+    velocity: Floats
+    generalized_impulse: Floats
+    impulses: Floats
+    rank: NDArray[np.int64]
+    energy_change: Floats
+    energy_interval: Floats
+    clamp: Floats
+    status: NDArray[np.str_]
+
+
+def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
+                    restitution: ArrayLike, *, budget: int | None = None, clamp: bool = True,
+                    rank_tolerance: float | None = None) -> Impacts:
+    """Resolve n impacts of one size in one call: to the bit what `resolve_impact` with ``factored`` returns for each.
+
+    Parameters
+    ----------
+    mass_matrices : (n, d, d).
+    contact_jacobians : (n, c, d).
+    velocities : (n, d).
+    restitution : one number in [−1, 1], or (n,), one per impact.
+    budget, clamp, rank_tolerance : see `resolve_impact`; for all n.
+
+    Raises
+    ------
+    ArgumentError, RangeError
+        As `resolve_impact`, for the first impact that is refused; the index in the argument's name begins with its
+        number: ``mass_matrices[17, 0, 0]``.
+    """
+    M, J, v, e = stacked(mass_matrices, contact_jacobians, velocities, restitution)
+    _check_options("factored", budget, rank_tolerance, True)
+    clamped = _checked_clamp(clamp)
+    n, c, d = J.shape
+    v_plus, momentum, impulses = np.empty((n, d)), np.empty((n, d)), np.empty((n, c))
+    counts, numbers = np.empty((n, 2), np.int64), np.empty((n, 4))
+    wrong, at = _entries()[1](
+        M, J, v, e, 0.0 if rank_tolerance is None else float(rank_tolerance), d if budget is None else int(budget),
+        clamped, _scratch(d, c), v_plus, momentum, impulses, counts, numbers)
+    if wrong[0]:
+        raise refusal(wrong, Given(M[at], J[at], v[at], float(e[at]), None), (at,))
+    return Impacts(v_plus, momentum, impulses, counts[:, 0], numbers[:, 1], numbers[:, 2:], numbers[:, 0],
+                   np.array(_STATUS)[counts[:, 1]])
 
 
 def _method(method: Any) -> tuple[Any, bool]:
@@ -151,11 +250,17 @@ def _method(method: Any) -> tuple[Any, bool]:
     return METHODS[method]
 
 
-def _check_options(method: str, budget: Any, tolerance: Any, problem: ImpactInput) -> None:
+def _checked_clamp(clamp: Any) -> bool:
+    if not isinstance(clamp, bool | np.bool_):
+        raise ArgumentError("clamp", clamp, "True, False or None")
+    return bool(clamp)
+
+
+def _check_options(method: str, budget: Any, tolerance: Any, equal: bool) -> None:
     if budget is not None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 0:
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
-        if method != "factored" or problem.unequal is not None:
+        if method != "factored" or not equal:
             raise ArgumentError("budget", budget, "None: only method 'factored' with equal restitution is anytime")
     number = isinstance(tolerance, float | int | np.floating)
     if tolerance is not None and not (number and 0.0 < tolerance < 1.0):
@@ -165,17 +270,14 @@ def _check_options(method: str, budget: Any, tolerance: Any, problem: ImpactInpu
 def _as_impact(problem: ImpactInput, answer: Whitened, clamped: bool, *, method: str, law: str,
                rows_used: int | None) -> Impact:
     """Undo the power-of-two scaling and report the energy of what is really returned."""
-    found = outcome(problem, answer.v_plus, clamped)
-    momentum = problem.unscale_momentum(answer.momentum)
-    impulses = problem.unscale_impulses(answer.impulses)
-    if found.factor != 1.0:
-        momentum, impulses = found.factor * momentum, found.factor * impulses
-    for quantity, array in (("velocity", found.velocity), ("generalized_impulse", momentum), ("impulses", impulses)):
+    found = outcome(problem, answer.v_plus, answer.momentum, answer.impulses, clamped)
+    for quantity, array in (("velocity", found.velocity), ("generalized_impulse", found.momentum),
+                            ("impulses", found.impulses)):
         if not np.isfinite(array).all():
             raise RangeError(quantity, f"the {method} impact of these magnitudes is above 1.8e308")
     if not math.isfinite(found.energy_change):
         raise RangeError("energy_change", "the kinetic energy of these magnitudes is above 1.8e308")
     clamp = answer.clamp * found.factor
     status = "cancelled" if clamp == 0.0 or problem.underflows and problem.contacts else answer.status
-    return Impact(found.velocity, momentum, impulses, answer.rank, found.energy_change, found.energy_interval, clamp,
-                  status, method, law, rows_used)
+    return Impact(found.velocity, found.momentum, found.impulses, answer.rank, found.energy_change,
+                  found.energy_interval, clamp, status, method, law, rows_used)

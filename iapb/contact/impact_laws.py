@@ -112,12 +112,12 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
                clamp: float, met: bool) -> FrictionalImpact:
     """Undo the scaling by powers of two, and refuse what overflows."""
     problem = given.problem
-    out = outcome(problem, v_plus, clamped=True)
+    out = outcome(problem, v_plus, momentum, np.zeros(problem.contacts), clamped=True)
     scale = np.ldexp(1.0, problem.velocity_exponent) * out.factor
     clamp *= out.factor
     status = "complete" if met else "reduced"
     found = FrictionalImpact(
-        out.velocity, problem.unscale_momentum(momentum) * out.factor, scale * impulses, scale * p_t,
+        out.velocity, out.momentum, scale * impulses, scale * p_t,
         out.energy_change, out.energy_interval, share, clamp, "cancelled" if clamp == 0.0 else status,
     )
     for name in ("velocity", "generalized_impulse", "impulses", "tangential_impulses"):

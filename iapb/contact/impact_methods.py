@@ -1,9 +1,4 @@
-"""The impact as given, checked and scaled by powers of two, and the methods that `resolve_impact` offers on it.
-
-Scaling every coordinate to a unit diagonal of M, every row to a largest entry near one and the velocity to a largest
-entry near one is exact in binary arithmetic. So no intermediate over- or underflows, and a change of units or of
-row scale by a power of two changes no bit of the result.
-"""
+"""The impact as given, checked and scaled by powers of two, and the methods that `resolve_impact` offers on it."""
 
 from __future__ import annotations
 
@@ -16,30 +11,36 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.kernels.impact import (
-    ImpactWork,
-    apply_change,
-    apply_projected_change,
-    factored_impact,
-    make_impact_work,
-    rank_tolerance,
+from iapb.compiled import block
+from iapb.contact.kernels import border
+from iapb.contact.kernels.border import (
+    least_norm_impulses,
+    make_border_work,
+    row_sizes,
+    scale_impact,
+    unscale_impact,
 )
-from iapb.contact.kernels.passive import gain_enclosure, passive_step
-from iapb.contact.kernels.projector import minimum_norm_impulses, unit_columns
+from iapb.contact.kernels.impact import apply_change, apply_projected_change, rank_tolerance
+from iapb.contact.kernels.projector import unit_columns
 from iapb.contact.kernels.unilateral import make_push_work, poisson_impact
 from iapb.dense import product, solve
-from iapb.double_double import kinetic_energies
-from iapb.errors import ArgumentError, SolverError
-from iapb.mechanics.kernels.cholesky import cholesky, to_whitened, whiten_columns
+from iapb.errors import ArgumentError, RangeError, SolverError
+from iapb.mechanics.kernels.cholesky import to_whitened, whiten_columns
 
 Floats = NDArray[np.float64]
-Exponents = NDArray[np.int32]
+Exponents = NDArray[np.int64]
+_DOUBLE = np.dtype(np.float64)
+_PLURAL = {"mass_matrix": "mass_matrices", "contact_jacobian": "contact_jacobians", "velocity": "velocities"}
 
-# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) is rounding of whoever computed M: energies are those of M as given, in
-# which the skew part cancels; the factor is that of the symmetric part.
-_SYMMETRY_TOLERANCE = 1e-9
-_LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
-_EXACT = 1000  # binary exponents that an entry may lie below the largest and still be scaled exactly
+
+class Given(NamedTuple):
+    """An impact as given: real numbers in arrays that fit each other."""
+
+    mass_matrix: Floats  # (d, d)
+    contact_jacobian: Floats  # (c, d)
+    velocity: Floats  # (d,)
+    restitution: float
+    unequal: Floats | None  # (c,) where restitution differs between contacts
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,9 @@ class ImpactInput:
     coordinate_exponent: Exponents  # s (d,)
     row_exponent: Exponents  # r (c,)
     velocity_exponent: int  # k
-    given_mass: Floats  # (d, d) M and
-    given_velocity: Floats  # (d,) v in the caller's units
     underflows: bool  # entries of v are so far apart that scaling rounds the small ones
+    given: Given
+    work: Any  # the block of `iapb.contact.kernels.border.BorderWork` that holds all this
 
     @property
     def coordinates(self) -> int:
@@ -69,86 +70,121 @@ class ImpactInput:
         """c."""
         return len(self.contact_jacobian)
 
-    def unscale_velocity(self, v: Floats) -> Floats:
-        """Velocity in the caller's units."""
-        return _ldexp(v, self.coordinate_exponent + self.velocity_exponent)
-
-    def scale_velocity(self, v: Floats) -> Floats:
-        """Velocity in scaled coordinates."""
-        return _ldexp(v, -(self.coordinate_exponent + self.velocity_exponent))
-
-    def unscale_momentum(self, momentum: Floats) -> Floats:
-        """Generalized impulse in the caller's units."""
-        return _ldexp(momentum, self.velocity_exponent - self.coordinate_exponent)
-
-    def unscale_impulses(self, p: Floats) -> Floats:
-        """Impulses along the caller's rows."""
-        return _ldexp(p, self.row_exponent + self.velocity_exponent)
-
-    def unscale_energy(self, energy: float) -> float:
-        """Energy in the caller's units."""
-        return _times_power(energy, 2 * self.velocity_exponent)
-
 
 def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
                 restitution: ArrayLike) -> ImpactInput:
     """Check shapes, finiteness, symmetry and definiteness, then scale; raise ArgumentError by name."""
-    M = _finite("mass_matrix", mass_matrix, 2)
-    d = len(M)
-    if d == 0 or M.shape != (d, d):
-        raise ArgumentError("mass_matrix", M.shape, "a square matrix with at least one row")
-    v = _finite("velocity", velocity, 1)
-    if v.shape != (d,):
-        raise ArgumentError("velocity", v.shape, f"shape ({d},), one entry per row of mass_matrix")
-    J = np.zeros((0, d)) if _is_empty(contact_jacobian) else _finite("contact_jacobian", contact_jacobian, 2)
-    if J.shape[1] != d:
-        raise ArgumentError("contact_jacobian", J.shape, f"shape (contacts, {d})")
-    e, unequal = _checked_restitution(restitution, len(J))
-    return _scaled(M, J, v, e, unequal)
+    return scaled(as_given(mass_matrix, contact_jacobian, velocity, restitution))
 
 
-@dataclass(frozen=True)
-class Outcome:
+def scaled(given: Given) -> ImpactInput:
+    """Check the numbers of an impact and scale it."""
+    work = block(make_border_work(len(given.velocity), len(given.contact_jacobian)))
+    wrong = scale_impact(given.mass_matrix, given.contact_jacobian, given.velocity, work)
+    if wrong[0]:
+        raise refusal(wrong, given)
+    return ImpactInput(
+        mass_matrix=work.mass, lower=work.lower, contact_jacobian=np.ascontiguousarray(work.rows.T),
+        velocity=work.velocity, restitution=given.restitution, unequal=given.unequal,
+        coordinate_exponent=work.coordinate_exponent, row_exponent=work.row_exponent,
+        velocity_exponent=int(work.velocity_exponent[0]), underflows=bool(work.underflows[0]), given=given, work=work)
+
+
+class Outcome(NamedTuple):
     """An impact in the caller's units, exactly passive where it is clamped."""
 
     velocity: Floats
+    momentum: Floats
+    impulses: Floats
     energy_change: float
     energy_interval: tuple[float, float]
     factor: float  # of the impulses: below 1 where rounding in the caller's units needed a further step
 
 
-def outcome(problem: ImpactInput, v_plus: Floats, clamped: bool) -> Outcome:
-    """Velocity and energy in the caller's units; the last step again where scaling back rounded v⁺ the wrong way."""
-    M, v, factor = np.ascontiguousarray(problem.given_mass), problem.given_velocity, 1.0
-    velocity = problem.unscale_velocity(v_plus)
-    if not np.isfinite(velocity).all():
-        return Outcome(velocity, math.nan, (math.nan, math.nan), factor)
-    lower, upper, exponent = gain_enclosure(M, v, velocity)
-    if clamped and not upper <= 0.0:
-        candidate = velocity - v
-        factor = passive_step(M, v, candidate, 1.0, velocity)
-        v_plus = problem.scale_velocity(velocity)
-        lower, upper, exponent = gain_enclosure(M, v, velocity)
-    _, change = kinetic_energies(problem.mass_matrix, problem.velocity, v_plus)
-    interval = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
-    return Outcome(velocity, min(max(problem.unscale_energy(change), interval[0]), interval[1]), interval, factor)
+def outcome(problem: ImpactInput, v_plus: Floats, momentum: Floats, impulses: Floats, clamped: bool) -> Outcome:
+    """Undo the scaling; the last step again where scaling back rounded v⁺ the wrong way."""
+    work, given = problem.work, problem.given
+    work.v_plus[:], work.momentum[:], work.impulses[:] = v_plus, momentum, impulses
+    results = np.empty(problem.coordinates), np.empty(problem.coordinates), np.empty(problem.contacts)
+    factor, energies = unscale_impact(given.mass_matrix, given.velocity, clamped, work, *results)
+    return Outcome(*results, energies[0], energies[1:], factor)
 
 
-def _outward(value: float, exponent: int, towards: float) -> float:
-    """value · 2^exponent, one step outwards for what rounding took; a bound of no gain or no loss stays one."""
-    bound = math.nextafter(_times_power(value, exponent), towards)
-    return min(bound, 0.0) if value <= 0.0 < towards else max(bound, 0.0) if value >= 0.0 > towards else bound
+def as_given(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
+             restitution: ArrayLike) -> Given:
+    """Check types, shapes and the range of e."""
+    M = _array("mass_matrix", mass_matrix, 2)
+    d = len(M)
+    if d == 0 or M.shape != (d, d):
+        raise ArgumentError("mass_matrix", M.shape, "a square matrix with at least one row")
+    v = _array("velocity", velocity, 1)
+    if v.shape != (d,):
+        raise ArgumentError("velocity", v.shape, f"shape ({d},), one entry per row of mass_matrix")
+    J = np.zeros((0, d)) if _is_empty(contact_jacobian) else _array("contact_jacobian", contact_jacobian, 2)
+    if J.shape[1] != d:
+        raise ArgumentError("contact_jacobian", J.shape, f"shape (contacts, {d})")
+    return Given(M, J, v, *_checked_restitution(restitution, len(J)))
 
 
-def _times_power(value: float, exponent: int) -> float:
-    try:
-        return math.ldexp(value, exponent)
-    except OverflowError:
-        return math.copysign(math.inf, value)
+def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
+            restitution: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
+    """Check types, shapes and the range of e of n impacts; e becomes (n,)."""
+    M, v = _array("mass_matrices", mass_matrices, 3), _array("velocities", velocities, 2)
+    n, d = v.shape
+    if d == 0 or M.shape != (n, d, d):
+        raise ArgumentError("mass_matrices", M.shape, f"shape ({n}, {d}, {d}), one matrix per line of velocities")
+    J = _array("contact_jacobians", contact_jacobians, 3)
+    if J.shape[0] != n or J.shape[2] != d:
+        raise ArgumentError("contact_jacobians", J.shape, f"shape ({n}, contacts, {d})")
+    e = _real_numbers(restitution)
+    if e is None or e.shape not in ((), (n,)):
+        raise ArgumentError("restitution", restitution, f"a real number or shape ({n},), one per impact")
+    values = np.ascontiguousarray(np.broadcast_to(e.astype(np.float64), n))
+    wrong = np.flatnonzero(~((values >= -1.0) & (values <= 1.0)))
+    if len(wrong):
+        raise ArgumentError(f"restitution[{wrong[0]}]" if e.ndim else "restitution", float(values[wrong[0]]),
+                            "a number in [-1, 1]")
+    return M, J, v, values
+
+
+def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = (),
+            method: str = "factored") -> ArgumentError | RangeError:
+    """What the kernel found wrong, and where, as an error; `which` : the number of the impact, where there are many."""
+    reason, i, j = wrong
+
+    def name(argument: str, *place: int) -> str:
+        place = (*which, *place)
+        argument = _PLURAL.get(argument, argument) if which else argument
+        return f"{argument}[{', '.join(map(str, place))}]" if place else argument
+
+    M, J, v = given.mass_matrix, given.contact_jacobian, given.velocity
+    entry, found = name("mass_matrix", i, j), float(M[i, j]) if reason <= border.ASYMMETRIC and i < len(M) > j else 0.0
+    if reason == border.MASS_NOT_FINITE:
+        return ArgumentError(entry, found, "a finite number")
+    if reason == border.VELOCITY_NOT_FINITE:
+        return ArgumentError(name("velocity", i), float(v[i]), "a finite number")
+    if reason == border.ROWS_NOT_FINITE:
+        return ArgumentError(name("contact_jacobian", i, j), float(J[i, j]), "a finite number")
+    if reason == border.DIAGONAL:
+        return ArgumentError(entry, found, "a positive diagonal entry")
+    if reason == border.ENTRY:
+        return ArgumentError(entry, found, "a positive definite matrix")
+    if reason == border.ASYMMETRIC:
+        return ArgumentError(entry, found, f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
+    if reason == border.NOT_DEFINITE:
+        return ArgumentError(name("mass_matrix"), M,
+                             f"a positive definite matrix (pivot {i} of Cholesky is not positive)")
+    if reason == border.ENERGY_RANGE:
+        return RangeError(name("energy_change"), "the kinetic energy of these magnitudes is above 1.8e308")
+    quantity = {border.VELOCITY_RANGE: "velocity", border.MOMENTUM_RANGE: "generalized_impulse",
+                border.IMPULSE_RANGE: "impulses"}[reason]
+    return RangeError(name(quantity), f"the {method} impact of these magnitudes is above 1.8e308")
 
 
 def _is_empty(rows: ArrayLike) -> bool:
     """[] and zeros(0) have no second dimension to check."""
+    if type(rows) is np.ndarray and rows.ndim == 2:
+        return False
     given = _real_numbers(rows)
     return given is not None and given.shape == (0,)
 
@@ -166,7 +202,10 @@ def _real_numbers(value: Any) -> NDArray[Any] | None:
     return given if given.dtype.kind in "fiu" else None
 
 
-def _finite(name: str, value: Any, dimensions: int) -> Floats:
+def _array(name: str, value: Any, dimensions: int) -> Floats:
+    """A contiguous array of doubles; not yet checked to be finite."""
+    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions and value.flags.carray:
+        return value
     given = _real_numbers(value)
     if given is None:
         raise ArgumentError(name, value, "an array of real numbers")
@@ -176,10 +215,7 @@ def _finite(name: str, value: Any, dimensions: int) -> Floats:
         raise ArgumentError(name, value, "an array of finite numbers") from None
     if array.ndim != dimensions:
         raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
-    if not np.isfinite(array).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ArgumentError(f"{name}[{', '.join(map(str, where))}]", float(array[where]), "a finite number")
-    return array
+    return np.require(array, requirements=["C", "A"])
 
 
 def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, Floats | None]:
@@ -205,67 +241,6 @@ def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, 
     return 0.0, values
 
 
-def _exponents(array: Floats) -> Exponents:
-    """Binary exponent of every entry; zeros get one that never is a maximum."""
-    mantissa, exponents = np.frexp(array)
-    exponents[mantissa == 0.0] = _LOWEST_EXPONENT
-    return exponents
-
-
-def _ldexp(array: Floats, exponent: Exponents) -> Floats:
-    """array · 2^exponent; overflow becomes infinity for the caller to refuse.
-
-    Exponents are sums of a few of doubles, far inside int32; the marks of zeros, some -1e5 each, are too.
-    """
-    with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(array, exponent)
-
-
-def scaling(diagonal: Floats, J: Floats, v: Floats) -> tuple[Exponents, Exponents, Exponents]:
-    """Exponents s (..., d), r (..., c) and k (...) of `ImpactInput`, of one impact or many; `diagonal`: of M."""
-    s = -(np.frexp(diagonal)[1] // 2)
-    k = (_exponents(v) - s).max(axis=-1, initial=_LOWEST_EXPONENT)
-    row = -(_exponents(J) + s[..., None, :]).max(axis=-1, initial=_LOWEST_EXPONENT)
-    row[np.abs(row) > abs(_LOWEST_EXPONENT) // 2] = 0  # a row of zeros
-    return s, row, np.where(k <= _LOWEST_EXPONENT // 2, 0, k)
-
-
-def _scaled(M: Floats, J: Floats, v: Floats, e: float, unequal: Floats | None) -> ImpactInput:
-    diagonal = M.diagonal()
-    if not diagonal.min() > 0.0:
-        k = int(np.argmin(diagonal))
-        raise ArgumentError(f"mass_matrix[{k}, {k}]", float(diagonal[k]), "a positive diagonal entry")
-    s, row, of_velocity = scaling(diagonal, J, v)
-    mass, lower = _factored(M, _ldexp(M, s[:, None] + s))
-    size, k = _exponents(v) - s, int(of_velocity)
-    underflows = bool(((size < k - _EXACT) & (size > _LOWEST_EXPONENT // 2)).any())
-    return ImpactInput(
-        mass_matrix=mass, lower=lower, contact_jacobian=_ldexp(J, row[:, None] + s), velocity=_ldexp(v, -(s + k)),
-        restitution=e, unequal=unequal, coordinate_exponent=s, row_exponent=row, velocity_exponent=k,
-        given_mass=M, given_velocity=v, underflows=underflows)
-
-
-def _factored(M: Floats, scaled: Floats) -> tuple[Floats, Floats]:
-    """The scaled M and the Cholesky factor of its symmetric part; M as given is for messages."""
-    if not (scaled.max() <= 2.0 and scaled.min() >= -2.0):  # |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
-        i, j = np.unravel_index(int(np.argmax(np.abs(scaled))), M.shape)
-        raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]), "a positive definite matrix")
-    mass = symmetric = np.ascontiguousarray(scaled)
-    if not (scaled == scaled.T).all():
-        skew = np.abs(scaled - scaled.T)
-        if skew.max() > _SYMMETRY_TOLERANCE:
-            i, j = np.unravel_index(int(np.argmax(skew)), M.shape)
-            raise ArgumentError(f"mass_matrix[{i}, {j}]", float(M[i, j]),
-                                f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
-        symmetric = np.ascontiguousarray(0.5 * (scaled + scaled.T))
-    lower = np.zeros_like(symmetric)
-    pivot = cholesky(symmetric, lower)
-    if pivot:
-        raise ArgumentError("mass_matrix", M, f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)")
-    return mass, lower
-
-
-
 PINV_CUTOFF = 1e-15  # numpy's classical default, the "as printed" reading of (20)
 DAMPING = 1e-8  # λ as a share of the largest diagonal entry of W: half of the digits
 
@@ -282,19 +257,23 @@ class Whitened(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method: its solver (problem, row budget, clamped, tolerance) and whether it clamps by default."""
+    """A method: its solver (problem, row budget, clamped, tolerance) and whether it clamps by default.
 
-    solve: Callable[[ImpactInput, int, bool, float | None], Whitened]
+    Without a solver it is (21) in factored form, compiled as a whole (`iapb.contact.kernels.border`).
+    """
+
+    solve: Callable[[ImpactInput, int, bool, float | None], Whitened] | None
     clamped: bool
 
 
-def _prepared(problem: ImpactInput) -> ImpactWork:
-    work = make_impact_work(problem.coordinates, max(1, problem.contacts))
-    work.columns[:, : problem.contacts] = problem.contact_jacobian.T
+def _prepared(problem: ImpactInput) -> Any:
+    """The scratch of the problem, with its rows as columns."""
+    work = problem.work.impact
+    work.columns[:, : problem.contacts] = problem.work.rows
     return work
 
 
-def _whitened_rows(problem: ImpactInput, work: ImpactWork) -> Floats:
+def _whitened_rows(problem: ImpactInput, work: Any) -> Floats:
     """Unit rows of A = J L⁻ᵀ; fills work.u, work.rows and work.length as `factored_impact` would."""
     to_whitened(problem.lower, problem.velocity, work.u)
     whiten_columns(problem.lower, work.columns, problem.contacts)
@@ -305,47 +284,6 @@ def _whitened_rows(problem: ImpactInput, work: ImpactWork) -> Floats:
 
 def _tolerance(problem: ImpactInput, given: float | None) -> float:
     return float(rank_tolerance(problem.lower)) if given is None else float(given)
-
-
-def factored(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(21) through an orthonormal basis of A's row space (design: factored form)."""
-    work, d, c = _prepared(problem), problem.coordinates, problem.contacts
-    v_plus, momentum, share = np.empty(d), np.empty(d), _tolerance(problem, tolerance)
-    rank, clamp = factored_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.restitution, c,
-                                  share, budget, clamped, work, v_plus, momentum)
-    ended_early = rank == budget < d and bool((work.size[:c] > share * share).any())
-    status = "budget" if ended_early else "complete"
-    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp, status)
-
-
-def _least_norm(problem: ImpactInput, work: ImpactWork, rank: int) -> Floats:
-    """The p of least norm along the *caller's* rows with Aᵀp = Δu, in scaled rows p' = 2^−r p.
-
-    Where row sizes differ, the least norm of p is found first, and what its rounding leaves of Δu is added by the
-    least norm of p', which no difference of sizes harms.
-    """
-    c, size = problem.contacts, _row_size(problem)
-    impulses = size * _least_norm_of(work, work.length[:c] * size, rank, work.change)
-    if (size == 1.0).all():
-        return impulses
-    left = work.change - product(work.rows[:, :c] * work.length[:c], impulses)
-    return impulses + _least_norm_of(work, work.length[:c], rank, left)
-
-
-def _row_size(problem: ImpactInput) -> Floats:
-    """2^−r (c,), largest 1: the caller's rows are these multiples of the scaled ones, up to one common factor."""
-    present = problem.contact_jacobian.any(axis=1)
-    least = np.min(problem.row_exponent, where=present, initial=np.iinfo(np.int32).max)
-    exponent = np.where(present, least - problem.row_exponent, 0)
-    return np.ldexp(1.0, np.maximum(exponent, -1000))  # below 2^-1000 a row is as good as absent
-
-
-def _least_norm_of(work: ImpactWork, length: Floats, rank: int, change: Floats) -> Floats:
-    d, c = len(change), len(length)
-    impulses = np.zeros(c)
-    minimum_norm_impulses(work.rows, length, c, work.basis, rank, change, impulses, work.columns, np.empty((d, d)),
-                          np.empty(d))
-    return impulses
 
 
 def _from_impulses(problem: ImpactInput, impulses: NDArray[np.floating], rank: int, clamped: bool) -> Whitened:
@@ -369,9 +307,8 @@ def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float
 
     A comparison: LAPACK's last bits, which W's condition number amplifies, depend on the processor.
     """
-    if problem.contacts == 0:
-        return factored(problem, 0, clamped, tolerance)
-    size = _row_size(problem)
+    row_sizes(problem.work)
+    size = problem.work.size
     W, gamma = _delassus(problem, size)
     cutoff = PINV_CUTOFF if tolerance is None else tolerance
     singular_values = np.linalg.svd(W, compute_uv=False)
@@ -385,8 +322,6 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
 
     A comparison: by LAPACK, whose last bits depend on the processor.
     """
-    if problem.contacts == 0:
-        return factored(problem, 0, clamped, tolerance)
     W, gamma = _delassus(problem)
     unit = W / np.sqrt(np.outer(np.diag(W), np.diag(W))) if np.all(np.diag(W) > 0.0) else np.zeros_like(W)
     smallest = float(np.linalg.eigvalsh(0.5 * (unit + unit.T))[0])
@@ -402,8 +337,6 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
 
 def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
     """p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps some of its approach, none gains energy."""
-    if problem.contacts == 0:
-        return factored(problem, 0, clamped, tolerance)
     work = _prepared(problem)
     rows = _whitened_rows(problem, work) * work.length[: problem.contacts, None]
     W, gamma = product(rows, rows.T), product(problem.contact_jacobian, problem.velocity)
@@ -427,7 +360,8 @@ def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | Non
     work.change[:] = -(1.0 + problem.restitution) * (right[:rank].T @ (right[:rank] @ work.u))
     clamp = apply_projected_change(problem.mass_matrix, problem.lower, problem.velocity, rank, clamped, work, v_plus,
                                    momentum)
-    return Whitened(v_plus, momentum, _least_norm(problem, work, rank), rank, clamp)
+    least_norm_impulses(problem.work, rank)
+    return Whitened(v_plus, momentum, problem.work.impulses, rank, clamp)
 
 
 # Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two
@@ -443,8 +377,7 @@ def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float |
                                  work, make_push_work(d, c), impulses, v_plus, momentum)
     if rank < 0:
         raise SolverError(f"Poisson's law: the active-set method did not converge on {c} contacts")
-    fresh = _prepared(problem)
-    _whitened_rows(problem, fresh)
-    closing = fresh.length[:c] * math.sqrt(sum(fresh.u * fresh.u)) * _UNSOLVED
+    _whitened_rows(problem, _prepared(problem))
+    closing = work.length[:c] * math.sqrt(sum(work.u * work.u)) * _UNSOLVED
     met = clamp >= 1.0 - _UNSOLVED and bool(np.all(product(problem.contact_jacobian, v_plus) >= -closing))
     return Whitened(v_plus, momentum, impulses, rank, clamp, "complete" if met else "not solved")

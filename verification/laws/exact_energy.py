@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb import resolve_impacts
 from iapb.certificate import judge_gains
 from iapb.compiled import kernel
-from iapb.contact.impact_methods import scaling
-from iapb.contact.kernels.passive import gain, never_gains, passive_step
+from iapb.contact.kernels.passive import gain
 from iapb.double_double import kinetic_energies
 from verification.proofs.attack_kernel import resolve_batch
 
@@ -68,22 +68,11 @@ class ExactEnergy:
 
 def resolved(impacts: Impacts, clamped: bool = True, *, scale: bool = False) -> tuple[Floats, Floats]:
     """Return v⁺ (n, d) and the clamps (n,); `scale`: by powers of two before and after, as `resolve_impact` does."""
-    n, d, _ = impacts.rows.shape
-    given, back = impacts, np.zeros((n, d), np.int32)
-    if scale:
-        diagonal = np.diagonal(impacts.mass, axis1=1, axis2=2)
-        s, row, k = scaling(diagonal, impacts.rows.transpose(0, 2, 1), impacts.v)
-        back = s + k[:, None]
-        given = impacts._replace(
-            mass=np.ldexp(impacts.mass, s[:, :, None] + s[:, None, :]), v=np.ldexp(impacts.v, -back),
-            rows=np.ldexp(impacts.rows, s[:, :, None] + row[:, None, :]))  # fmt: skip
-    v_plus, clamps = resolve_batch(given.mass, given.rows, given.v, given.restitution, clamped)
-    v_plus = np.ldexp(v_plus, back)
-    if scale and clamped:  # scaling back may round v⁺ the wrong way: the last step again
-        for i, (mass, v, after) in enumerate(zip(impacts.mass, impacts.v, v_plus, strict=True)):
-            if not never_gains(mass, v, after):
-                clamps[i] *= passive_step(mass, v, after - v, 1.0, after)
-    return v_plus, clamps
+    if not scale:
+        return resolve_batch(impacts.mass, impacts.rows, impacts.v, impacts.restitution, clamped)
+    found = resolve_impacts(impacts.mass, impacts.rows.transpose(0, 2, 1), impacts.v, impacts.restitution,
+                            clamp=clamped)
+    return found.velocity, found.clamp
 
 
 def ordinary(rng: np.random.Generator, n: int, d: int, c: int, decades: float = 3.0) -> Impacts:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb import ArgumentError, IapbError, RangeError, resolve_impact
+from iapb import ArgumentError, IapbError, RangeError, resolve_impact, resolve_impacts
 
 
 def impact_of(seed: int, d: int = 5, c: int = 7) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -222,3 +222,60 @@ def test_every_error_has_the_common_root() -> None:
 @pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])
 def test_no_rows_in_any_form_leave_the_velocity_as_it_is(rows: object) -> None:
     assert np.array_equal(call(contact_jacobian=rows).velocity, call(contact_jacobian=np.zeros((0, 2))).velocity)
+
+
+@given(seed=st.integers(0, 10_000), d=st.integers(1, 6), c=st.integers(0, 8), clamp=st.booleans(),
+       budget=st.none() | st.integers(0, 6), tolerance=st.sampled_from([None, 1e-6]))
+def test_many_at_once_are_those_one_by_one_bit_for_bit(
+    seed: int, d: int, c: int, clamp: bool, budget: int | None, tolerance: float | None
+) -> None:
+    rng = np.random.default_rng(seed)
+    n = 5
+    root = rng.normal(size=(n, d, d))
+    masses = root @ root.transpose(0, 2, 1) + 10.0 ** rng.uniform(-9, 0) * np.eye(d)
+    rows = rng.normal(size=(n, c, d)) * 10.0 ** rng.uniform(-6, 6, (n, c, 1))
+    rows[:, 2:4] = rows[:, 1:2]
+    v, e = rng.normal(size=(n, d)) * 10.0 ** rng.uniform(-300, 9, (n, 1)), rng.uniform(-1.0, 1.0, n)
+    options = {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance}
+    found = resolve_impacts(masses, rows, v, e, **options)  # type: ignore[arg-type]
+    for k in range(n):
+        single = resolve_impact(masses[k], rows[k], v[k], e[k], **options)  # type: ignore[arg-type]
+        for name in ("velocity", "generalized_impulse", "impulses", "energy_interval", "rank", "energy_change", "clamp",
+                     "status"):
+            np.testing.assert_array_equal(getattr(found, name)[k], getattr(single, name), strict=False)
+
+
+STACKED = {"mass_matrices": np.array([np.eye(2)] * 3), "contact_jacobians": np.ones((3, 1, 2)),
+           "velocities": -np.ones((3, 2)), "restitution": 0.5}
+
+
+@pytest.mark.parametrize(("argument", "value", "named"), [
+    ("mass_matrices", np.eye(2), "mass_matrices"),
+    ("mass_matrices", np.ones((2, 2, 2)), "mass_matrices"),
+    ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, np.nan]]], "mass_matrices[2, 1, 1]"),
+    ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "mass_matrices[1]"),
+    ("contact_jacobians", np.ones((3, 1, 3)), "contact_jacobians"),
+    ("contact_jacobians", np.full((3, 1, 2), np.inf), "contact_jacobians[0, 0, 0]"),
+    ("velocities", "fast", "velocities"),
+    ("velocities", [[0.0, 0.0], [0.0, np.nan], [0.0, 0.0]], "velocities[1, 1]"),
+    ("restitution", [0.5, 1.5, 0.5], "restitution[1]"),
+    ("restitution", np.nan, "restitution"),
+    ("restitution", [0.5, 0.5], "restitution"),
+    ("budget", -1, "budget"),
+    ("clamp", None, "clamp"),
+    ("rank_tolerance", 2.0, "rank_tolerance"),
+])
+def test_the_wrong_one_of_many_is_named(argument: str, value: object, named: str) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        resolve_impacts(**{**STACKED, argument: value})  # type: ignore[arg-type]
+    assert caught.value.argument == named
+
+
+def test_an_overflow_among_many_is_named() -> None:
+    with pytest.raises(RangeError) as caught:
+        resolve_impacts(**{**STACKED, "velocities": [[-1.0, -1.0], [-1e200, 0.0], [0.0, 0.0]]})  # type: ignore[arg-type]
+    assert caught.value.quantity == "energy_change[1]"
+
+
+def test_none_at_all_are_resolved_too() -> None:
+    assert resolve_impacts(np.zeros((0, 2, 2)), np.zeros((0, 4, 2)), np.zeros((0, 2)), 0.5).velocity.shape == (0, 2)
