@@ -43,6 +43,8 @@ def perform(name: str, folder: Path) -> None:
     asked.write_text(json.dumps([asdict(block) for block in read_blocks(ROOT / name, name)]))
     environment = {**os.environ, "PYTHONPATH": str(work), "PYTHONDONTWRITEBYTECODE": "1", "COLUMNS": WIDTH,
                    "TERM": "dumb", "NO_COLOR": "1"}
+    for variable in ("CI", "BUILD_NUMBER", "PYTEST_ADDOPTS"):  # where these are set, pytest prints more
+        environment.pop(variable, None)
     done = subprocess.run([sys.executable, str(Path(__file__).parent / "performing.py"), str(asked), str(partial)],
                           cwd=work, env=environment, capture_output=True, text=True)
     if done.returncode:
