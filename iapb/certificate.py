@@ -20,7 +20,7 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from iapb.scene.mechanism import largest_friction, mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Scene, scene_kind
 
 Floats = NDArray[np.float64]
@@ -340,13 +340,13 @@ def _joined(parts: list[Certificate]) -> Certificate:
 def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:
     """The impulse against Jᵀp of the step's contacts, and restitution at those that were struck; NaN where open."""
     table, impacts = run.contacts, run.impacts
-    frictionless = not (run.law_settings.get("friction_in_impacts") and scene.contact.friction > 0.0)
+    frictionless = not (run.law_settings.get("friction_in_impacts") and largest_friction(scene) > 0.0)
     if not frictionless or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     if run.law not in ENGINE_LAWS and not table.impulse.any():  # another world need not record it
         return np.nan, np.nan
-    values = restitution_by_pair(scene, pairs_of(scene, shapes_of(scene)))
-    equality = len(np.unique(values)) == 1 and not run.law_settings.get("pushing")
+    values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
+    equality = len(values) == 1 and not run.law_settings.get("pushing")
     span = residual = 0.0
     for step in np.unique(impacts.step):
         of_step = np.flatnonzero(impacts.step == step)

@@ -35,7 +35,7 @@ from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene
-from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.mechanism import frictions_of, mechanism_of, pairs_of, shapes_of, start_of, stops_of
 from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
@@ -95,9 +95,14 @@ class Start:
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.size = np.array([_smallest_extent(self.shapes, i) for i in range(len(self.shapes.kind))])
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
+        self.kind, self.radius = self.shapes.kind, self.shapes.radius
         self.found = self._contacts()
         self.rows = np.array([self._row(i, self.found.normal[i]) for i in range(len(self.found.gap))]).reshape(
             -1, self.mechanism.nv)
+        if any(body.joint_limits for body in scene.bodies):
+            self._add_stops()
+        classes, table = frictions_of(scene)
+        self.friction = table[classes[self.found.shape_a], classes[self.found.shape_b]]
         self.thickness = np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
 
     def _contacts(self) -> ContactBuffer:
@@ -110,6 +115,26 @@ class Start:
             count = detect(self.shapes, self.pairs, *self.mechanism.placements(self.q), margin, buffer)
         columns: list[Any] = [column[: max(int(count), 0)] for column in buffer]
         return ContactBuffer(*columns)
+
+    def _add_stops(self) -> None:
+        """Append the ends of the joints' ranges: rows and gaps; a stop has one number for both of its shapes."""
+        stops, arrays, first = stops_of(self.scene), self.mechanism.arrays, len(self.shapes.kind)
+        names, ranges = [body.name for body in self.scene.bodies], [body.joint_limits for body in self.scene.bodies]
+        extra, rows = make_contact_buffer(len(stops)), np.zeros((len(stops), self.mechanism.nv))
+        for i, stop in enumerate(stops):
+            low, high = ranges[stop.body] or (0.0, 0.0)
+            extra.gap[i] = stop.arm * stop.sign * (self.q[arrays.q_start[stop.body]] - stop.bound)
+            rows[i, arrays.v_start[stop.body]] = stop.arm * stop.sign
+            extra.shape_a[i] = extra.shape_b[i] = first + i
+            extra.body_a[i], extra.body_b[i] = stop.body, stop.parent
+            self.labels.append(f"the {'lower' if stop.sign > 0.0 else 'upper'} limit of {names[stop.body]}")
+            self.size = np.append(self.size, stop.arm * (high - low))
+        places = self.mechanism.placements(self.q)[1]
+        extra.point[:] = places[extra.body_a]
+        columns: list[Any] = [np.concatenate(both) for both in zip(self.found, extra, strict=True)]
+        self.found, self.rows = ContactBuffer(*columns), np.concatenate([self.rows, rows])
+        self.kind = np.append(self.kind, np.full(len(stops), -1, self.kind.dtype))
+        self.radius = np.append(self.radius, np.zeros(len(stops)))
 
     def _row(self, i: int, direction: Floats) -> Floats:
         """Row of contact i along a direction."""
@@ -137,11 +162,12 @@ class Start:
     def applied(self) -> Floats:
         """Generalized force of gravity and of the hand at the start (d,)."""
         force, hand = -self.mechanism.gravity(self.q, self.gravity), self.scene.hand
-        if hand is not None and any(hand.force):
+        pushes = hand.forces([0.0])[0] if hand is not None else []
+        if hand is not None and any(pushes):
             body = self.mechanism.index(hand.body)
             R, p = self.mechanism.placements(self.q)
-            flat = len(hand.force) == 3
-            wrench = np.array([*hand.force[:2], 0.0, 0.0, 0.0, hand.force[2]] if flat else hand.force)
+            flat = len(pushes) == 3
+            wrench = np.array([*pushes[:2], 0.0, 0.0, 0.0, pushes[2]] if flat else pushes)
             point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
             force += wrench[:3] @ self.mechanism.point_jacobian(self.q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(self.q, body)[3:]
@@ -190,7 +216,7 @@ class Start:
         for rows in self.by_pair:
             tree, gap = self.trees(rows[0])[0], float(self.found.gap[rows[0]])
             free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # of a linkage the pose would change
-            flat = len(rows) > 1 or self.shapes.radius[self.found.shape_a[rows[0]]] > 0.0  # not on one corner
+            flat = len(rows) > 1 or self.radius[self.found.shape_a[rows[0]]] > 0.0  # not on one corner
             if tree in touched or not (free and flat and pull[rows[0]] < 0.0):
                 continue
             if gap < falls.get(tree, (math.inf, rows))[0]:
@@ -227,7 +253,7 @@ class Start:
 
     def is_near(self, i: int) -> bool:
         """Whether the row of contact i is that of a touch: two boxes in space must be near for that."""
-        boxes = self.shapes.kind[self.found.shape_a[i]] == BOX and self.shapes.kind[self.found.shape_b[i]] == BOX
+        boxes = self.kind[self.found.shape_a[i]] == BOX and self.kind[self.found.shape_b[i]] == BOX
         return not boxes or bool(self.found.gap[i] <= self.thickness[i])
 
     def loads(self, rows: NDArray[np.int64]) -> Floats:
@@ -247,7 +273,7 @@ class Start:
     def total_load(self) -> float:
         """All weights and the hand's force [N]."""
         hand = self.scene.hand
-        pushed = float(np.linalg.norm(hand.force[: 2 if len(hand.force) == 3 else 3])) if hand is not None else 0.0
+        pushed = hand.largest_force() if hand is not None else 0.0
         return float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies) + pushed
 
 
@@ -352,7 +378,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
         a, b = start.labels[found.shape_a[i]], start.labels[found.shape_b[i]]
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
         stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
-        if start.shapes.kind[found.shape_b[i]] in ENDLESS and depth >= size:
+        if start.kind[found.shape_b[i]] in ENDLESS and depth >= size:
             yield Caution("outside", f"{a} and {b}", f"{a} starts behind {b}, {in_metres(depth)} deep: "
                           f"move it by [{out}] m")
         elif float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0]) <= 1e-12 * start.critical[0][0]:
@@ -440,20 +466,20 @@ def _sags(start: Start) -> Iterator[Caution]:
     share, i = worst
     if i < 0:
         return
-    a, b = (start.labels[s] for s in (start.found.shape_a[i], start.found.shape_b[i]))
-    yield Caution("sag", f"{a} and {b}", f"at rest {a} and {b} overlap by {in_metres(share * start.thickness[i])}, "
+    both = start.names([i])
+    yield Caution("sag", both, f"at rest {both} overlap by {in_metres(share * start.thickness[i])}, "
                   f"{share:.0%} of the thinner: set contact.stiffness >= {_up(K * share / SAG)}")
 
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:
     """Regularised friction (6), an explicit damper μN/v_thr, that turns a motion round within a step."""
     contact = start.scene.contact
-    if contact.friction_law != "regularised" or contact.friction == 0.0:
+    if contact.friction_law != "regularised" or not start.friction.any():
         return
     worst, where = 2.0, np.zeros(0, np.int64)
     for rows in start.supports:
         force = start.loads(rows)
-        root = np.sqrt(contact.friction * force * start.dt / contact.friction_velocity)
+        root = np.sqrt(start.friction[rows] * force * start.dt / contact.friction_velocity)
         tangents = [(start._row(i, t), r) for i, r in zip(rows, root, strict=True) for t in _tangents(start, i)]
         found = start.mobility(np.array([r * row for row, r in tangents]))
         if found > worst * (1.0 + ROUNDED):

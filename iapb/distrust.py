@@ -97,6 +97,7 @@ def _sank(run: Run) -> str:
         return ""
     k = int(np.searchsorted(run.contacts.offsets, i, "right")) - 1
     a, b = (run.body_names[x] if x >= 0 else "a wall" for x in (run.contacts.body_a[i], run.contacts.body_b[i]))
+    b += " (or the limit of its joint)" if bodies[run.contacts.body_a[i]].get("joint_limits") else ""
     return (f"{a} and {b} overlap by {in_metres(-float(run.contacts.gap[i]))} at {run.time[k]:.4g} s, more than half "
             f"of {in_metres(float(thinner[i]))}")
 
@@ -189,7 +190,7 @@ def _flew(run: Run) -> str:
         return ""
     scene, time = run.scene_resolved, float(run.time[-1])
     masses = [body["mass"] for body in scene.get("bodies", ()) if body.get("mass")]
-    push = float(np.linalg.norm(((scene.get("hand") or {}).get("force") or [0.0])[:2])) / min(masses, default=1.0)
+    push = float(np.linalg.norm(run.hand_force, axis=1).max(initial=0.0)) / min(masses, default=1.0)
     acceleration = float(np.linalg.norm(scene.get("gravity") or [0.0])) + push
     reach = float(np.abs(run.q[0]).max() + np.abs(run.v[0]).max() * time + 0.5 * acceleration * time**2)
     reach += max((_size(body.get("shapes", ()), 0.0) for body in scene.get("bodies", ())), default=0.0)

@@ -23,6 +23,7 @@ from iapb.contact.laws import (
     FRICTION,
     IMPACT_FRICTION,
     IMPULSES,
+    JOINTS,
     NEWNESS,
     OWN_RESTITUTION,
     PENALTY,
@@ -31,7 +32,8 @@ from iapb.contact.laws import (
 from iapb.haptics.coupling import Coupling
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitution_by_pair, shapes_of
+from iapb.scene.mechanism import friction_by_pair, mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.model import Hand
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
@@ -63,6 +65,8 @@ class Question:
     body_pairs: int  # of shapes of two trees
     tree_pairs: int  # of shapes of one tree
     restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
+    frictions: tuple[float, ...]  # different values of mu among the pairs, ascending
+    limited: tuple[str, ...]  # bodies whose joint has limits that the law keeps
     law: str | None
     uses: frozenset[str]  # what the law makes of the contact section
     coupling: str | None
@@ -75,15 +79,20 @@ class Question:
         """All candidate pairs of shapes."""
         return self.wall_pairs + self.body_pairs + self.tree_pairs
 
+    @property
+    def contacts(self) -> int:
+        """Everything that can touch: pairs of shapes, and joints at their limits."""
+        return self.pairs + len(self.limited)
+
     def unused(self, part: str) -> str | None:
         """Return why no contact needs a part of the contact section; None if one does."""
-        if self.pairs == 0:
+        if self.contacts == 0:
             return "nothing can touch: the scene has no pair of shapes"
         return None if part in self.uses else f"the law '{self.law}' does not use it"
 
     def ignored(self, field: str, *parts: str) -> str:
         """Return the field where contacts would need it and the law uses none of these parts; else an empty text."""
-        return field if self.pairs and not self.uses.intersection(parts) else ""
+        return field if self.contacts and not self.uses.intersection(parts) else ""
 
     def without_device(self) -> str | None:
         """Return why no device takes part; None if one does."""
@@ -168,15 +177,53 @@ def velocity_terms(question: Question) -> Effect:
 def hand_force(question: Question) -> Effect:
     """J_h^T F_h of (1)."""
     hand = question.scene.hand
-    active = hand is not None and any(hand.force)
+    active = hand is not None and (any(hand.force) or hand.changes)
     if hand is None:
         reason = "the scene has no hand"
+    elif hand.changes:
+        reason = f"the hand pushes {hand.body}: {_over_time(hand)}"
     elif active:
         units = "N, N, N m" if len(hand.force) == 3 else "N, N, N, N m, N m, N m"
         reason = f"the hand pushes {hand.body} with hand.force = {numbers(hand.force)} {units}"
     else:
         reason = "the hand holds still: hand.force is zero"
     return Effect("hand_force", active, reason, "the tool would not be pushed")
+
+
+def _over_time(hand: Hand) -> str:
+    """Say how the hand's force changes."""
+    said = [f"hand.force = {numbers(hand.force)}"] if any(hand.force) else []
+    if hand.force_table:
+        rows = hand.force_table
+        said.append(f"hand.force_table, {len(rows)} row{'s' * (len(rows) > 1)} from {number(rows[0][0])} to "
+                    f"{number(rows[-1][0])} s")
+    if hand.force_function:
+        said.append(f"hand.force_function = [{', '.join(hand.force_function)}]")
+    return " + ".join(said)
+
+
+def joint_damping(question: Question) -> Effect:
+    """Viscous damping of joints, implicit in the step."""
+    damped = [body for body in question.scene.bodies if any(body.joint_damping)]
+    unused = None if damped else "no joint has damping"
+    if damped and JOINTS not in question.uses:
+        unused = f"the law '{question.law}' does not use it"
+    given = ", ".join(f"{body.name} {numbers(body.joint_damping)}" for body in damped[:3])
+    reason = unused or f"joint_damping: {given}{' …' if len(damped) > 3 else ''} N s/m, N m s/rad"
+    return Effect("joint_damping", unused is None, reason, "joints would turn and slide without loss",
+                  "joint_damping" if damped and unused else "")
+
+
+def joint_limits(question: Question) -> Effect:
+    """Ends of the joints' ranges: contacts of a link with its parent."""
+    given = [body for body in question.scene.bodies if body.joint_limits is not None]
+    unused = None if given else "no joint has limits"
+    if given and not question.limited:
+        unused = f"the law '{question.law}' does not use it"
+    said = ", ".join(f"{body.name} {numbers(body.joint_limits)}" for body in given[:3])
+    reason = unused or f"joint_limits: {said}{' …' if len(given) > 3 else ''} rad, m"
+    return Effect("joint_limits", unused is None, reason, "joints would turn and slide without end",
+                  "joint_limits" if given and unused else "")
 
 
 def _turning(question: Question) -> str:
@@ -251,7 +298,7 @@ def unequal_restitution(question: Question) -> Effect:
 def impact_friction(question: Question) -> Effect:
     """Coulomb friction in the impacts themselves: a future extension in the paper."""
     contact = question.scene.contact
-    active, reason = _valued(question, IMPACT_FRICTION, "friction", contact.friction, "")
+    active, reason = _rough(question, IMPACT_FRICTION)
     if active and contact.self_collision_rows == "per_body":
         active, reason = False, "contact.self_collision_rows = per_body: rows of one body alone have no slip"
     return Effect("impact_friction", active, reason, "bodies would bounce without losing tangential speed")
@@ -275,10 +322,25 @@ def contact_damping(question: Question) -> Effect:
 
 def friction(question: Question) -> Effect:
     """Friction at resting contacts: Coulomb's law, or (6)."""
-    value = question.scene.contact.friction
-    active, reason = _valued(question, FRICTION, "friction", value, "")
-    ignored = question.ignored("friction", FRICTION) if value else ""
+    active, reason = _rough(question, FRICTION)
+    rough = question.frictions[-1:] > (0.0,)
+    ignored = question.ignored("friction", FRICTION) if rough else ""
     return Effect("friction", active, reason, "bodies would slide along each other without loss", ignored)
+
+
+def _rough(question: Question, part: str) -> tuple[bool, str]:
+    """Decide an effect that is on where a pair has friction and the law uses this part."""
+    unused, values = question.unused(part), question.frictions
+    if unused is None and not values:
+        unused = "nothing can rub: the scene has no pair of shapes"
+    own = len(values) > 1 or values[:1] not in ((), (question.scene.contact.friction,))
+    if not own:
+        value = values[0] if values else 0.0
+        return unused is None and value > 0.0, unused or f"contact.friction = {number(value)}"
+    said = f"friction {number(values[0])} to {number(values[-1])}, by pair: of two values the geometric mean"
+    if len(values) == 1:
+        said = f"all pairs have friction {number(values[0])}"
+    return unused is None and values[-1] > 0.0, unused or said
 
 
 def clustering(question: Question) -> Effect:
@@ -389,6 +451,8 @@ EFFECTS: tuple[Callable[[Question], Effect], ...] = (
     varying_inertia,
     velocity_terms,
     hand_force,
+    joint_damping,
+    joint_limits,
     wall_contacts,
     body_contacts,
     self_collisions,
@@ -448,13 +512,16 @@ def decide_for(
         tree_a, body_b = mechanism.tree_of_body[shapes.body[a]], shapes.body[b]
         same = body_b >= 0 and mechanism.tree_of_body[body_b] == tree_a
         counts["wall" if body_b < 0 else "tree" if same else "body"] += 1
-    values = tuple(float(e) for e in np.unique(restitution_by_pair(scene, pairs)))
+    values = tuple(float(e) for e in restitutions_of(scene, pairs))
+    frictions = tuple(float(mu) for mu in np.unique(friction_by_pair(scene, pairs)))
     known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
     if rendering is None and law is not None and not isinstance(law, str):
         rendering = getattr(law, "rendering", "full")
+    uses = EVERYTHING | {JOINTS} if known is None else getattr(known, "uses", EVERYTHING)
+    limited = tuple(body.name for body in scene.bodies if body.joint_limits is not None and JOINTS in uses)
     question = Question(
-        scene, mechanism, counts["wall"], counts["body"], counts["tree"], values,
-        law=law if law is None or isinstance(law, str) else law.name, uses=getattr(known, "uses", EVERYTHING),
+        scene, mechanism, counts["wall"], counts["body"], counts["tree"], values, frictions, limited,
+        law=law if law is None or isinstance(law, str) else law.name, uses=uses,
         coupling=coupling if coupling is None or isinstance(coupling, str) else coupling.name,
         logs_impulses=law is None or isinstance(law, str) or getattr(law, "impulses", False),
         own_gains=coupling if hasattr(coupling, "stiffness") else None, rendering=rendering,

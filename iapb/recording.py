@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.distrust import distrust_of
+from iapb.haptics.kernels import PLANNED
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities
@@ -20,7 +21,7 @@ from iapb.scene.model import SpatialScene
 Floats = NDArray[np.float64]
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
-_STEPS_PER_CHUNK = 512  # one second of the paper's loop: progress and Ctrl-C answer at least that often
+_STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C answer at least that often
 
 # What the loop writes; poses and energies follow from it.
 STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")

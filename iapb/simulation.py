@@ -22,7 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import Entry, kernel
+from iapb.compiled import Entry, copy_into, kernel
 from iapb.compiling import compiling_told, to_stderr
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
@@ -33,7 +33,7 @@ from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device,
 from iapb.recording import Record, Recorder, bytes_per_step, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.system import System
+from iapb.system import System, wrenches_of
 from iapb.worlds import find_world
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
@@ -47,6 +47,8 @@ def compiled_steps(  # type: ignore[no-untyped-def]
 ):
     """Do `steps` steps of an engine law; return (steps done, status)."""
     for k in range(steps):
+        if port.planned.shape[0] > 0:
+            copy_into(port.wrench, port.planned[k])
         couple(world, state, port)
         status = advance(world, state, port.applied)
         if status:
@@ -164,6 +166,7 @@ class Simulation:
         self.link = None if device is None else DeviceLink(device, *blocks)
         self.stepper = Stepper(*blocks, self.link)
         self._steps = Entry(compiled_steps)
+        self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
 
     def arrays(self) -> list[np.ndarray]:
@@ -186,7 +189,7 @@ class Simulation:
         Parameters
         ----------
         hand_force : (3,) force [N] in the plane and torque [N m], or (6,) force and torque, world axes, from now
-            on; None keeps the last one (at first the scene's).
+            on; None keeps the last one (at first the scene's, which may change over time).
 
         Raises
         ------
@@ -203,6 +206,8 @@ class Simulation:
 
     def begin_step(self) -> None:
         """Do the first half of a step: hand and coupling, the law, and the device is told its force."""
+        if self._planned:
+            self.port.wrench[:] = wrenches_of(self.scene, [self.time])[0]
         self.stepper.couple()
         if self.compiled:
             self.stepper.advance()
@@ -221,7 +226,7 @@ class Simulation:
             raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
         if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
-        self.port.wrench[:] = 0.0
+        self._planned, self.port.wrench[:] = False, 0.0
         self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
 
     def _take(self, result: StepResult) -> None:
@@ -258,15 +263,27 @@ class Simulation:
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
         """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
         if self.compiled and self.link is None:
-            done, status = self._steps(self.world, self.state, self.port, record, self.steps_done, steps)
+            planned, stop = self._plan(steps)
+            done, status = self._steps(self.world, self.state, self.port, record, self.steps_done, planned)
             self.steps_done += done
-            return done, IapbError(FAILURES[status]) if status else None
+            return done, IapbError(FAILURES[status]) if status else stop
         for k in range(steps):
             try:
                 self.step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
             self.stepper.write(record, k, self.steps_done - 1)
+        return steps, None
+
+
+    def _plan(self, steps: int) -> tuple[int, IapbError | None]:
+        """Tell the compiled loop the hand's changing force; return for how many of the steps it has a value."""
+        self.port.planned[:steps] = self.port.wrench
+        for k in range(steps if self._planned else 0):
+            try:
+                self.port.planned[k] = wrenches_of(self.scene, [(self.steps_done + k) * self.system.dt])[0]
+            except IapbError as stop:
+                return k, stop
         return steps, None
 
 

@@ -18,12 +18,12 @@ from iapb.contact.kernels.impact_friction import make_friction_work
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
-from iapb.contact.kernels.world import State, Switches, World
+from iapb.contact.kernels.world import State, Stops, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
-from iapb.haptics.kernels import Port
+from iapb.haptics.kernels import PLANNED, Port
 from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.cholesky import cholesky
@@ -31,12 +31,16 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
+    frictions_of,
+    joint_damping_of,
+    largest_friction,
     mechanism_of,
     pairs_of,
-    restitution_by_pair,
     restitution_by_shape,
+    restitutions_of,
     shapes_of,
     start_of,
+    stops_of,
 )
 
 Floats = NDArray[np.float64]
@@ -54,6 +58,8 @@ class System:
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
     dt : float [s]
     restitutions : (r,) the different values of e among the pairs of shapes that can touch, ascending
+    frictions : Frictions, of any two shapes
+    joint_damping : (d,) [N s/m, N m s/rad]; stops : Stops, the ends of the joints' ranges
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -62,8 +68,10 @@ class System:
         self.mechanism: Mechanism = mechanism_of(scene)
         self.shapes = shapes_of(scene)
         self.pairs = pairs_of(scene, self.shapes)
-        self.capacity = contact_capacity(self.shapes, self.pairs)
-        self.restitutions = np.unique(restitution_by_pair(scene, self.pairs))
+        self.stops = make_stops(scene, self.mechanism, len(self.shapes.kind))
+        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        self.restitutions, self.frictions = restitutions_of(scene, self.pairs), frictions_of(scene)
+        self.joint_damping = joint_damping_of(scene)
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
@@ -176,7 +184,7 @@ def make_world(system: System, law: Any) -> World:
         pushing=law.impulses and law.pushing,
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
-        contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions")),
+        contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
         broad_phase=len(system.pairs) > WORTHWHILE_PAIRS,
     )
     integrator = INTEGRATORS[law.integrator]
@@ -188,20 +196,31 @@ def make_world(system: System, law: Any) -> World:
         tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
         switches=switches, dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
-        friction=float(contact.friction), coulomb="friction" in on and contact.friction_law == "coulomb",
+        friction_class=system.frictions.class_of_shape, friction=system.frictions.table,
+        coulomb="friction" in on and contact.friction_law == "coulomb",
         friction_velocity=float(contact.friction_velocity),
         restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
         own_restitution=restitution_by_shape(scene), approach_velocity=float(contact.approach_velocity),
         cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
+        joint_damping=system.joint_damping, stops=system.stops,
         per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
         stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
         semi_implicit=integrator.semi_implicit,
     ))
 
 
+def make_stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
+    """The ends of the joints' ranges as arrays; they are numbered behind the `shapes`."""
+    found = stops_of(scene)
+    body, parent = (np.array([getattr(stop, name) for stop in found], np.int64) for name in ("body", "parent"))
+    sign, bound, arm = (np.array([getattr(stop, name) for stop in found]) for name in ("sign", "bound", "arm"))
+    return Stops(body, parent, shapes + np.arange(len(found), dtype=np.int64), mechanism.arrays.q_start[body],
+                 mechanism.arrays.v_start[body], sign, bound, arm)
+
+
 def slides_in_impacts(scene: Scene) -> bool:
     """Whether a law with friction in impacts has any here; rows (13)-(14) of one body alone have no slip to stop."""
-    return scene.contact.friction > 0.0 and scene.contact.self_collision_rows == "relative"
+    return largest_friction(scene) > 0.0 and scene.contact.self_collision_rows == "relative"
 
 
 def make_state(system: System) -> State:
@@ -215,7 +234,7 @@ def make_state(system: System) -> State:
     if cholesky(mass, lower):
         raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
     sliding, tangents = slides_in_impacts(system.scene), 2 if isinstance(system.scene, SpatialScene) else 1
-    rubbing = system.scene.contact.friction > 0.0 and system.scene.contact.friction_law == "coulomb"
+    rubbing = largest_friction(system.scene) > 0.0 and system.scene.contact.friction_law == "coulomb"
     vectors = {name: np.zeros(d) for name in (
         "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
         "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
@@ -292,11 +311,22 @@ def _hand(system: System, device: Any) -> dict[str, Any]:
     """Which body is held, where, and how it is pushed."""
     hand, wrench, point = system.scene.hand, np.zeros(6), np.zeros(3)
     if hand is None:
-        return {"hand_body": -1, "device_body": -1, "hand_point": point, "wrench": wrench}
-    wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
+        return {"hand_body": -1, "device_body": -1, "hand_point": point, "wrench": wrench,
+                "planned": np.zeros((0, 6))}
+    wrench[:] = wrenches_of(system.scene, [0.0])[0]
     point[: len(hand.point)] = hand.point
     return {"hand_body": system.mechanism.index(hand.body), "device_body": device.index(hand.body),
-            "hand_point": point, "wrench": wrench}
+            "hand_point": point, "wrench": wrench, "planned": np.zeros((PLANNED * hand.changes, 6))}
+
+
+def wrenches_of(scene: Scene, times: Sequence[float]) -> Floats:
+    """Force and torque (n, 6) of the scene's hand at times [s], world axes; zeros without a hand."""
+    if scene.hand is None:
+        return np.zeros((len(times), 6))
+    forces = np.array(scene.hand.forces(times))
+    wrenches = np.zeros((len(forces), 6))
+    wrenches[:, [0, 1, 5] if forces.shape[1] == 3 else slice(None)] = forces
+    return wrenches
 
 
 def _gains(coupling: Coupling, size: int) -> dict[str, Any]:

@@ -51,10 +51,37 @@ class ContactRows:
 
 def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     """Return the contacts of `system` at q (nq,) with gap <= margin [m]."""
-    axes, origins, frames = mechanics_of(system).bodies(q)
+    mechanics = mechanics_of(system)
+    axes, origins, frames = mechanics.bodies(q)
     geometry = find_contacts(system.shapes, system.pairs, axes, origins, margin)
+    if len(system.stops.bound):
+        geometry = _with_stops(geometry, system, mechanics, q, origins, frames, margin)
     rows = contact_jacobian(geometry.normal, geometry, origins, frames)
     return ContactRows(geometry, rows, geometry.gap, rows @ v)
+
+
+def _with_stops(
+    geometry: Contacts, system: Any, mechanics: PinocchioMechanism, q: Floats, origins: Floats, frames: Floats,
+    margin: float,
+) -> Contacts:
+    """Append the ends of the joints' ranges with gap <= margin [m]: contacts on an arm that the joint turns.
+
+    The joint's axis is that of its body's motion by the joint's own velocity, relative to the parent.
+    """
+    stops = system.stops
+    gap = stops.arm * stops.sign * (q[stops.coordinate] - stops.bound)
+    kept = np.flatnonzero(gap <= margin)
+    body, parent, dof = stops.body[kept], stops.parent[kept], stops.dof[kept]
+    turning, sliding = frames[body, 3:, dof], frames[body, :3, dof]
+    turns = np.linalg.norm(turning, axis=1) > 0.5
+    axis = np.where(turns[:, None], turning, sliding)
+    lever = unit_tangents(axis, spatial=True)[:, 0]
+    normal = np.where(turns[:, None], cross(axis, lever), axis) * stops.sign[kept, None]
+    point = origins[body] + np.where(turns, stops.arm[kept], 0.0)[:, None] * lever
+    shape, feature = stops.shape[kept].astype(np.int32), np.zeros(len(kept), np.int64)
+    own = (shape, shape, body.astype(np.int32), parent.astype(np.int32), feature, point, normal, gap[kept])
+    columns: list[Any] = [np.concatenate([geometry[k], column]) for k, column in enumerate(own)]
+    return Contacts(*columns)
 
 
 def contact_jacobian(directions: Floats, geometry: Contacts, origins: Floats, frames: Floats) -> Floats:

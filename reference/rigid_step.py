@@ -271,7 +271,7 @@ def friction_step(
     normal_rows: Floats,
     tangent_rows: Floats,
     bound: Floats,
-    friction: float,
+    friction: float | Floats,
     relaxed: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
     """Return v⁺ (d,), normal (c,) and tangential impulses (c, s) [N s] of one step.
@@ -280,7 +280,7 @@ def friction_step(
     ----------
     normal_rows : (c, d) unit-normal rows; tangent_rows : (c, s, d) rows of s = 1 (plane) or 2 (space) unit tangents
     bound : (c,) of the normal velocities after the step [m/s]; −inf leaves a contact out
-    friction : mu > 0, one for all contacts
+    friction : mu >= 0, one for all contacts or (c,)
 
     Raises
     ------
@@ -288,6 +288,7 @@ def friction_step(
         where no solver reaches FRICTION_TOLERANCE; says with how many contacts, and what each solver said
     """
     count, size = tangent_rows.shape[0], 1 + tangent_rows.shape[1]
+    mu = np.broadcast_to(np.asarray(friction, np.float64), count)
     blocks = np.concatenate([normal_rows[:, None], tangent_rows], axis=1)
     impulse, velocity = np.zeros((count, size)), v_free
     taken = np.zeros(count, np.bool_)
@@ -297,12 +298,12 @@ def friction_step(
         offset = rows @ v_free
         offset[::size] -= bound[taken]
         response = np.linalg.solve(mass_matrix, rows.T)
-        impulse[taken] = _by_islands(rows @ response, offset.reshape(-1, size), friction, relaxed)
+        impulse[taken] = _by_islands(rows @ response, offset.reshape(-1, size), mu[taken], relaxed)
         velocity = v_free + response @ impulse[taken].ravel()
     return velocity, impulse[:, 0], impulse[:, 1:]
 
 
-def _by_islands(w: Floats, offset: Floats, friction: float, relaxed: bool) -> Floats:
+def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> Floats:
     """Return p (k, size) for W (k size, k size) and offset (k, size) [m/s], island by island."""
     from scipy.sparse.csgraph import connected_components
 
@@ -313,7 +314,7 @@ def _by_islands(w: Floats, offset: Floats, friction: float, relaxed: bool) -> Fl
     for mine in (np.flatnonzero(island == k) for k in range(islands)):
         part = blocks[mine][:, :, mine].reshape(len(mine) * size, -1)
         problem = ImpactProblem.from_delassus(
-            part, offset[mine].ravel(), 0.0, friction, contact_size=size, relaxed=relaxed
+            part, offset[mine].ravel(), 0.0, friction[mine], contact_size=size, relaxed=relaxed
         )
         impulse[mine] = _solve_friction(problem).reshape(-1, size)
     return impulse

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene
 from iapb.scene.mechanism import one_restitution
-from iapb.system import System
+from iapb.system import System, wrenches_of
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import find_rows, identities, mechanics_of
@@ -147,6 +147,8 @@ class _Motion:
 
     def __post_init__(self) -> None:
         self.system = System(self.scene)
+        if self.scene.hand is not None and self.scene.hand.changes:
+            raise ArgumentError("scene", self.scene.name, "a scene whose hand's force does not change over time")
         mechanism = self.system.mechanism
         self.mechanics = mechanics_of(self.system)
         if self.coupled and mechanism.nq != mechanism.nv:
@@ -175,6 +177,7 @@ class _Motion:
         """Applied − B − G (d,), the coupling included."""
         q, v, device_q, device_v = self.split(state)
         force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
+        force -= self.system.joint_damping * v
         if self.coupled:
             force[self.tool] += self._pull(device_q - q[self.tool], device_v - v[self.tool])
         return force
@@ -185,8 +188,7 @@ class _Motion:
             return np.zeros(size)
         rotation, origin = mechanics.placement(q, hand.body)
         point = origin + rotation @ np.array([*hand.point, 0.0])[:3]
-        wrench = np.zeros(6)
-        wrench[[0, 1, 5] if len(hand.force) == 3 else slice(None)] = hand.force
+        wrench = wrenches_of(self.scene, [0.0])[0]
         turning = mechanics.frame_jacobian(q, hand.body)[3:].T @ wrench[3:]
         return np.asarray(mechanics.point_jacobian(q, hand.body, point).T @ wrench[:3] + turning, np.float64)
 

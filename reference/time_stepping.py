@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.contact.laws import FRICTION, IMPACT_FRICTION, OWN_RESTITUTION, StepResult
+from iapb.contact.laws import FRICTION, IMPACT_FRICTION, JOINTS, OWN_RESTITUTION, StepResult
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
@@ -83,8 +83,9 @@ class RigidConstraints:
 
     @property
     def uses(self) -> frozenset[str]:
-        """Parts of the contact section that the law uses: restitution, and friction in all but "none"."""
-        return frozenset({OWN_RESTITUTION} | ({FRICTION, IMPACT_FRICTION} if self.friction != "none" else set()))
+        """Parts of the scene that the law uses: restitution, joints, and friction in all but "none"."""
+        friction = {FRICTION, IMPACT_FRICTION} if self.friction != "none" else set()
+        return frozenset({OWN_RESTITUTION, JOINTS} | friction)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -112,7 +113,9 @@ class RigidConstraints:
         mass = mechanics.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
         force = applied_force - mechanics.inner_forces(q, v, system.gravity)
-        step = self._solve(system, mass, q, v, force, dt, found)
+        # Damping of joints, implicit: M + Δt D holds the damped velocities, as in the engine's step.
+        damping = system.joint_damping
+        step = self._solve(system, mass + dt * np.diag(damping), q, v, force - damping * v, dt, found)
         blows = _blows(mass, found, step.normal, system.scene.contact.approach_velocity)
         normal = found.jacobian.T * step.normal
         impulse = (normal + step.dragging)[:, blows].sum(axis=1)
@@ -121,18 +124,21 @@ class RigidConstraints:
         write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus = mechanics.integrate(q, step.velocity, dt)
         contact_state = _contact_state(found, step.normal, blows)
+        dragging -= damping * step.velocity
         return StepResult(q_plus, step.velocity, pressing, dragging, impulse, contact_state)
 
     def _solve(
         self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float, found: ContactRows
     ) -> _Solved:
-        e, mu = _restitution(system, found), 0.0 if self.friction == "none" else system.scene.contact.friction
-        if mu == 0.0:
+        e = _restitution(system, found)
+        classes, table = system.frictions
+        if self.friction == "none" or not table.any():
             step = rigid_step(
                 mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization, self.scheme
             )
             still = np.zeros((len(found.gap), 3))
             return _Solved(step.velocity, step.impulse, still, np.zeros_like(found.jacobian.T))
+        mu = table[classes[found.geometry.shape_a], classes[found.geometry.shape_b]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
         tangents, rows = tangent_rows(system, q, found)
         v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"

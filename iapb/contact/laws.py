@@ -30,6 +30,7 @@ RENDERINGS = ("full", "saturate", "scale", "spread")
 # Parts of a scene's contact section: what a law makes of it is its attribute `uses`.
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
 IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
+JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
 EVERYTHING = frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION})
 
 
@@ -147,8 +148,8 @@ class ImpulseAugmented(_EngineLaw):
 
     @property
     def uses(self) -> frozenset[str]:
-        """Parts of the contact section that the law uses."""
-        return EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}
+        """Parts of the scene that the law uses."""
+        return EVERYTHING - ({IMPACT_FRICTION} if not self.friction_in_impacts else set()) | {JOINTS}
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -166,7 +167,7 @@ class Penalty(_EngineLaw):
     impulses = False
     friction_in_impacts = pushing = False
     rendering = "full"
-    uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS})  # the record says which contacts are new
+    uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS})  # the record says which contacts are new
 
     @property
     def settings(self) -> dict[str, Any]:

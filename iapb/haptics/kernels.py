@@ -18,6 +18,7 @@ from iapb.mechanics.kernels.vectors import add, dot, load, transform
 from iapb.run import FREE
 
 NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
+PLANNED = 512  # steps ahead that the force of a hand which changes over time is known; no chunk is longer
 
 
 class Port(NamedTuple):
@@ -33,6 +34,7 @@ class Port(NamedTuple):
     device_body: int  # the same in the device
     hand_point: np.ndarray  # (3,) [m] held point in the body's frame
     wrench: np.ndarray  # (6,) force [N] and torque [N m] of the hand, world axes
+    planned: np.ndarray  # (n, 6) the wrench of the coming steps; n = 0: it does not change
     stiffness: np.ndarray  # (d_t,) K [N/m, N m/rad]
     damping: np.ndarray  # (d_t,) B [N s/m, N m s/rad]
     mechanism: MechanismArrays  # the device: kinematically the tool

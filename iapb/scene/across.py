@@ -29,6 +29,7 @@ def across_parts(given: Any) -> list[InitErrorDetails]:
         *_scattered_trees(bodies),
         *_nothing_moves(bodies),
         *_too_many_shapes(bodies, walls),
+        *_friction_pairs(given.get("contact"), bodies, walls),
         *_tool(given, bodies),
     ]
 
@@ -94,6 +95,23 @@ def _too_many_shapes(bodies: list[dict[str, Any]], walls: list[dict[str, Any]]) 
     count = len(walls) + sum(len(_mappings(body.get("shapes"))) for body in bodies)
     if count > MAX_SHAPES:
         yield located(("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included")
+
+
+def _friction_pairs(
+    contact: Any, bodies: list[dict[str, Any]], walls: list[dict[str, Any]]
+) -> Iterator[InitErrorDetails]:
+    """Pairs name things of the scene, and no two things twice."""
+    names, seen, where = {_name(item) for item in (*bodies, *walls)}, set(), ("contact", "friction_pairs")
+    for i, pair in enumerate(_mappings(contact.get("friction_pairs") if isinstance(contact, dict) else None)):
+        between = pair.get("between")
+        if not isinstance(between, (list, tuple)) or not all(isinstance(name, str) for name in between):
+            continue
+        for k, name in enumerate(between):
+            if name not in names and None not in names:
+                yield located((*where, i, "between", k), name, "the name of a body or a wall of this scene")
+        if frozenset(between) in seen:
+            yield located((*where, i, "between"), list(between), "two things that no earlier pair names")
+        seen.add(frozenset(between))
 
 
 def _tool(given: dict[str, Any], bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:

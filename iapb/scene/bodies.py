@@ -10,7 +10,15 @@ import math
 from fractions import Fraction as Exact
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails
 
 from iapb.mechanics.joints import KINDS
@@ -20,6 +28,7 @@ from iapb.scene.parts import (
     Name,
     NonNegative,
     Number,
+    OwnFriction,
     OwnRestitution,
     Part,
     Positive,
@@ -121,6 +130,7 @@ class Ball(Part):
 class _OfWall(Part):
     name: Name = Field(description="the wall's name")
     restitution: OwnRestitution = None
+    friction: OwnFriction = None
 
 
 class HalfPlaneWall(_OfWall):
@@ -172,6 +182,18 @@ SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminat
 # Moving bodies
 
 _DENSITY: TypeAdapter[float] = TypeAdapter(Positive)
+LIMITED = ("revolute", "prismatic")  # the joints that can have limits: one coordinate that is a length or an angle
+
+JointDamping = Annotated[
+    tuple[NonNegative, ...],
+    BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given),
+    Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none"),
+]
+JointLimits = Annotated[
+    tuple[Number, Number] | None,
+    Field(description="least and largest position of its revolute or prismatic joint [rad, m]; default: no limits"),
+]
+
 
 class _AnyBody(Part):
     """What a joint asks of its body's numbers, in the plane and in space."""
@@ -242,6 +264,31 @@ class _AnyBody(Part):
             raise expectation("a rotation of length one: cos, sin or quaternion x, y, z, w")
         return given or KINDS[joint].neutral
 
+    @field_validator("joint_damping", check_fields=False)
+    @classmethod
+    def _one_damping_per_velocity(cls, given: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        joint = info.data.get("joint")
+        count = KINDS[joint].nv if joint is not None else len(given)
+        if given and len(given) != count:
+            raise expectation(f"{count} number{'' if count == 1 else 's'}, one per velocity of a {joint} joint")
+        return given
+
+    @field_validator("joint_limits", check_fields=False)
+    @classmethod
+    def _limits_around_the_start(
+        cls, limits: tuple[float, float] | None, info: ValidationInfo
+    ) -> tuple[float, float] | None:
+        joint, position = info.data.get("joint"), info.data.get("position")
+        if limits is None or joint is None:
+            return limits
+        if joint not in LIMITED:
+            raise expectation(f"no limits: only a {' or '.join(LIMITED)} joint has them, this joint is {joint}")
+        if not limits[0] < limits[1]:
+            raise expectation("two numbers, the smaller one first")
+        if position and not limits[0] <= position[0] <= limits[1]:
+            raise expectation(f"limits around the start, position = {position[0]:g}")
+        return limits
+
 
 class Body(_AnyBody):
     """A rigid body of a tree.
@@ -277,6 +324,9 @@ class Body(_AnyBody):
         (), description="joint velocities at the start [m/s, rad/s]; default: zeros"
     )
     restitution: OwnRestitution = None
+    friction: OwnFriction = None
+    joint_damping: JointDamping = ()
+    joint_limits: JointLimits = None
 
     @field_validator("inertia")
     @classmethod
@@ -327,6 +377,9 @@ class SpatialBody(_AnyBody):
         (), description="joint velocities [m/s, rad/s]; free_flyer: linear, angular, body axes; default: zeros"
     )
     restitution: OwnRestitution = None
+    friction: OwnFriction = None
+    joint_damping: JointDamping = ()
+    joint_limits: JointLimits = None
 
     @field_validator("inertia")
     @classmethod

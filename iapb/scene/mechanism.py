@@ -1,4 +1,4 @@
-"""A scene as the engine's mechanism, shapes and candidate pairs, with the restitution of each pair.
+"""A scene as the engine's mechanism, shapes and candidate pairs, with restitution and friction of each pair.
 
 The bodies of a planar scene lie in the plane z = 0 of the spatial engine. No BLAS here: its last bits depend on the
 processor.
@@ -6,6 +6,7 @@ processor.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from iapb.dense import product
 from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import Joint
+from iapb.mechanics.joints import KINDS, Joint
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
@@ -173,10 +174,56 @@ def _box_corners(width: float, height: float) -> Floats:
     return 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
 
 
+class Stop(NamedTuple):
+    """One end of a joint's range, as a contact between the joint's body and its parent.
+
+    The gap is arm · sign · (position − bound) [m]: the way to the bound of a point that the joint carries on that arm.
+    """
+
+    body: int
+    parent: int  # −1 = the world
+    sign: float  # 1 for the least position, −1 for the largest
+    bound: float  # [rad, m]
+    arm: float  # [m]; of a prismatic joint 1
+
+
+def stops_of(scene: Scene) -> tuple[Stop, ...]:
+    """Return the ends of the joints' ranges, two for each joint with limits.
+
+    A revolute joint stops on the arm of its body's radius of gyration about the axis, so that the body meets
+    the stop with its whole mass, and the contact section's numbers mean what they mean at a contact.
+    """
+    parents = _parents(scene)
+    return tuple(
+        Stop(i, parents[i], sign, bound, _stopping_arm(body))
+        for i, body in enumerate(scene.bodies) if body.joint_limits is not None
+        for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True)
+    )
+
+
+def _stopping_arm(body: Any) -> float:
+    """Radius of gyration about the joint's axis [m]; 1 where there is no axis or no mass."""
+    if body.joint != "revolute" or body.mass <= 0.0:
+        return 1.0
+    if len(body.origin) == 2:
+        inertia = body.inertia + body.mass * sum(c * c for c in body.center_of_mass)
+    else:
+        axis = np.array(body.axis) / math.hypot(*body.axis)
+        lever = np.array([axis[(k + 1) % 3] * body.center_of_mass[(k + 2) % 3]
+                          - axis[(k + 2) % 3] * body.center_of_mass[(k + 1) % 3] for k in range(3)])
+        matrix = np.array(inertia_matrix(body.inertia))
+        inertia = float((axis[:, None] * matrix * axis).sum() + body.mass * (lever * lever).sum())
+    return math.sqrt(inertia / body.mass) if inertia > 0.0 else 1.0
+
+
 def restitution_by_shape(scene: Scene) -> Floats:
-    """Return what the body or wall of each shape gives (n,), UNSTATED where none; in the order of `shapes_of`."""
+    """Return what the body or wall of each shape gives (n,), UNSTATED where none; in the order of `shapes_of`.
+
+    The joints' stops follow, which give none.
+    """
     given = [body.restitution for body in scene.bodies for _ in body.shapes]
     given += [wall.restitution for wall in scene.walls]
+    given += [None] * len(stops_of(scene))
     return np.array([UNSTATED if e is None else e for e in given], np.float64)
 
 
@@ -192,6 +239,66 @@ def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
     return np.where(smaller > 1.0, scene.contact.restitution, smaller)
 
 
+def restitutions_of(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
+    """Return the different values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
+    stops = [scene.contact.restitution] if stops_of(scene) else []
+    return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
+
+
+class Frictions(NamedTuple):
+    """Coefficients of friction by classes of shapes that are alike: table (k, k), and the class (n,) of each shape."""
+
+    class_of_shape: NDArray[np.int64]
+    table: Floats
+
+
+def frictions_of(scene: Scene) -> Frictions:
+    """Return mu of any two shapes, in the order of `shapes_of`; the joints' stops follow, which have none.
+
+    What `contact.friction_pairs` says of two things comes first. Else it is the geometric mean of the two values given,
+    as for the roughness of two surfaces; a body or wall that gives none takes the other's, and where neither gives one
+    `contact.friction` holds. So equal values stay what they are, and on ice everything slides.
+    """
+    owners = [(body.name, body.friction) for body in scene.bodies for _ in body.shapes]
+    owners += [(wall.name, wall.friction) for wall in scene.walls]
+    pairs = {frozenset(pair.between): pair.friction for pair in scene.contact.friction_pairs}
+    paired = frozenset().union(*pairs)
+    alike: dict[tuple[str, float | None], int] = {}
+    classes = [alike.setdefault((name if name in paired else "", own), len(alike)) for name, own in owners]
+    stops = len(stops_of(scene))
+    table = np.zeros((len(alike) + (stops > 0),) * 2)
+    for (a, first), i in alike.items():
+        for (b, second), k in alike.items():
+            table[i, k] = pairs.get(frozenset({a, b}), _mean_friction(first, second, scene.contact.friction))
+    return Frictions(np.array(classes + [len(alike)] * stops, np.int64), table)
+
+
+def _mean_friction(first: float | None, second: float | None, otherwise: float) -> float:
+    if first is None or second is None:
+        given = second if first is None else first
+        return otherwise if given is None else given
+    return first if first == second else math.sqrt(first * second)
+
+
+def friction_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
+    """Return mu of each pair (k, 2) of shapes (see `frictions_of`)."""
+    classes, table = frictions_of(scene)
+    return table[classes[pairs[:, 0]], classes[pairs[:, 1]]]
+
+
+def largest_friction(scene: Scene) -> float:
+    """Return the largest mu that any two things of the scene can have."""
+    things = (*scene.bodies, *scene.walls)
+    return max([scene.contact.friction, *(pair.friction for pair in scene.contact.friction_pairs),
+                *(thing.friction for thing in things if thing.friction is not None)])
+
+
+def joint_damping_of(scene: Scene) -> Floats:
+    """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
+    given = [body.joint_damping or (0.0,) * KINDS[body.joint].nv for body in scene.bodies]
+    return np.array([x for each in given for x in each], np.float64)
+
+
 def one_restitution(scene: Scene, pairs: NDArray[np.int32]) -> float:
     """Return e where all pairs have the same one; for laws that know no other case.
 
@@ -200,7 +307,7 @@ def one_restitution(scene: Scene, pairs: NDArray[np.int32]) -> float:
     ArgumentError
         Pairs differ.
     """
-    values = np.unique(restitution_by_pair(scene, pairs))
+    values = restitutions_of(scene, pairs)
     if len(values) > 1:
         found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
         raise ArgumentError("scene", scene.name, found)

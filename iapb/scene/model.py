@@ -5,8 +5,12 @@ A file with ``dimensions: 3`` is a scene in space: its vectors have three number
 
 from __future__ import annotations
 
+import bisect
 import copy
 import io
+import itertools
+import math
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
@@ -17,6 +21,7 @@ from iapb.errors import ArgumentError, SceneError
 from iapb.names import one_of
 from iapb.scene.across import across_parts
 from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, Wall
+from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     Fraction,
     Name,
@@ -36,9 +41,18 @@ MAX_BODIES = 2000
 MAX_WALLS = 2000
 MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
 MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a slip of the pen, and would not end
+MAX_PAIRS = 1000  # of things with a friction of their own
+MAX_ROWS = 100_000  # of a hand's force over time
 MAX_DELAY = 1000  # steps; a longer delay is a broken line
 AUTO = ("stiffness", "damping", "coherence_distance")  # of a contact: what `auto` chooses where it is not given
 PerCoordinate = tuple[NonNegative, ...]
+
+
+class FrictionPair(Part):
+    """The friction of two things, whatever each gives by itself."""
+
+    between: tuple[Name, Name] = Field(description="names of two bodies, or of a body and a wall")
+    friction: NonNegative = Field(description="coefficient mu [1] where these two touch")
 
 
 class Contact(Part):
@@ -55,6 +69,9 @@ class Contact(Part):
         "clamped", description="clamped (default): never pulls; printed: (5) to the letter, may pull"
     )
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
+    friction_pairs: Annotated[tuple[FrictionPair, ...], Field(max_length=MAX_PAIRS)] = Field(
+        (), description="coefficients of single pairs; they come before what bodies and walls give; default: none"
+    )
     friction_law: Literal["coulomb", "regularised"] = Field(
         "coulomb",
         description="coulomb (default): sticks and slides, implicit in the step; regularised: the paper's explicit (6)",
@@ -87,7 +104,10 @@ class Contact(Part):
 
 
 class Hand(Part):
-    """The hand: a constant force on one body, the worst case for stability (paper, section VI)."""
+    """The hand: a force on one body; a constant one is the worst case for stability (paper, section VI).
+
+    What `force`, `force_table` and `force_function` give is added. Each step has the force of its beginning.
+    """
 
     body: Name = Field(description="the body that the hand holds")
     point: Vector2 = Field(
@@ -96,6 +116,69 @@ class Hand(Part):
     force: tuple[Number, Number, Number] = Field(
         (0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], world axes; default: none"
     )
+    force_table: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MAX_ROWS)] = Field(
+        (), description="rows of time [s] and force as in force; linear in between, the first row before it and the "
+        "last one after it; default: none"
+    )
+    force_function: tuple[Expression, ...] = Field(
+        (), description="the force as functions of the time t [s], one text for each number of force, such as "
+        "0.5*sin(2*pi*t); default: none"
+    )
+
+    @field_validator("force_table")
+    @classmethod
+    def _rows_in_time(cls, rows: tuple[tuple[float, ...], ...], info: ValidationInfo) -> tuple[tuple[float, ...], ...]:
+        width = 1 + len(cls.model_fields["force"].default)
+        if any(len(row) != width for row in rows):
+            raise expectation(f"rows of {width} numbers: the time, then {width - 1} as in force")
+        if any(not after[0] > before[0] for before, after in itertools.pairwise(rows)):
+            raise expectation("rows in the order of their times, none twice")
+        return rows
+
+    @field_validator("force_function")
+    @classmethod
+    def _one_text_for_each(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
+        count = len(cls.model_fields["force"].default)
+        if texts and len(texts) != count:
+            raise expectation(f"{count} texts, one for each number of force")
+        return texts
+
+    @property
+    def changes(self) -> bool:
+        """Whether the force changes over time."""
+        return bool(self.force_table or self.force_function)
+
+    def forces(self, times: Iterable[float]) -> list[list[float]]:
+        """Return the force at times [s].
+
+        Raises
+        ------
+        IapbError
+            An expression has no finite value there.
+        """
+        functions = [function_of(text) for text in self.force_function]
+        found = []
+        for t in times:
+            force = list(self.force)
+            if self.force_table:
+                force = [a + b for a, b in zip(force, _between(self.force_table, t), strict=True)]
+            found.append([a + f(t) for a, f in zip(force, functions, strict=True)] if functions else force)
+        return found
+
+    def largest_force(self) -> float:
+        """Return the length of the largest force [N] of force and table, and that of the functions at the start."""
+        times = [0.0, *(row[0] for row in self.force_table)]
+        return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in self.forces(times))
+
+
+def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
+    """Return the row at a time, linear between two."""
+    k = bisect.bisect_right(rows, time, key=lambda row: row[0])
+    if k == 0 or k == len(rows):
+        return list(rows[0 if k == 0 else -1][1:])
+    (start, *first), (stop, *last) = rows[k - 1], rows[k]
+    share = (time - start) / (stop - start)
+    return [a + share * (b - a) for a, b in zip(first, last, strict=True)]
 
 
 class SpatialHand(Hand):
@@ -240,6 +323,30 @@ class Scene(Part):
             raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
         made._source_text = scene_text(made, f"{self.name} with new values for {', '.join(values) or 'nothing'}")
         return made
+
+
+    def with_hand_force(self, function: Callable[[float], Any]) -> Self:
+        """Return a copy whose hand pushes with function(t), t [s] at the start of each step, in place of its force.
+
+        The values stand in the copy as `hand.force_table`, so that a run records what was done.
+
+        Parameters
+        ----------
+        function
+            from the time to three numbers in the plane, six in space, as `hand.force`.
+
+        Raises
+        ------
+        ArgumentError
+            a scene without a hand, or of more than MAX_ROWS steps.
+        SceneError
+            values that are no forces.
+        """
+        if self.hand is None or self.steps > MAX_ROWS:
+            raise ArgumentError("scene", self.name, f"a scene with a hand and at most {MAX_ROWS:,} steps")
+        rows = [[k * self.step, *_plain(function(k * self.step))] for k in range(self.steps)]
+        none = [0.0] * len(self.hand.force)
+        return self.with_values({"hand.force": none, "hand.force_table": rows, "hand.force_function": []})
 
 
 class SpatialScene(Scene):

@@ -26,6 +26,10 @@ OwnRestitution = Annotated[
         description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's"
     ),
 ]
+OwnFriction = Annotated[
+    NonNegative | None,
+    Field(description="its own mu [1]; of two that touch the geometric mean; default: the other's, or contact's"),
+]
 Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]

@@ -21,6 +21,7 @@ from iapb.contact.geometry import (
 from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.run import COLLIDING, FREE, RESTING
+from iapb.scene.mechanism import Frictions
 from reference import rigid_step as stepping
 from reference.rigid_step import NEWTON, POISSON, rigid_step, velocity_bounds
 from reference.time_stepping import RigidConstraints
@@ -161,6 +162,8 @@ def peg_world(position, velocity, restitution=0.0):  # type: ignore[no-untyped-d
     system = SimpleNamespace(
         mechanism=mechanism, shapes=shapes, pairs=pairs, capacity=capacity, tool_tree=0,
         gravity=np.zeros(3), scene=SimpleNamespace(contact=contact), restitutions=np.array([restitution]),
+        stops=SimpleNamespace(bound=()), frictions=Frictions(np.zeros(3, np.int64), np.zeros((1, 1))),
+        joint_damping=np.zeros(3),
     )  # fmt: skip
     log = SimpleNamespace(
         logged=np.zeros(1, int), group=np.zeros(1, int), rows=np.zeros(1, int), rank=np.zeros(1, int),

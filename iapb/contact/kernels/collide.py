@@ -8,9 +8,10 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import find_islands
 from iapb.contact.kernels.impact import factored_impact, project_impact, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction
+from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
-from iapb.contact.kernels.rows import body_row, contact_row, direction_row, tangent_of
+from iapb.contact.kernels.rows import body_row, contact_row, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.mechanics.kernels.vectors import load
 
@@ -52,7 +53,7 @@ def gather_rows(world, state, island, size):
     for i in range(state.contact_count[0]):
         if not contacts.collides[i] or state.island_of_tree[world.tree_of_body[contacts.body_a[i]]] != island:
             continue
-        if world.per_body_rows and contacts.body_b[i] >= 0:
+        if world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i):
             for body in (contacts.body_a[i], contacts.body_b[i]):
                 body_row(world.mechanism, state.body, body, contacts.point[i], contacts.normal[i], state.row)
                 _store_row(state, size, i, count)
@@ -190,7 +191,8 @@ def resolve_unequal(world, state, size, count, smallest):
 def add_friction_to_impact(world, state, size, count, rank):
     """Friction on top of the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
     gather_tangents(world, state, size, count)
-    state.friction_work.coefficient[:count] = world.friction
+    for r in range(count):
+        state.friction_work.coefficient[r] = friction_of(world, state.contacts, state.rows[r])
     return add_impact_friction(
         state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, rank,
         state.work, state.push_work, state.friction_work, state.row_impulse, state.group_v_plus[:size],

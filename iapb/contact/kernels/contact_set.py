@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from iapb.compiled import kernel
+from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.mechanics.kernels.vectors import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
@@ -124,7 +125,9 @@ def _is_same(contacts, i, previous, j, distance, cosine):
         and contacts.feature[i] == previous.feature[j]
     ):
         return True
-    if distance == 0.0 or not same_surface(contacts, i, previous, j, cosine):
+    if distance == 0.0 or is_stop(contacts, i) or is_stop(previous, j):
+        return False
+    if not same_surface(contacts, i, previous, j, cosine):
         return False
     return squared_distance(contacts, i, previous, j) <= distance * distance
 

@@ -16,7 +16,7 @@ import numpy as np
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import moving_tree
 from iapb.contact.kernels.impact_friction import along, slide, tangent_inertia
-from iapb.contact.kernels.rows import add_body_row, tangent_of
+from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.mechanics.kernels.cholesky import solve_tree_blocks
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
@@ -109,7 +109,7 @@ def _gather(world, state):
         if not contacts.normal_force[i] > 0.0:
             continue
         f.contact[count] = i
-        f.radius[count] = world.friction * contacts.normal_force[i] * world.dt
+        f.radius[count] = friction_of(world, contacts, i) * contacts.normal_force[i] * world.dt
         first = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
         other = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
         f.tree[count, 0], f.tree[count, 1] = first, -1 if other == first else other

@@ -66,6 +66,12 @@ def direction_row(m, w, contacts, i, direction, out):
 
 
 @kernel
+def friction_of(world, contacts, i):
+    """μ of contact i: that of its two shapes."""
+    return world.friction[world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]]
+
+
+@kernel
 def tangent_of(n, which, tangents):
     """Unit tangent number `which` of a unit normal: the one in the plane z = 0 where there is one only, else of two."""
     if tangents == 1:

@@ -11,10 +11,11 @@ from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
 from iapb.contact.kernels.coulomb import add_step_friction, remember_friction
+from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
-from iapb.contact.kernels.rows import contact_velocities
-from iapb.mechanics.kernels.cholesky import cholesky_tree_blocks, solve_tree_blocks
+from iapb.contact.kernels.rows import contact_velocities, friction_of
+from iapb.mechanics.kernels.cholesky import cholesky, cholesky_tree_blocks, solve_mass, solve_tree_blocks
 from iapb.mechanics.kernels.configuration import integrate
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
 from iapb.mechanics.kernels.kinematics import forward_kinematics
@@ -91,6 +92,10 @@ def find_contacts(world, state):
         return count
     if world.switches.clustering:
         count = cluster(state.contacts, count, world.cluster_distance)
+    if world.switches.joint_limits:
+        count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, state.contacts, count)
+        if count < 0:
+            return count
     state.contact_count[0] = count
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
@@ -150,7 +155,8 @@ def move(world, state, applied):
             state.friction_force[k] += weight * state.stage_friction[k]
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
-    if world.switches.contacts and world.coulomb and not rub(world, state):
+    rubs = world.switches.contacts and world.coulomb
+    if (rubs or world.switches.joint_damping) and not implicit_forces(world, state, rubs):
         return NOT_POSITIVE_DEFINITE
     finite = True
     for k in range(state.v.shape[0]):
@@ -161,13 +167,49 @@ def move(world, state, applied):
 
 
 @kernel
-def rub(world, state):
-    """Coulomb friction of the step, from places and normal forces at its start. False: M is not definite."""
+def implicit_forces(world, state, rubs):
+    """Damping of the joints and Coulomb friction, from places and normal forces at the start. False: M not definite."""
     if world.stage_weight.shape[0] > 1:
         copy_into(state.q, state.start_q)
         if not locate(world, state):
             return False
-    add_step_friction(world, state)
+    if world.switches.joint_damping and not damp_joints(world, state):
+        return False
+    if rubs:
+        add_step_friction(world, state)
+    if world.switches.joint_damping:
+        for k in range(state.v.shape[0]):
+            state.friction_force[k] += state.acceleration[k]
+    return True
+
+
+@kernel
+def damp_joints(world, state):
+    """(M + Δt D) v⁺ = M v for the trees that are damped, D diagonal; −D v⁺ into `acceleration`. False: not definite.
+
+    v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every Δt: the step is
+    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M. These trees move with the new velocity, whatever the
+    integrator.
+    """
+    a = state.acceleration
+    for t in range(world.tree_start.shape[0]):
+        start, stop, damped = world.tree_start[t], world.tree_stop[t], False
+        for k in range(start, stop):
+            a[k] = 0.0
+            damped = damped or world.joint_damping[k] > 0.0
+        if not damped:
+            continue
+        for i in range(start, stop):
+            for j in range(start, stop):
+                state.group_mass[i, j] = state.mass_matrix[i, j]
+                a[i] += state.mass_matrix[i, j] * state.v[j]
+            state.group_mass[i, i] += world.dt * world.joint_damping[i]
+        if cholesky(state.group_mass[start:stop, start:stop], state.group_lower[start:stop, start:stop]) != 0:
+            return False
+        solve_mass(state.group_lower[start:stop, start:stop], a[start:stop], a[start:stop])
+        for k in range(start, stop):
+            state.v[k] = state.mean_v[k] = a[k]
+            a[k] *= -world.joint_damping[k]
     return True
 
 
@@ -206,13 +248,14 @@ def rest(world, state, stage):
         state.stage_friction[k] = 0.0
     if not world.switches.contacts:
         return
-    friction = 0.0 if world.coulomb else world.friction
     contacts, count = state.contacts, state.contact_count[0]
     if stage > 0:
         contacts = state.stage_contacts
         count = touching(world, state, contacts)
         if world.switches.clustering:
             count = cluster(contacts, count, world.cluster_distance)
+        if world.switches.joint_limits:
+            count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, contacts, count)
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0
@@ -221,5 +264,6 @@ def rest(world, state, stage):
         group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
                                  state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:
+            friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
             resting_force(world.mechanism, state.body, contacts, i, world.stiffness, world.damping, world.clamped,
                           friction, world.friction_velocity, state.stage_penalty, state.stage_friction)

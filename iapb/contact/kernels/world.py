@@ -30,6 +30,21 @@ class Switches(NamedTuple):
     spreading: bool
     contacts: bool
     broad_phase: bool
+    joint_damping: bool
+    joint_limits: bool
+
+
+class Stops(NamedTuple):
+    """Ends of the joints' ranges, as contacts of a body and its parent (k of them; see `iapb.scene.mechanism.Stop`)."""
+
+    body: np.ndarray  # (k,) int64
+    parent: np.ndarray  # (k,) int64, −1 = the world
+    shape: np.ndarray  # (k,) int64: stands for both shapes of the contact
+    coordinate: np.ndarray  # (k,) int64 in q
+    dof: np.ndarray  # (k,) int64
+    sign: np.ndarray  # (k,) 1 least, −1 largest position
+    bound: np.ndarray  # (k,) [rad, m]
+    arm: np.ndarray  # (k,) [m]
 
 
 class World(NamedTuple):
@@ -48,15 +63,18 @@ class World(NamedTuple):
     stiffness: float  # K [N/m] (5)
     damping: float  # B [N s/m] (5)
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
-    friction: float  # μ (6)
+    friction_class: np.ndarray  # (shapes + stops,) int64
+    friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
     coulomb: bool  # resting friction by Coulomb's law, implicit in the step; False: the paper's explicit (6)
     friction_velocity: float  # v_threshold [m/s] (6)
     restitution: float  # e of all contacts, or of those whose shapes give none
-    own_restitution: np.ndarray  # (shapes,) e that a shape's body or wall gives, above 1 = none
+    own_restitution: np.ndarray  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
     coherence_distance: float  # [m]
     per_body_rows: bool  # (13)-(14) instead of (12)
+    joint_damping: np.ndarray  # (d,) viscous [N s/m, N m s/rad]
+    stops: Stops
     impulse_limit: np.ndarray  # (d,) largest |Jᵀp/Δt| the device can render [N, N m], inf = none
     stage_fraction: np.ndarray  # (s,) where in the step each force evaluation of the integrator stands, first 0
     stage_weight: np.ndarray  # (s,) its share of the step, sum 1

@@ -1,0 +1,123 @@
+"""Functions of time in a scene file: arithmetic of t, pi and a few functions, read without running any Python.
+
+They have the same bits on every processor: decimal arithmetic in place of libm, powers by multiplication.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable
+from decimal import Decimal, localcontext
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator
+
+from iapb.errors import IapbError
+from iapb.scene.parts import Text, expectation
+
+Function = Callable[[float], float]
+
+MAX_POWER = 16
+_PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803482534")
+_NEGLIGIBLE = Decimal("1e-26")  # of a series whose sum has the size of 1
+_LARGEST_EXPONENT = 709.0  # e to it is still a double
+
+
+def _exp(x: float) -> float:
+    return float(Decimal(min(x, _LARGEST_EXPONENT + 1.0)).exp()) if x > -750.0 else 0.0
+
+
+def _sine(x: float, odd: int = 1) -> float:
+    """sin x, or cos x with odd = 0: the series of the angle less whole turns, with digits to spare for any double."""
+    with localcontext(prec=40):
+        angle = Decimal(x) % (2 * _PI)
+        term = total = angle if odd else Decimal(1)
+        n = 1 + odd
+        while abs(term) > _NEGLIGIBLE:
+            term *= -angle * angle / (n * (n + 1))
+            total += term
+            n += 2
+        return float(total)
+
+
+def _power(base: float, exponent: float) -> float:
+    if exponent != int(exponent) or not 0 <= exponent <= MAX_POWER:
+        raise ValueError(f"a power is a whole number from 0 to {MAX_POWER}")
+    return math.prod([base] * int(exponent))
+
+
+NAMES = {"pi": math.pi}
+FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {  # with the least number of arguments
+    "sin": (_sine, 1), "cos": (lambda x: _sine(x, 0), 1), "exp": (_exp, 1),
+    "sqrt": (math.sqrt, 1), "abs": (abs, 1), "step": (lambda x: 1.0 if x >= 0.0 else 0.0, 1),
+    "min": (min, 2), "max": (max, 2),
+}
+_OPERATORS: dict[type, Callable[..., float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: _power,
+    ast.UAdd: operator.pos, ast.USub: operator.neg,
+}
+_KNOWN = f"numbers, t, pi, + - * / **, and {', '.join(FUNCTIONS)} (step(x) is 1 where x >= 0, else 0)"
+
+
+@cache
+def function_of(text: str) -> Function:
+    """Return the function of t that a checked text gives; it raises IapbError where it has no finite value."""
+    inner = _made(ast.parse(text, mode="eval").body)
+
+    def function(t: float) -> float:
+        try:
+            value = float(inner(t))
+        except (ValueError, ArithmeticError) as error:
+            raise IapbError(f"{text} has no value at t = {t:g}: {error}") from error
+        if not math.isfinite(value):
+            raise IapbError(f"{text} is {value} at t = {t:g}")
+        return value
+
+    return function
+
+
+def _made(node: ast.expr) -> Function:
+    """Turn one node into a function of t; SyntaxError for what an expression does not hold."""
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            number = float(value)
+            return lambda t: number
+        case ast.Name(id="t"):
+            return lambda t: t
+        case ast.Name(id=name) if name in NAMES:
+            return lambda t: NAMES[name]
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            of, first, second = _OPERATORS[type(op)], _made(left), _made(right)
+            return lambda t: of(first(t), second(t))
+        case ast.UnaryOp(operand=operand, op=op) if type(op) in _OPERATORS:
+            of, only = _OPERATORS[type(op)], _made(operand)
+            return lambda t: of(only(t))
+        case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name in FUNCTIONS:
+            called, least = FUNCTIONS[name]
+            if len(given) != least and not (least == 2 and len(given) > 2):
+                raise SyntaxError(f"{name} takes {least} number{'s or more' if least > 1 else ''}")
+            arguments = [_made(argument) for argument in given]
+            return lambda t: called(*(argument(t) for argument in arguments))
+    raise SyntaxError(f"an expression of {_KNOWN}")
+
+
+def _checked(text: str) -> str:
+    """A text that is an expression with a finite value at t = 0."""
+    try:
+        function_of(text)(0.0)
+    except IapbError as error:
+        raise expectation(f"a finite number at t = 0: {error}") from error
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError) as error:
+        said = error.msg if isinstance(error, SyntaxError) and error.lineno is None else f"an expression of {_KNOWN}"
+        raise expectation(said) from error
+    return text
+
+
+def _as_text(given: Any) -> Any:
+    return repr(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+
+
+Expression = Annotated[Text, BeforeValidator(_as_text), AfterValidator(_checked)]

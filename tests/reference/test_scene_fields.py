@@ -1,0 +1,89 @@
+"""Rigid worlds and event-driven truth: friction by body, damping and limits of joints, a hand's force over time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from iapb.effects import ignored_fields
+from iapb.errors import ArgumentError
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.simulation import simulate
+from reference.scene_events import scene_truth
+from reference.worlds import run_world
+
+ARM = """
+name: arm
+rate: 2000
+duration: 0.6
+gravity: [0, -9.81]
+bodies:
+  - {name: upper, joint: revolute, mass: 1.0, inertia: 0.01, center_of_mass: [0.2, 0], joint_limits: [-0.5, 1.0],
+     joint_damping: 0.3}
+  - {name: lower, parent: upper, joint: revolute, origin: [0.4, 0], mass: 0.5, inertia: 0.005,
+     center_of_mass: [0.15, 0], joint_limits: [-0.6, 0.4], velocity: [3.0]}
+contact: {stiffness: 2e5, damping: 60, restitution: 0.0}
+"""
+
+
+def arm(**values: object) -> Scene:
+    return scene_from_text(ARM).with_values(values)
+
+
+@pytest.mark.parametrize("world", ["IAPB", "ideal"])
+def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str) -> None:
+    truth, errors = scene_truth(arm(), 0.6), []
+    assert len(truth.events) >= 2  # both joints meet a limit
+    for rate in (1000.0, 4000.0):
+        run = run_world(arm(rate=rate, **{"contact.stiffness": 5e4 * rate / 1000.0}), world)
+        errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))
+    assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too
+
+
+def test_a_joint_of_the_rigid_world_returns_from_its_limit_as_fast_as_it_came() -> None:
+    run = run_world(arm(gravity=None, **{"contact.restitution": 1.0, "bodies.upper.joint_damping": 0.0}), "ideal")
+    assert run.energy["kinetic"][-1] == pytest.approx(run.energy["kinetic"][0], rel=1e-2)
+    assert (np.abs(np.diff(np.sign(run.v[:, 1]))) > 0).any()
+
+
+def test_a_huge_damping_is_no_more_than_a_held_joint() -> None:
+    run = run_world(arm(**{"bodies.upper.joint_damping": 1e9, "bodies.lower.joint_damping": 1e9}), "ideal-friction")
+    assert np.abs(run.q).max() < 2e-3
+    assert (np.diff(run.energy["friction_work"]) <= 0.0).all()
+
+
+def slope(**values: object) -> Scene:
+    tilt = math.radians(20.0)
+    box = {"name": "box", "joint": "planar", "mass": 1.0, "inertia": 0.0017, "position": [0, 0.05, 0], "friction": 0.5,
+           "shapes": [{"kind": "box", "size": [0.1, 0.1]}]}
+    ice = box | {"name": "ice", "position": [-1.0, 0.05, 0.0], "friction": 0.0}
+    scene = Scene.model_validate({
+        "name": "slope", "rate": 1000.0, "duration": 0.2, "bodies": [box, ice],
+        "gravity": [9.81 * math.sin(tilt), -9.81 * math.cos(tilt)],
+        "walls": [{"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}],
+        "contact": {"stiffness": 1e4, "damping": 100.0}})
+    return scene.with_values(values)
+
+
+def test_the_rigid_world_with_friction_holds_one_body_and_lets_the_other_slide() -> None:
+    run, free = run_world(slope(), "ideal-friction"), run_world(slope(), "ideal")
+    distance = 0.5 * 9.81 * math.sin(math.radians(20.0)) * 0.2**2
+    assert abs(run.q[-1, 0]) < 1e-6
+    assert run.q[-1, 3] + 1.0 == pytest.approx(distance, rel=0.01)
+    assert "friction" in ignored_fields(free.effects)
+    assert "friction" not in ignored_fields(run.effects)
+    assert free.q[-1, 0] == pytest.approx(distance, rel=0.01)
+
+
+def test_every_world_takes_the_hands_force_over_time() -> None:
+    table = [[0.0, 0.0, 0.0, 0.0], [0.2, 0.2, 0.1, 0.0]]
+    scene = load_scene(find_scene("peg_corner")).with_values(
+        {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table})
+    engine, rigid = simulate(scene), run_world(scene, "ideal")
+    assert np.array_equal(simulate(scene, world="IAPB").hand_force, rigid.hand_force)
+    assert rigid.hand_force[-1, 0] == pytest.approx(0.2 * (len(rigid.time) - 2) * scene.step / 0.2)
+    assert engine.hand_force[-1, 0] == rigid.hand_force[-1, 0]
+    with pytest.raises(ArgumentError, match="does not change over time"):
+        scene_truth(scene, 0.2)
