@@ -24,6 +24,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import ceil
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -184,7 +185,7 @@ def bounded_memory() -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
-_BATCH = 500  # cases that one process tries
+_BATCH = 2000  # cases that one process tries
 _SHOWN = 5
 _SAID = 160  # characters of a message that the report shows
 _COLUMNS = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
@@ -194,10 +195,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Try the cases and keep the result; return 0 if none broke anything, else 1."""
     options = _options(arguments)
     chosen = [options.kind] if options.kind else list(KINDS)
-    share = -(-options.cases // len(chosen))
+    shares = sum(KINDS[kind].share for kind in chosen)
     broken: list[Broken] = []
     rows, start = [], time.monotonic()
     for kind in chosen:
+        share = ceil(options.cases * KINDS[kind].share / shares)
         found = list(_records(kind, range(options.first, options.first + share), options.seed, options.keep))
         read, refused = sum(record.read for record in found), sum(record.refused for record in found)
         bad = sum(len(record.broken) for record in found)
@@ -205,7 +207,7 @@ def main(arguments: list[str] | None = None) -> int:
         said = min((record.said for record in found), key=lambda text: (not text, len(text)))
         rows.append((kind, share, refused, read, bad, " ".join(said.split())[:_SAID]))
         print(f"{kind:<22} {share:>7} tried, {read:>6} read, {refused:>6} refused by name, {bad} broken", flush=True)
-    tried = share * len(chosen)
+    tried = sum(row[1] for row in rows)
     print(f"{tried} cases of {len(chosen)} kinds in {time.monotonic() - start:.0f} s; {len(broken)} broken.")
     for each in broken[:_SHOWN]:
         print(f"{each.file}\n{each.how}")
@@ -217,7 +219,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _options(arguments: list[str] | None) -> Any:
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.fuzz", description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=100_000, help="in all, shared out evenly among the kinds")
+    parser.add_argument("--cases", type=int, default=100_000, help="in all, shared out among the kinds")
     parser.add_argument("--kind", choices=list(KINDS), help="only this one")
     parser.add_argument("--first", type=int, default=0, help="number of the first case of each kind")
     parser.add_argument("--seed", type=int, default=0)
@@ -227,7 +229,7 @@ def _options(arguments: list[str] | None) -> Any:
 
 def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzRecord]:
     """Yield a record per batch; where a process died, one for that case, and the rest of its batch is tried again."""
-    KINDS[kind].samples()  # made once, here
+    _warm(KINDS[kind])
     batches = [numbers[at : at + _BATCH] for at in range(0, len(numbers), _BATCH)]
     while batches:
         batch = batches.pop(0)
@@ -237,6 +239,14 @@ def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzR
             batches[:0] = [part for part in (batch[:at], batch[at + 1 :]) if part]
             record = _died(kind, last, seed, keep, status)
         yield record
+
+
+def _warm(kind: Any) -> None:
+    """Make and read the valid samples here, once: each process that is forked has their modules and kernels."""
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder))
+        for name, content in kind.samples().items():
+            judge(kind, Path(folder) / name, content)
 
 
 def _in_child(kind: str, batch: range, seed: int, keep: Path) -> tuple[FuzzRecord | None, int, int | None]:
@@ -273,7 +283,6 @@ def _died(kind: str, number: int, seed: int, keep: Path, status: int | None) -> 
     how = f"the process ended with {status}"
     broken = Broken(kind, number, seed, how, kept(keep, kind, number, name, content, how))
     return FuzzRecord(kind, 1, 0, 0, (broken,), how)
-
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +26,25 @@ import numpy as np
 from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
-from iapb.scene import scene_folder
+from iapb.recording import Recorder
+from iapb.scene import Scene, find_scene, scene_folder
 from iapb.scene.reading import read_document
+from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import read_problem
 from reference.fclib import _write_rows, write_fclib
+from reference.worlds import find_world
 from reports.cli import main
 from reports.commands.inspect import inspect
+from reports.live.deadline import TICK_COLUMNS
+from reports.live.replay import finish_live, is_live, open_log
+from reports.store.folder import Place
 from reports.store.io import sealed
+from reports.store.keys import content_hash
+from reports.store.logs import RunLog, read_log
+from reports.store.runs import read_entry
 from reports.store.tables import Column, Table, read_table, write_table
+from reports.streaming import log_head, recover, stream
 from reports.sweeps.study import load_study, points_of, scene_of
 from tests.robustness.damage import TOKENS, Rng, damaged_bytes, damaged_text, damaged_values
 from tests.robustness.faults import inputs_of, open_store, sample_run
@@ -49,12 +59,14 @@ class Kind:
     samples : valid inputs, as bytes, by file name
     damaged : (sample, another sample, rng) -> wrong input
     read : reads a file; ends without a word, or raises an IapbError
+    share : of the cases, beside the other kinds: less where a case takes long
     """
 
     name: str
     samples: Callable[[], dict[str, bytes]]
     damaged: Callable[[bytes, bytes, Rng], bytes]
     read: Callable[[Path], None]
+    share: float = 1.0
 
 
 def prepare(folder: Path) -> None:
@@ -246,6 +258,89 @@ _WRONG: tuple[Any, ...] = (
 )  # fmt: skip
 
 
+_PART, _PARTS = 60, 4  # steps of a chunk of the logs, and how many there are
+
+
+@cache
+def _logged() -> tuple[dict[str, bytes], list[str], str]:
+    """The logs of a run, to read and to go on from, and of a live run; what first chunks, and what all, come to."""
+    hashes: list[str] = []
+    scene = load_scene(find_scene("peg_corner"))
+    with tempfile.TemporaryDirectory() as folder:
+        simulation = _simulation(scene)
+        recorder, total = Recorder(simulation), _PART * _PARTS
+        logs = (RunLog(Path(folder) / "run.h5.log", log_head(simulation, "IAPB", total, key=_KEY, code=_KEY)),
+                open_log(Path(folder), "live", simulation, "IAPB", total))  # fmt: skip
+        for _ in range(_PARTS):
+            recorder.chunk(recorder.steps + _PART)
+            hashes.append(content_hash(recorder.run("IAPB", "killed")))
+            for log, more in zip(logs, ((), (np.zeros((_PART, TICK_COLUMNS)),)), strict=True):
+                log.write_chunk(recorder.records[-1], _PART, 0.0, more)
+                log.write_state(simulation.arrays())
+        for log in logs:
+            log.close()
+        run, live = (log.path.read_bytes() for log in logs)
+        return {"read.h5.log": run, _GO_ON: run, "live.h5.log": live}, hashes, content_hash(recorder.run("IAPB", ""))
+
+
+_KEY, _GO_ON = "fuzz", "run.h5.log"
+
+
+def _simulation(scene: Scene) -> Simulation:
+    world = find_world("IAPB")
+    return Simulation(scene, world.law, world.coupling_in(scene))
+
+
+def damaged_log(sample: bytes, other: bytes, rng: Rng) -> bytes:
+    """Damage to the first line, to the lines of blocks, anywhere; or whole blocks lost, doubled or put elsewhere."""
+    pieces, kind = _blocks(sample), rng.random()
+    if kind < 0.35:
+        return damaged_bytes(pieces[0], rng) + b"".join(pieces[1:])
+    if kind < 0.6:
+        at = int(rng.integers(1, len(pieces)))
+        line, _, numbers = pieces[at].partition(b"\n")
+        pieces[at] = damaged_bytes(line, rng) + b"\n" + numbers
+        return b"".join(pieces)
+    if kind < 0.8:
+        return damaged_bytes(sample, rng)
+    at, to = (int(rng.integers(1, len(pieces))) for _ in range(2))
+    taken = (pieces if rng.random() < 0.7 else _blocks(other))[at]
+    if rng.random() < 0.5:
+        del pieces[to]
+    return b"".join([*pieces[:to], taken, *pieces[to:]])
+
+
+@cache
+def _places(log: bytes) -> tuple[int, ...]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log"
+        path.write_bytes(log)
+        return (0, *(block.start for block in read_log(path)[1]), len(log))
+
+
+def _blocks(log: bytes) -> list[bytes]:
+    """The first line of a log, and each of its blocks."""
+    return [log[start:end] for start, end in pairwise(_places(log))]
+
+
+class WrongContent(Exception):
+    """Something else came of a damaged log than of the whole one."""
+
+
+def _read_log(path: Path) -> None:
+    """Go on to the end of a run; of a live run, and of another, make readable what there is."""
+    _, parts, whole = _logged()
+    target = path.with_suffix("")
+    target.unlink(missing_ok=True)
+    if path.name == _GO_ON:
+        simulation = _simulation(load_scene(find_scene("peg_corner")))
+        stream(Place(_KEY, target), simulation, "IAPB", _PART * _PARTS, resume=True)
+        if read_entry(target).content_hash != whole:
+            raise WrongContent("the run that went on is another one")
+    elif read_entry(finish_live(path, "killed")[0] if is_live(path) else recover(path)).content_hash not in parts:
+        raise WrongContent("the steps are others than were recorded")
+
+
 _LINES = (
     "run peg_corner --set duration=0.05",
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
@@ -339,11 +434,12 @@ def _called(words: list[str], folder: Path) -> tuple[int, str, str]:
 KINDS = {kind.name: kind for kind in (
     Kind("scenes in the plane", _planar, _scene_or_text, _read_scene),
     Kind("scenes in space", _spatial, _scene_or_text, _read_scene),
-    Kind("URDF robots", _robots, _text_or_bytes, _read_robot),
-    Kind("sweep studies", _studies, _scene_or_text, _read_study),
-    Kind("LCP and MLCP files", problem_texts, _only_text_or_bytes, _read_problem),
+    Kind("URDF robots", _robots, _text_or_bytes, _read_robot, 1.5),
+    Kind("sweep studies", _studies, _scene_or_text, _read_study, 1.5),
+    Kind("LCP and MLCP files", problem_texts, _only_text_or_bytes, _read_problem, 1.25),
     Kind("FCLIB files", fclib_files, damaged_hdf5, _read_problem),
-    Kind("run files and tables", result_files, _only_bytes, _read_results),
-    Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results),
-    Kind("command lines", lines, damaged_line, run_line),
+    Kind("run files and tables", result_files, _only_bytes, _read_results, 1.25),
+    Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results, 0.6),
+    Kind("logs of killed runs", lambda: _logged()[0], damaged_log, _read_log, 0.4),
+    Kind("command lines", lines, damaged_line, run_line, 0.5),
 )}  # fmt: skip

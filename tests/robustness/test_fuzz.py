@@ -12,7 +12,8 @@ from tests.robustness.damage import Rng
 from tests.robustness.fuzz import BROKEN, case, fuzz, judge, main
 from tests.robustness.inputs import KINDS, Kind, prepare
 
-CASES = {"scenes in the plane": 200, "scenes in space": 100, "sealed run files": 60, "command lines": 60}
+CASES = {"scenes in the plane": 200, "scenes in space": 100, "sealed run files": 60, "command lines": 60,
+         "logs of killed runs": 60}
 OTHERS = 200  # of the kinds that cost less
 
 
