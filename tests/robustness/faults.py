@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
 from functools import cache, partial
+from math import inf
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -328,6 +329,8 @@ def try_faults(
         place = folder / str(number)
         place.mkdir(parents=True)
         records.append(FaultRecord(name, *fault(place, times)))
+        one = records[-1]
+        print(f"{name:<34} {one.tried:>5} tried, {one.survived:>5} survived, {one.lost} lost: {one.said}", flush=True)
     return tuple(records)
 
 
@@ -336,13 +339,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.faults", description=__doc__.splitlines()[0])
     parser.add_argument("--times", type=int, default=120, help="how often each fault is done")
     parser.add_argument("--kills", type=int, default=102, help="how often a command is killed, in all")
+    parser.add_argument("--seconds", type=float, default=inf, help="after which a command is killed no more")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         records = try_faults(Path(folder) / "store", given.times)
-        records += try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), KILLS)
-    for one in records:
-        print(f"{one.fault:<34} {one.tried:>5} tried, {one.survived:>5} survived, {one.lost} lost")
-    remember("faults", f"python -m tests.robustness.faults --times {given.times} --kills {given.kills}",
+        kills = {name: partial(kill, seconds=given.seconds) for name, kill in KILLS.items()}
+        records += try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), kills)
+    limit = f" --seconds {given.seconds:g}" if given.seconds < inf else ""
+    remember("faults", f"python -m tests.robustness.faults --times {given.times} --kills {given.kills}{limit}",
              ("fault", "tried", "survived", "lost", "what one reads"), [astuple(one) for one in records])
     return int(any(one.survived < one.tried or one.lost for one in records))
 

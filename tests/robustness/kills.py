@@ -1,73 +1,150 @@
-"""Commands killed at random moments, in a tree of other people's files: `KILLS` by name, each `fault(folder, times)`.
+"""Commands killed while they write, in a tree of other people's files: `KILLS` by name, each `fault(folder, times)`.
 
 Part of `python -m tests.robustness.faults`. A kill is survived if no result is damaged, no finished one is gone, and
-the hash of the foreign tree is as before; at the end each command must come to its end.
+the hash of the foreign tree is as before. The same command goes on in what the kill left, and is killed again; what it
+comes to in the end has the content of a run that nobody disturbed. A kill counts where the command was still running.
+
+The commands start in a process that has imported iapb and loaded its kernels, and runs go to their log early and often:
+a kill meets their writing, not imports.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+import shutil
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
+from math import inf
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from reports.store.care import DAMAGED, WHOLE, check_store
+from reports import streaming
+from reports.cli import main
+from reports.store.care import DAMAGED, LEFTOVER, PARTIAL, WHOLE, check_store, is_run
 from reports.store.io import mark_store
+from reports.store.runs import read_entry, read_run, store_run
 
-ROOT = Path(__file__).resolve().parents[2]
 OWN = "own"  # folder of a command's results, in the foreign tree
 STUDY = """\
 name: killed
 title: Killed
 scene: peg_corner
 worlds: [IAPB]
-values: {duration: 2.0}
+values: {duration: 1.0}
 grid:
-  contact.friction: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+  contact.friction: [0.0, 0.2, 0.4]
 """
 FOREIGN = ("thesis.h5", "big.iso.partial", "notes.txt", "mine-0123456789abcdef.h5", ".x.h5.1.writing",
            f"{OWN}/thesis.h5", f"{OWN}/log.h5.log", f"{OWN}/y.h5.2.writing", f"{OWN}/z.h5.partial")  # fmt: skip
 COMMANDS: dict[str, Sequence[str]] = {
-    "run": ("run", "peg_corner", "--set", "duration=400", "--resume", "--out", OWN),
-    "live": ("live", "peg_corner", "--seconds", "2", "--out", OWN),
-    "sweep": ("sweep", "study.yaml", "--workers", "2", "--out", OWN),
+    "run": ("run", "peg_corner", "--set", "duration=60", "--resume", "--out", OWN),
+    "live": ("live", "peg_corner", "--seconds", "0.7", "--out", OWN),
+    "sweep": ("sweep", "study.yaml", "--workers", "1", "--out", OWN),
     "reproduce": ("reproduce", "--figure", "fig02", "--out", OWN),
-    "verify": ("verify", "--full", "--impacts", "300", "--trajectories", "2", "--out", OWN),
+    "verify": ("verify", "--full", "--impacts", "20", "--trajectories", "1", "--workers", "1", "--out", OWN),
     "store gc": ("store", "gc", OWN, "--delete"),
 }
+_GARBAGE, _STALE = 5, "stale-"  # files that gc finds, of each of two kinds
+_LIVE = re.compile(r"peg_corner-\d{8}T\d+\.h5")
+_POLL_SECONDS = 1e-3
+_MOST_ATTEMPTS = 5  # per kill that counts
 
 
-def killed_command(name: str, folder: Path, times: int) -> tuple[int, int, int, str]:
-    """Start a command and kill it with its children within the time that it takes undisturbed."""
+def killed_command(name: str, folder: Path, times: int, seconds: float = inf) -> tuple[int, int, int, str]:
+    """Start a command, kill it at some moment after it first changed its folder, start it again in what is left.
+
+    `seconds` : after which no more kills are tried.
+    """
     _make_foreign(folder)
-    mark_store(folder / OWN)  # iapb store gc touches marked folders only
-    before, rng, survived, lost = foreign_hash(folder), np.random.default_rng(0), 0, 0
-    began = time.monotonic()
-    assert _start(name, folder).wait() == 0, f"iapb {name} does not run"
-    longest = time.monotonic() - began
-    for _ in range(times):
+    garbage = _garbage_and_a_run(folder) if name == "store gc" else b""
+    kept = set((folder / OWN).iterdir())
+    before, rng, count, survived, lost, making = foreign_hash(folder), np.random.default_rng(0), 0, 0, 0, 0
+    rest = _undisturbed(name, folder, garbage)
+    contents, until = _contents(folder), time.monotonic() + seconds
+    _clear(folder, kept)
+    for _ in range(_MOST_ATTEMPTS * times):
+        if count == times or time.monotonic() > until:
+            break
+        _plant(folder, garbage)
         finished = _finished(folder)
-        if name in ("run", "sweep"):  # and not read from its file
-            for path in finished:
-                path.unlink()
-            finished = set()
-        process = _start(name, folder)
-        time.sleep(float(rng.uniform(0.2, 1.0)) * longest)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        child = _start(name, folder)
+        _changed(folder, child)
+        child.join(float(rng.uniform(0.0, rest)))
+        if child.exitcode is None:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.join()
+        if child.exitcode != -signal.SIGKILL:  # it was done before
+            if child.exitcode or _contents(folder) != contents:
+                return count, 0, lost, f"it came to something else, with {child.exitcode}"
+            _clear(folder, kept)
+            continue
+        states = check_store(folder / OWN)
         gone = len(finished - _finished(folder))
-        damaged = sum(state.state == DAMAGED for state in check_store(folder / OWN))
-        lost += gone
-        survived += gone == 0 and damaged == 0 and foreign_hash(folder) == before
-    ended = _start(name, folder).wait()
-    return times, survived if ended == 0 else 0, lost, "nothing: the process is gone; the next one goes on"
+        count, lost = count + 1, lost + gone
+        left = sum(state.state in (LEFTOVER, PARTIAL) or state.path.name.startswith(_STALE) for state in states)
+        making += 0 < left < 2 * _GARBAGE if garbage else left > 0
+        damaged = any(state.state == DAMAGED for state in states)
+        survived += gone == 0 and not damaged and foreign_hash(folder) == before
+    ended = _call(COMMANDS[name], folder) == 0 and _contents(folder) == contents
+    repaired = _call(("store", "repair", OWN), folder) == 0 and foreign_hash(folder) == before
+    met = "the middle of its work" if garbage else "a file in the making"
+    said = f"nothing: the next one goes on; {making} of {count} met {met}"
+    return count, survived if ended and repaired else 0, lost, said
+
+
+def _undisturbed(name: str, folder: Path, garbage: bytes) -> float:
+    """Do a command here, so that all is loaded, and in a child; return how long that takes after its first change."""
+    kept = set((folder / OWN).iterdir())
+    _plant(folder, garbage)
+    assert _call(COMMANDS[name], folder) == 0, f"iapb {name} does not run"
+    _clear(folder, kept)
+    _plant(folder, garbage)
+    child = _start(name, folder)
+    _changed(folder, child)
+    began = time.monotonic()
+    child.join()
+    return time.monotonic() - began
+
+
+def _call(words: Sequence[str], folder: Path) -> int:
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+            return main(list(words))
+    finally:
+        os.chdir(before)
+
+
+def _start(name: str, folder: Path) -> Any:
+    process = get_context("fork").Process(target=_child, args=(name, folder))
+    process.start()
+    return process
+
+
+def _child(name: str, folder: Path) -> None:
+    os.setsid()
+    streaming.HELD, streaming.PAUSE = 1 << 18, 0.05
+    os._exit(_call(COMMANDS[name], folder))
+
+
+def _changed(folder: Path, child: Any) -> None:
+    """Wait until something changes in the command's folder, or the command ends."""
+    before = _listing(folder)
+    while child.exitcode is None and _listing(folder) == before:
+        time.sleep(_POLL_SECONDS)
+
+
+def _listing(folder: Path) -> set[str]:
+    return {f"{place}/{name}" for place, _, names in os.walk(folder / OWN) for name in names}
 
 
 def _make_foreign(folder: Path) -> None:
@@ -79,6 +156,7 @@ def _make_foreign(folder: Path) -> None:
         os.utime(path, (0.0, 0.0))
     (folder / "study.yaml").write_text(STUDY)
     (folder / OWN / "link.h5").symlink_to(folder / "thesis.h5")
+    mark_store(folder / OWN)  # iapb store gc touches marked folders only
 
 
 def foreign_hash(folder: Path) -> str:
@@ -90,17 +168,43 @@ def foreign_hash(folder: Path) -> str:
     return digest.hexdigest()
 
 
+def _garbage_and_a_run(folder: Path) -> bytes:
+    """Store a run of the present code, which gc has to keep; return one of older code."""
+    assert _call(("run", "peg_corner", "--set", "duration=0.5", "--out", OWN), folder) == 0
+    [kept] = _finished(folder)
+    store_run(folder / "older.h5", read_run(kept), key="older", code="iapb older")
+    return (folder / "older.h5").read_bytes()
+
+
+def _plant(folder: Path, garbage: bytes) -> None:
+    """Put there what gc removes: runs of older code, and what writers left that were killed an hour ago."""
+    for number in range(_GARBAGE if garbage else 0):
+        (folder / OWN / f"{_STALE}{number}.h5").write_bytes(garbage)
+        left = folder / OWN / f".{_STALE}{number}.h5.1.writing"
+        left.write_bytes(b"half")
+        os.utime(left, (0.0, 0.0))
+
+
+def _clear(folder: Path, kept: set[Path]) -> None:
+    for path in set((folder / OWN).iterdir()) - kept:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
 def _finished(folder: Path) -> set[Path]:
-    return {state.path for state in check_store(folder / OWN) if state.state == WHOLE}
+    return {state.path for state in check_store(folder / OWN)
+            if state.state == WHOLE and not state.path.name.startswith(_STALE)}  # fmt: skip
 
 
-def _start(name: str, folder: Path) -> subprocess.Popen[bytes]:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen([sys.executable, "-m", "reports.cli", *COMMANDS[name]], cwd=folder, env=environment,
-                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)  # fmt: skip
+def _contents(folder: Path) -> dict[str, str]:
+    """Content hash of each finished run; live ones have the time in their name, and are never the same."""
+    return {path.name: read_entry(path).content_hash for path in _finished(folder)
+            if is_run(path) and not _LIVE.fullmatch(path.name)}  # fmt: skip
 
 
 # name -> (folder, times) -> tried, survived, lost, said
-KILLS: dict[str, Callable[[Path, int], tuple[int, int, int, str]]] = {
+KILLS: dict[str, Callable[..., tuple[int, int, int, str]]] = {
     f"kill -9 of iapb {name}": partial(killed_command, name) for name in COMMANDS
 }
