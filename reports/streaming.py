@@ -120,6 +120,7 @@ class _Stream:
             self.log.write_state(self.simulation.arrays())  # type: ignore[union-attr]
             now = time.monotonic()
             self._next = now + max(PAUSE, (now - began) / _STATE_SHARE)
+            self.log.sync()  # type: ignore[union-attr]
 
     def _spill(self) -> None:
         """Append the chunks that are held and not yet in the log: Ctrl-C may come in the middle, and again."""

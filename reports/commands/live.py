@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -55,6 +56,8 @@ def live(
             run, timetable, pace = finish_live(log.path, stopped, log.steps)
         except BaseException:
             log.close(remove=log.steps == 0)
+            if log.steps:
+                print(f"What was done is in {log.path}; iapb store repair {out} makes it readable.", file=sys.stderr)
             raise
         log.close(remove=True)
     describe(pace)

@@ -28,7 +28,7 @@ from reports.store.care import (
     mark_stores,
     repair_store,
 )
-from reports.store.logs import is_whole
+from reports.store.logs import is_damaged
 from reports.store.runs import read_provenance
 from reports.streaming import logs_of_killed, recover
 
@@ -98,10 +98,10 @@ def _tell_recovered(log: Path) -> None:
         print(f"{recover(log)}: what a killed run did; iapb run --resume goes on")
         return
     print(f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable")
-    if is_whole(log):
-        log.unlink()
+    if is_damaged(log):
+        print(f"{log}: damaged; what is before the damage is in the run, the log is kept")
     else:
-        print(f"{log}: kept, for its end is cut off or damaged")
+        log.unlink()
 
 
 def _tell(states: Sequence[FileState]) -> None:

@@ -269,7 +269,8 @@ def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
             with aside.open("ab") as end:
                 end.write(mark)
     except (OSError, RuntimeError) as error:
-        why = getattr(error, "strerror", None) or error
+        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library says so, among other things
+        why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
         raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
 
 

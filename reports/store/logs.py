@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from iapb.errors import RunFileError
 from iapb.recording import CONTACTS, IMPACTS, STATES, STEPS
 from iapb.run import Quantity
+from reports.store.io import sync
 
 LOG_SUFFIX = ".log"
 CHUNK, STATE = "chunk", "state"
@@ -103,6 +104,14 @@ class RunLog:
         """Append everything that the next step depends on."""
         self._write_block({"kind": STATE, "steps": self.steps}, arrays)
 
+    def sync(self) -> None:
+        """Wait until all that is written is on the disk, so that no power cut takes it."""
+        try:
+            os.fdatasync(self._file)
+            sync(self.path.parent)
+        except OSError as error:
+            raise self._failed(error) from error
+
     def _write_block(self, line: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> None:
         numbers = b"".join(array.tobytes() for array in arrays)
         self._write({**line, "bytes": len(numbers)}, numbers)
@@ -120,9 +129,12 @@ class RunLog:
                 done = os.pwrite(self._file, view, place)
                 place, view = place + done, view[done:]
         except OSError as error:
-            raise RunFileError(f"{self.path}: cannot be written: {error.strerror or error}; --resume goes on from the "
-                               "last state in it") from error
+            raise self._failed(error) from error
         return place
+
+    def _failed(self, error: OSError) -> RunFileError:
+        return RunFileError(f"{self.path}: cannot be written: {error.strerror or error}; --resume goes on from the "
+                            "last state in it")  # fmt: skip
 
     def close(self, *, remove: bool = False) -> None:
         """Give up the lock; with `remove` the file too."""
@@ -188,12 +200,17 @@ def _blocks_from(path: Path, start: int, before: str) -> Iterator[Block]:
             start, before = block.end, line[_SEAL]
 
 
-def is_whole(path: Path) -> bool:
-    """Whether a log is whole up to its last byte."""
+def is_damaged(path: Path) -> bool:
+    """Whether a log holds more than its whole blocks and one that is cut off, as a kill or a full disk leaves it."""
     end = 0
     for block in read_log(path)[1]:
         end = block.end
-    return end == path.stat().st_size
+    rest = path.stat().st_size - end
+    with path.open("rb") as file:
+        file.seek(end)
+        text = file.readline(_LONGEST_LINE)
+    line = _parsed(text) or {}
+    return text.endswith(b"\n") and not (_is_block(line) and line["bytes"] > rest - len(text))
 
 
 def _parsed(text: bytes) -> dict[str, Any] | None:

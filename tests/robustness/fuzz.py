@@ -24,7 +24,8 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import ceil
+from functools import cache
+from math import ceil, inf
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -186,6 +187,7 @@ def bounded_memory() -> Iterator[None]:
 
 
 _BATCH = 2000  # cases that one process tries
+_ROUNDS = 100
 _SHOWN = 5
 _SAID = 160  # characters of a message that the report shows
 _COLUMNS = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
@@ -196,30 +198,40 @@ def main(arguments: list[str] | None = None) -> int:
     options = _options(arguments)
     chosen = [options.kind] if options.kind else list(KINDS)
     shares = sum(KINDS[kind].share for kind in chosen)
-    broken: list[Broken] = []
-    rows, start = [], time.monotonic()
-    for kind in chosen:
-        share = ceil(options.cases * KINDS[kind].share / shares)
-        found = list(_records(kind, range(options.first, options.first + share), options.seed, options.keep))
-        read, refused = sum(record.read for record in found), sum(record.refused for record in found)
-        bad = sum(len(record.broken) for record in found)
-        broken += [one for record in found for one in record.broken]
-        said = min((record.said for record in found), key=lambda text: (not text, len(text)))
-        rows.append((kind, share, refused, read, bad, " ".join(said.split())[:_SAID]))
-        print(f"{kind:<22} {share:>7} tried, {read:>6} read, {refused:>6} refused by name, {bad} broken", flush=True)
+    sizes = {kind: ceil(options.cases * KINDS[kind].share / shares) for kind in chosen}
+    found: dict[str, list[FuzzRecord]] = {kind: [] for kind in chosen}
+    start = time.monotonic()
+    for turn in range(_ROUNDS):  # all kinds in turn, so that each is tried where time is short
+        for kind, size in sizes.items():
+            numbers = range(options.first + turn * size // _ROUNDS, options.first + (turn + 1) * size // _ROUNDS)
+            if numbers and time.monotonic() - start < 60.0 * options.minutes:
+                found[kind] += _records(kind, numbers, options.seed, options.keep)
+    rows = [_row(kind, records) for kind, records in found.items()]
+    broken = [one for records in found.values() for record in records for one in record.broken]
+    for kind, tried, refused, read, bad, _ in rows:
+        print(f"{kind:<22} {tried:>7} tried, {read:>6} read, {refused:>6} refused by name, {bad} broken", flush=True)
     tried = sum(row[1] for row in rows)
     print(f"{tried} cases of {len(chosen)} kinds in {time.monotonic() - start:.0f} s; {len(broken)} broken.")
     for each in broken[:_SHOWN]:
         print(f"{each.file}\n{each.how}")
     if len(chosen) == len(KINDS):
+        limit = f" --minutes {options.minutes:g}" if options.minutes < inf else ""
         remember("wrong input", f"python -m tests.robustness.fuzz --cases {options.cases} --seed {options.seed} "
-                                f"--first {options.first}", _COLUMNS, rows)  # fmt: skip
+                                f"--first {options.first}{limit}", _COLUMNS, rows)  # fmt: skip
     return 1 if broken else 0
+
+
+def _row(kind: str, records: Sequence[FuzzRecord]) -> tuple[str, int, int, int, int, str]:
+    said = min((record.said for record in records), key=lambda text: (not text, len(text)), default="")
+    return (kind, sum(record.tried for record in records), sum(record.refused for record in records),
+            sum(record.read for record in records), sum(len(record.broken) for record in records),
+            " ".join(said.split())[:_SAID])  # fmt: skip
 
 
 def _options(arguments: list[str] | None) -> Any:
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.fuzz", description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=100_000, help="in all, shared out among the kinds")
+    parser.add_argument("--minutes", type=float, default=inf, help="after which no more are tried")
     parser.add_argument("--kind", choices=list(KINDS), help="only this one")
     parser.add_argument("--first", type=int, default=0, help="number of the first case of each kind")
     parser.add_argument("--seed", type=int, default=0)
@@ -229,7 +241,7 @@ def _options(arguments: list[str] | None) -> Any:
 
 def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzRecord]:
     """Yield a record per batch; where a process died, one for that case, and the rest of its batch is tried again."""
-    _warm(KINDS[kind])
+    _warm(kind)
     batches = [numbers[at : at + _BATCH] for at in range(0, len(numbers), _BATCH)]
     while batches:
         batch = batches.pop(0)
@@ -241,12 +253,13 @@ def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzR
         yield record
 
 
-def _warm(kind: Any) -> None:
+@cache
+def _warm(kind: str) -> None:
     """Make and read the valid samples here, once: each process that is forked has their modules and kernels."""
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
-        for name, content in kind.samples().items():
-            judge(kind, Path(folder) / name, content)
+        for name, content in KINDS[kind].samples().items():
+            judge(KINDS[kind], Path(folder) / name, content)
 
 
 def _in_child(kind: str, batch: range, seed: int, keep: Path) -> tuple[FuzzRecord | None, int, int | None]:

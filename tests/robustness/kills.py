@@ -52,7 +52,7 @@ COMMANDS: dict[str, Sequence[str]] = {
     "verify": ("verify", "--full", "--impacts", "20", "--trajectories", "1", "--workers", "1", "--out", OWN),
     "store gc": ("store", "gc", OWN, "--delete"),
 }
-_GARBAGE, _STALE = 5, "stale-"  # files that gc finds, of each of two kinds
+_OLDER, _LEFT, _STALE = 3, 1500, "stale-"  # files that gc finds: runs of older code, and what killed writers left
 _LIVE = re.compile(r"peg_corner-\d{8}T\d+\.h5")
 _POLL_SECONDS = 1e-3
 _MOST_ATTEMPTS = 5  # per kill that counts
@@ -90,7 +90,7 @@ def killed_command(name: str, folder: Path, times: int, seconds: float = inf) ->
         gone = len(finished - _finished(folder))
         count, lost = count + 1, lost + gone
         left = sum(state.state in (LEFTOVER, PARTIAL) or state.path.name.startswith(_STALE) for state in states)
-        making += 0 < left < 2 * _GARBAGE if garbage else left > 0
+        making += 0 < left < _OLDER + _LEFT if garbage else left > 0
         damaged = any(state.state == DAMAGED for state in states)
         survived += gone == 0 and not damaged and foreign_hash(folder) == before
     ended = _call(COMMANDS[name], folder) == 0 and _contents(folder) == contents
@@ -178,8 +178,9 @@ def _garbage_and_a_run(folder: Path) -> bytes:
 
 def _plant(folder: Path, garbage: bytes) -> None:
     """Put there what gc removes: runs of older code, and what writers left that were killed an hour ago."""
-    for number in range(_GARBAGE if garbage else 0):
+    for number in range(_OLDER if garbage else 0):
         (folder / OWN / f"{_STALE}{number}.h5").write_bytes(garbage)
+    for number in range(_LEFT if garbage else 0):
         left = folder / OWN / f".{_STALE}{number}.h5.1.writing"
         left.write_bytes(b"half")
         os.utime(left, (0.0, 0.0))

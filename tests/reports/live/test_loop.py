@@ -10,12 +10,14 @@ import pytest
 
 from iapb.errors import IapbError
 from reference.worlds import run_world
+from reports.cli import main
 from reports.live.budget import RowBudget, RowCost, calibrated
 from reports.live.deadline import PERCENTILES, Timetable
 from reports.live.loop import Loop
 from reports.live.measure import made_device, summary
 from reports.live.replay import finish_live, is_live, open_log, read_live, replay
 from reports.store.keys import content_hash
+from reports.store.logs import is_damaged, read_log
 from reports.streaming import logs_of_killed
 
 PERIOD = 1e-3
@@ -139,6 +141,14 @@ def test_a_live_run_that_is_killed_is_there_up_to_its_last_chunk(peg, fake_clock
     stored = read_live(finish_live(log, "killed")[0])
     assert stored.run.steps == 3 * 512 == len(stored.timetable.due) and stored.run.stopped == "killed"
     assert content_hash(replay(stored)) == content_hash(stored.run)
+    content, last = log.read_bytes(), list(read_log(log)[1])[-1]
+    for cut in (len(content), last.end - 1, last.start + 20, last.start):
+        log.write_bytes(content[:cut])
+        assert not is_damaged(log)
+    log.write_bytes(content[: last.start + 20] + b"x" + content[last.start + 21 :])
+    assert is_damaged(log) and main(["store", "repair", str(tmp_path)]) == 0 and log.is_file()
+    log.write_bytes(content)
+    assert main(["store", "repair", str(tmp_path)]) == 0 and not log.is_file()
 
 
 class Fails:
