@@ -30,18 +30,27 @@ from iapb.contact.geometry import (
     make_contact_buffer,
 )
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.laws import FRICTION, PENALTY, ContactLaw, ImpulseAugmented
+from iapb.contact.laws import FRICTION, IMPACT_FRICTION, IMPULSES, PENALTY, ContactLaw, ImpulseAugmented
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene
-from iapb.scene.mechanism import frictions_of, mechanism_of, pairs_of, shapes_of, start_of, stops_of
+from iapb.scene.mechanism import (
+    frictions_of,
+    mechanism_of,
+    pairs_of,
+    restitution_by_pair,
+    shapes_of,
+    start_of,
+    stops_of,
+)
 from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
 
 NEAR = 0.02  # of the smaller shape: contacts closer than this at the start are taken to touch together
 DEEP = 0.02  # of the smaller shape: an overlap at the start that is no resting depth
+SHIFTED = 0.05  # of the smaller shape: the way by which friction in an impact may change where a body goes
 SAG = 0.1  # of the smaller shape: more static sag is no rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact gives back no more than it took
 ROUNDED = 1e-9  # share by which rounding may move a limit
@@ -131,7 +140,7 @@ class Start:
             self.size = np.append(self.size, stop.arm * (high - low))
         places = self.mechanism.placements(self.q)[1]
         extra.point[:] = places[extra.body_a]
-        columns: list[Any] = [np.concatenate(both) for both in zip(self.found, extra, strict=True)]
+        columns: list[Any] = [np.concatenate([self.found[k], column]) for k, column in enumerate(extra)]
         self.found, self.rows = ContactBuffer(*columns), np.concatenate([self.rows, rows])
         self.kind = np.append(self.kind, np.full(len(stops), -1, self.kind.dtype))
         self.radius = np.append(self.radius, np.zeros(len(stops)))
@@ -206,6 +215,12 @@ class Start:
         """The trees that contact i touches."""
         bodies = [int(b) for b in (self.found.body_a[i], self.found.body_b[i]) if b >= 0]
         return list(dict.fromkeys(int(self.mechanism.tree_of_body[b]) for b in bodies))
+
+    def is_free(self, tree: int) -> bool:
+        """Whether a tree is one body that can go anywhere and that no hand holds."""
+        bodies = [self.scene.bodies[b] for b in np.flatnonzero(self.mechanism.tree_of_body == tree)]
+        held = self.scene.hand is not None and any(body.name == self.scene.hand.body for body in bodies)
+        return len(bodies) == 1 and bodies[0].joint in ("planar", "free_flyer") and not held
 
     @cached_property
     def supports(self) -> list[NDArray[np.int64]]:
@@ -361,6 +376,8 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
         found += [*_too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler")), *_sags(start)]
     if FRICTION in uses and PENALTY in uses:
         found += _overdriven_friction(start)
+    if IMPULSES in uses and IMPACT_FRICTION not in uses and start.scene.contact.self_collision_rows == "relative":
+        found += _slips_through_impacts(start)
     return tuple(found)
 
 
@@ -431,6 +448,47 @@ def _fast(start: Start) -> Iterator[Caution]:
         yield Caution("fast", f"{thin} and {other}", f"{other} meets {thin} at {speed:.3g} m/s, "
                       f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it sinks in or "
                       f"passes through; set rate >= {_up(4.0 * speed / size)} Hz")
+
+
+def _slips_through_impacts(start: Start) -> Iterator[Caution]:
+    """The free body that lands while it slides, and that friction in the impact would carry to another place.
+
+    What each body meets first is looked at; not linkages, whose poses change on the way, nor what a hand leads.
+    Friction would take up to Δv = μ (1 + e) v_n of the slip. What it leaves, resting friction takes in the next
+    Δv/(μ a), a the acceleration onto the wall; a body that bounces keeps it for the flight of 2 e v_n/a.
+    """
+    pull = start.moved(start.applied[None])[:, 0]
+    first: dict[int, tuple[float, int, float, float]] = {}  # of each tree: time, contact, approach, acceleration
+    for rows in start.by_pair:
+        i = int(rows[0])
+        gap, approach = max(float(start.found.gap[i]), 0.0), -float(start.rows[i] @ start.v)
+        force, trees = -float(start.rows[i] @ pull), start.trees(i)
+        square = approach**2 + 2.0 * force * gap
+        if not all(start.is_free(tree) for tree in trees) or square < 0.0:
+            continue
+        speed = math.sqrt(square)
+        time = 2.0 * gap / (approach + speed) if approach + speed > 0.0 else 0.0 if gap == 0.0 else math.inf
+        for tree in trees:
+            first[tree] = min(first.get(tree, (math.inf, i, 0.0, 0.0)), (time, i, speed, force))
+    found = [(_shift(start, *one, pull), one) for one in first.values() if one[0] < start.scene.duration]
+    (share, change, slip), (_, i, speed, _) = max(found, default=((0.0, 0.0, 0.0), (0.0, 0, 0.0, 0.0)))
+    if share > SHIFTED:
+        both = start.names([i])
+        yield Caution("impact friction", both, f"{both} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, and "
+                      f"impacts of this law have no friction, which would take {change:.3g} m/s of it: use the world "
+                      "IAPB-friction or ideal-friction")
+
+
+def _shift(start: Start, time: float, i: int, speed: float, force: float, pull: Floats) -> tuple[float, float, float]:
+    """What friction in the impact of contact i changes: the way as a share of the thinner, the slip, of which slip."""
+    mu, pair = float(start.friction[i]), np.array([[start.found.shape_a[i], start.found.shape_b[i]]])
+    e = float(restitution_by_pair(start.scene, pair)[0])
+    slip = float(np.linalg.norm([start._row(i, t) @ (start.v + time * pull) for t in _tangents(start, i)]))
+    change, left = min(mu * (1.0 + e) * speed, slip), start.scene.duration - time
+    if change == 0.0:
+        return 0.0, 0.0, slip
+    lasts = left if force <= 0.0 else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
+    return change * lasts / float(start.thickness[i]), change, slip
 
 
 def _thin_first(start: Start, i: int) -> tuple[int, int]:

@@ -229,3 +229,20 @@ def test_a_run_that_is_right_is_trusted_and_each_reason_is_found_in_its_arrays()
     assert "can be explained" in distrust_of(replace(run, q=far))[0]
     far[-1, 0] = np.nan
     assert distrust_of(replace(run, q=far)) == ("positions or velocities are not finite",)
+
+
+@pytest.mark.parametrize(("values", "warned"), [
+    ({}, True), ({"contact.friction": 0.0}, False), ({"bodies.box_0.velocity": [0.0, 0.0, 0.0]}, False),
+    ({"bodies.box_0.position": [0.0, 0.05, 0.0]}, False), ({"bodies.box_0.friction": 0.0}, False),
+    ({"hand": {"body": "box_0"}}, False),
+])
+def test_a_body_that_lands_sliding_needs_friction_in_its_impacts(values: dict[str, Any], warned: bool) -> None:
+    thrown = box(height=0.1, velocity=[1.0, 0.0, 0.0])
+    made = scene(thrown, duration=0.4, stiffness=1e4, friction=0.5, restitution=0.5).with_values(values)
+    assert ("impact friction" in kinds(made)) == warned
+    assert not {c.kind for c in check_scene(made, ImpulseAugmented(friction_in_impacts=True))} & {"impact friction"}
+    if not values:
+        (said,) = (caution.text for caution in check_scene(made) if caution.kind == "impact friction")
+        assert "meet at 1.4 m/s and slide at 1 m/s" in said
+        paper, rough = simulate(made).q[-1, 0], simulate(made, ImpulseAugmented(friction_in_impacts=True)).q[-1, 0]
+        assert paper - rough > 0.05 * SIDE  # so much farther it goes without
