@@ -13,13 +13,18 @@ from reports.codecheck import CODECHECK_NAME, write_codecheck
 from reports.crate import write_crate
 from reports.figures.figure import Figure, NotComputed, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
+from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
+from reports.pages.sections import SECTIONS
 from reports.provenance import uncommitted_changes
+from reports.report import ARCHIVE_NAME
 from verification.finding import Failure, attempt
 
-REPORT_NAME, MANIFEST_NAME, DIRTY_NAME = "report.html", "manifest.json", "dirty.diff"
+MANIFEST_NAME, DIRTY_NAME = "manifest.json", "dirty.diff"
 _TEXTS = {
-    REPORT_NAME: "the report: one page that needs nothing else",
+    FIRST_PAGE: "the report's first page",
+    **{section.page: f"the report: {section.title}" for section in SECTIONS},
+    ARCHIVE_NAME: "all pages of the report",
     NUMBERS_NAME: "every number of the report, for iapb report diff and iapb reproduce --check",
     MANIFEST_NAME: "every file behind the report: key, content hash, command, size and what was made from it",
     DIRTY_NAME: "how the sources differed from the commit",
@@ -57,7 +62,7 @@ def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure
     listed = _write_manifest(out / MANIFEST_NAME, evidence)
     changed = _write_changes(out / DIRTY_NAME)
     command = evidence.provenance.get("command", "iapb reproduce")
-    outputs = {name: _TEXTS[name] for name in (REPORT_NAME, NUMBERS_NAME, MANIFEST_NAME)}
+    outputs = {name: _TEXTS[name] for name in (FIRST_PAGE, NUMBERS_NAME, MANIFEST_NAME)}
     tables = {entry.file: f"table of {entry.name}" for entry in evidence.manifest if not entry.used_by}
     draft = write_codecheck(out, outputs | tables, command)
     beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}

@@ -20,7 +20,7 @@ PAPER_AUTHORS = "D. Constantinescu, S. E. Salcudean, E. A. Croft"
 PAPER_PLACE = "IEEE Transactions on Robotics 21(3), 2005"
 _ACTION, _SOFTWARE, _MACHINE, _PAPER = "#reproduce", "#iapb", "#machine", "#paper"
 _FORMATS = {".html": "text/html", ".json": "application/json", ".diff": "text/x-diff", ".yml": "application/yaml",
-            ".h5": "application/x-hdf5"}  # fmt: skip
+            ".h5": "application/x-hdf5", ".zip": "application/zip"}  # fmt: skip
 _MACHINE_FACTS = ("system", "cpu", "blas", "python")
 
 

@@ -1,51 +1,49 @@
-"""The report: one self-contained HTML file, made from plain records and stored runs.
+"""Write the report: its first page, a page for each section beside it, and all of them in one archive.
 
-    page = build_report(Evidence(inputs=..., claims=..., ...))
-    write_report("out/report.html", page)
+    pages = build_report(Evidence(inputs=..., claims=..., ...))
+    write_report("out", pages)
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from iapb.errors import ArgumentError
-from reports.figures import RECIPES
-from reports.figures.figure import Recipe
-from reports.pages.builder import build_page
-from reports.pages.records import Evidence
+from reports.pages.builder import FIRST_PAGE
 
-LARGEST_REPORT = 8_000_000  # bytes: a report that cannot be mailed is not read
+LARGEST_FIRST, LARGEST_REPORT = 1_000_000, 8_000_000  # bytes: a report that cannot be mailed is not read
+ARCHIVE_NAME = "report.zip"
 
 
-def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
-    """Return the report as one HTML document that needs nothing else: no network, no script.
-
-    Parameters
-    ----------
-    evidence
-        What there is to show; what is not there is printed as "not computed in this run".
-    recipes
-        The figures; by default all of ours.
-    """
-    return build_page(evidence, recipes)
-
-
-def write_report(path: str | Path, page: str) -> Path:
-    """Write the page in one step (a reader never sees half of it) and return its path.
+def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
+    """Write the pages and their archive, each in one step and the first page last; return the first page's path.
 
     Raises
     ------
     ArgumentError
-        If the page is larger than LARGEST_REPORT.
+        If the first page is larger than LARGEST_FIRST, or all pages together than LARGEST_REPORT.
     """
-    content = page.encode()
-    if len(content) > LARGEST_REPORT:
-        raise ArgumentError("page", f"{len(content)} bytes", f"at most {LARGEST_REPORT} bytes")
-    target = Path(path)
+    contents = {name: page.encode() for name, page in pages.items()}
+    for what, size, largest in (("first page", len(contents[FIRST_PAGE]), LARGEST_FIRST),
+                                ("pages", sum(map(len, contents.values())), LARGEST_REPORT)):  # fmt: skip
+        if size > largest:
+            raise ArgumentError(what, f"{size} bytes", f"at most {largest} bytes")
+    target = Path(folder)
+    for name in sorted(contents, key=lambda name: name == FIRST_PAGE):
+        _write(target / name, contents[name])
+    archive = target / f"{ARCHIVE_NAME}.partial"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        for name in sorted(contents):
+            file.writestr(zipfile.ZipInfo(name), contents[name], zipfile.ZIP_DEFLATED)
+    os.replace(archive, target / ARCHIVE_NAME)
+    return target / FIRST_PAGE
+
+
+def _write(target: Path, content: bytes) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_name(target.name + ".partial")
     partial.write_bytes(content)
     os.replace(partial, target)
-    return target

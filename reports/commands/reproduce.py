@@ -15,7 +15,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from reports.commands.progress import stage_progress
 from reports.commands.report import print_difference
-from reports.companions import REPORT_NAME, remembering, write_companions
+from reports.companions import remembering, write_companions
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports
 from reports.difference_text import unlike
 from reports.evidence.gather import failed_cases, gather
@@ -24,9 +24,9 @@ from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
 from reports.figures.standalone import standalone
 from reports.numbers_file import read_numbers
-from reports.pages.builder import figure_inputs
+from reports.pages.builder import build_report, figure_inputs
 from reports.pages.records import FailedCases
-from reports.report import build_report, write_report
+from reports.report import write_report
 from reports.runner import Runner
 from verification.finding import Failure
 
@@ -60,7 +60,7 @@ def make_report(out: Path, depth: str) -> None:
         evidence = gather(out, depth, _timed(progress, took))
     undrawn: list[Failure] = []
     recipes, figures = remembering(RECIPES, undrawn)
-    path = write_report(out / REPORT_NAME, build_report(evidence, recipes))
+    path = write_report(out, build_report(evidence, recipes))
     failed = evidence.failed + failed_cases(out / "tables", "figures", undrawn)
     beside = write_companions(out, evidence, figures, depth)
     for topic in evidence.topics:

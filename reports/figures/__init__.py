@@ -23,6 +23,7 @@ from reports.figures.figure import Recipe
 
 RECIPES: tuple[Recipe, ...] = (
     corner.hero,
+    *films.RECIPES[:1],  # the corner: on the first page, beside the hero
     complementarity.where_to_stop,
     scenes_plane.peg_corner,
     two_link_arm.arm,
@@ -32,7 +33,7 @@ RECIPES: tuple[Recipe, ...] = (
     scenes_space.scenes_space,
     fig05_couplings.couplings,
     two_link_arm.energy_loss,
-    *films.RECIPES,
+    *films.RECIPES[1:],
     *corner.RECIPES,
     energy_gains.energy_gains,
     cost.work_precision,

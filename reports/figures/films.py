@@ -40,7 +40,7 @@ FILMS = {
         "The corner, played back", UNLIMITED,
         "The peg of Figure 7 in four worlds at once, slowed down. The rigid world stops at the walls in blows; IAPB "
         "does so at each new contact, then gives a little; penalties alone let a corner dive into the wall.",
-        "figures"),
+        "hero"),
     "film-hole": Playback(
         "The tight hole, played back", {"IAPB": "hole/IAPB"},
         "The peg is in the hole with little air on either side; it meets both sides and the end."),

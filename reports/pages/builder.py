@@ -1,8 +1,11 @@
-"""Put records and figures into the templates: one self-contained page."""
+"""Put records and figures into the templates: the first page and one for each section; each needs nothing else."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from posixpath import dirname, relpath
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -13,6 +16,7 @@ from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
+from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
 from reports.pages.records import Evidence
@@ -22,6 +26,7 @@ from verification.claims.c10_trajectory import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
 from verification.scenes.trace import COORDINATES
 
+FIRST_PAGE = "report.html"
 # Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
 ROWS_SHOWN = 200
 # The mark that goes with each outcome: shape as well as colour.
@@ -33,22 +38,62 @@ FINDINGS = dict(
 )
 
 
-def build_page(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> str:
-    """Return the report as one HTML document."""
+def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dict[str, str]:
+    """Return the report: the HTML of the first page and of each section's, by their files' names.
+
+    Parameters
+    ----------
+    evidence
+        What there is to show; what is not there is printed as "not computed in this run".
+    recipes
+        The figures; by default all of ours.
+
+    Returns
+    -------
+    dict
+        FIRST_PAGE first; every page links to the others, and needs no network and no script.
+    """
     inputs = figure_inputs(evidence)
-    drawn = [(recipe.section, draw(recipe, inputs)) for recipe in recipes]
     figures: dict[str, list[Figure | NotComputed]] = {}
-    for section, figure in drawn:
-        figures.setdefault(section, []).append(figure)
-    page, text = _environment().get_template("page.html.j2"), script()
-    return page.render(
-        script=text, policy=policy(text), played=played(figures),
-        evidence=evidence, sections=SECTIONS, figures=figures,
-        counts=count_verdicts(evidence.claims), maps={claim.key: map_of(claim) for claim in evidence.claims},
+    for recipe in recipes:
+        figures.setdefault(recipe.section, []).append(draw(recipe, inputs))
+    environment, text = _environment(), script()
+    shared = {
+        "script": text, "policy": policy(text), "played": played(figures), "evidence": evidence, "figures": figures,
+        "groups": [(group, list(found)) for group, found in groupby(SECTIONS, key=lambda section: section.group)],
+        "used": {user for entry in evidence.manifest for user in entry.used_by},
+    }  # fmt: skip
+    first = environment.get_template("first.html.j2").render(
+        shared, answer=answer(evidence), facts=facts(evidence), counts=count_verdicts(evidence.claims),
         first_map=first_map(evidence.claims),
         part_counts=count_verdicts(part for claim in evidence.claims for part in claim.parts),
-        used={user for entry in evidence.manifest for user in entry.used_by},
-    )
+    )  # fmt: skip
+    maps = {claim.key: map_of(claim) for claim in evidence.claims}
+    layout = environment.get_template("section.html.j2")
+    pages = {section.page: layout.render(shared, section=section, maps=maps) for section in SECTIONS}
+    return link_across({FIRST_PAGE: first} | pages)
+
+
+def link_across(pages: Mapping[str, str]) -> dict[str, str]:
+    """Turn each link to an id that another page has, ``href="#C10"``, into one to that page.
+
+    Raises
+    ------
+    KeyError
+        If no page has the id.
+    """
+    ids = {name: frozenset(re.findall(r'\sid="([^"]+)"', page)) for name, page in pages.items()}
+    home = {id: name for name in reversed(list(pages)) for id in ids[name]}
+
+    def linked(name: str, page: str) -> str:
+        def link(found: re.Match[str]) -> str:
+            if found[1] in ids[name]:
+                return found[0]
+            return f'<a href="{relpath(home[found[1]], dirname(name) or ".")}#{found[1]}"'
+
+        return re.sub(r'<a href="#([^"]+)"', link, page)
+
+    return {name: linked(name, page) for name, page in pages.items()}
 
 
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:

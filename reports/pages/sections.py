@@ -1,4 +1,4 @@
-"""The sections of the report in reading order: one template each, and one line here."""
+"""The sections of the report in reading order, in five groups: one template and one page each, and one line here."""
 
 from __future__ import annotations
 
@@ -12,14 +12,21 @@ from reports.pages.records import Evidence
 class Section:
     """`ready` tells whether there is something to show; otherwise the page says that it was not computed.
 
+    group : heading in the contents
     tables : names of the manifest's tables that its numbers are kept in
     """
 
+    group: str
     id: str
     title: str
     ready: Callable[[Evidence], bool]
     topic: bool = False  # drawn from a Finding, by the template that all of them share
     tables: tuple[str, ...] = ()
+
+    @property
+    def page(self) -> str:
+        """Its file, from the folder of the report."""
+        return f"report/{self.id}.html"
 
     @property
     def template(self) -> str:
@@ -34,29 +41,31 @@ def _has(key: str) -> Callable[[Evidence], bool]:
     return lambda evidence: any(topic.key == key for topic in evidence.topics)
 
 
-def _topic(id: str, title: str) -> Section:
-    return Section(id, title, _has(id), True, (id,))
+def _topic(group: str, id: str, title: str) -> Section:
+    return Section(group, id, title, _has(id), True, (id,))
 
 
+PAPER, ENERGY, CHECKS, TIME, DATA = "The paper", "Energy", "Is it right?", "Time and effects", "Make it again"
 SECTIONS: tuple[Section, ...] = (
-    Section("idea", "The idea", _always),
-    Section("claims", "Claims ledger", lambda evidence: bool(evidence.claims), tables=("claims",)),
-    Section("figures", "Figures of the paper", _always, tables=("runs of the figures",)),
-    Section("couplings", "Device and tool", _always),
-    Section("proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
-    Section("properties", "Properties", _has("properties"), tables=("properties", "counterexamples", "energy-gains")),
-    _topic("exact-energy", "Exact energy"),
-    _topic("cross-checks", "Cross-checks"),
-    _topic("mechanics", "Linkages and free bodies"),
-    _topic("scene-ledger", "The scenes"),
-    _topic("complementarity", "Against complementarity"),
-    Section("accuracy", "Accuracy against time", _always, tables=("accuracy",)),
-    Section("hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases), tables=("hard cases",)),
-    _topic("stability", "Stability of contact"),
-    _topic("engines", "Other engines"),
-    _topic("haptic-rate", "The haptic rate"),
-    Section("effects", "Effects", lambda evidence: bool(evidence.effects), tables=("effects",)),
-    _topic("survival", "Runs that survive"),
-    Section("provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
-    Section("manifest", "Manifest", lambda evidence: bool(evidence.manifest)),
+    Section(PAPER, "idea", "The idea", _always),
+    Section(PAPER, "claims", "Claims ledger", lambda evidence: bool(evidence.claims), tables=("claims",)),
+    Section(PAPER, "figures", "Figures of the paper", _always, tables=("runs of the figures",)),
+    Section(PAPER, "couplings", "Device and tool", _always),
+    Section(ENERGY, "proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
+    Section(ENERGY, "properties", "Properties", _has("properties"),
+            tables=("properties", "counterexamples", "energy-gains")),
+    _topic(ENERGY, "exact-energy", "Exact energy"),
+    _topic(CHECKS, "cross-checks", "Cross-checks"),
+    _topic(CHECKS, "mechanics", "Linkages and free bodies"),
+    _topic(CHECKS, "scene-ledger", "The scenes"),
+    _topic(CHECKS, "complementarity", "Against complementarity"),
+    Section(CHECKS, "hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases), tables=("hard cases",)),
+    _topic(CHECKS, "stability", "Stability of contact"),
+    _topic(CHECKS, "engines", "Other engines"),
+    Section(TIME, "accuracy", "Accuracy against time", _always, tables=("accuracy",)),
+    _topic(TIME, "haptic-rate", "The haptic rate"),
+    Section(TIME, "effects", "Effects", lambda evidence: bool(evidence.effects), tables=("effects",)),
+    _topic(DATA, "survival", "Runs that survive"),
+    Section(DATA, "provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
+    Section(DATA, "manifest", "Manifest", lambda evidence: bool(evidence.manifest)),
 )

@@ -15,15 +15,16 @@ import pytest
 from iapb.scene import find_scene, load_scene
 from reports import companions, provenance
 from reports.codecheck import CODECHECK_NAME
-from reports.companions import DIRTY_NAME, MANIFEST_NAME, REPORT_NAME, remembering, write_companions
+from reports.companions import DIRTY_NAME, MANIFEST_NAME, remembering, write_companions
 from reports.crate import CRATE_NAME, PROFILE, sha256
 from reports.evidence import gather
 from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers
+from reports.pages.builder import FIRST_PAGE, build_report
 from reports.pages.records import Evidence
-from reports.report import build_report, write_report
+from reports.report import write_report
 from reports.runner import Runner
 from reports.store.io import MARK_NAME
 from verification.finding import REPRODUCED, Finding, Part, finding_of, titled
@@ -55,7 +56,7 @@ def out(tmp_path_factory) -> Path:
         evidence = Evidence(inputs={"bulk": titled(("n",), ((3,),))}, claims=claims, provenance=gather.provenance(),
                             manifest=manifest(runner.used, [stage], folder))  # fmt: skip
         recipes, figures = remembering((RECIPE,))
-        write_report(folder / REPORT_NAME, build_report(evidence, recipes))
+        write_report(folder, build_report(evidence, recipes))
         write_companions(folder, evidence, figures, "quick")
     return folder
 
@@ -107,7 +108,7 @@ def test_the_manifest_lists_each_run_with_its_users_and_its_command(out: Path) -
     assert shipped["used_by"] == own["used_by"] == ["C07"] and shipped["status"] == "complete"
     assert shipped["command"].startswith("iapb run peg_corner") and own["command"].startswith("iapb store again ")
     assert (out / shipped["file"]).stat().st_size == shipped["size"] and (out / table["file"]).is_file()
-    page = (out / REPORT_NAME).read_text()
+    page = (out / "report" / "manifest.html").read_text()
     assert "2 runs and 1 tables" in page and shipped["command"] in page
 
 
@@ -140,7 +141,8 @@ def test_the_draft_of_the_codecheck_is_yaml_and_its_files_exist(out: Path) -> No
 def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
     host = re.compile(rf"\b{re.escape(socket.gethostname())}\b")
     root = str(Path(__file__).resolve().parents[2])
-    for name in (REPORT_NAME, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME):
+    pages = [path.relative_to(out) for path in (out / "report").iterdir()]
+    for name in (FIRST_PAGE, *pages, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME):
         text = (out / name).read_text()
         assert str(out) not in text and root not in text and str(Path.home()) + "/" not in text
         assert not host.search(text) or len(socket.gethostname()) < 4, name  # "x86" would be found in any page
@@ -149,7 +151,7 @@ def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
 def test_changes_that_are_committed_leave_no_patch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / DIRTY_NAME).write_text("old")
     monkeypatch.setattr(companions, "uncommitted_changes", lambda: "")
-    (tmp_path / REPORT_NAME).write_text("<p>")
+    (tmp_path / FIRST_PAGE).write_text("<p>")
     written = write_companions(tmp_path, Evidence(), {}, "quick")
     assert not (tmp_path / DIRTY_NAME).exists() and DIRTY_NAME not in [path.name for path in written]
 

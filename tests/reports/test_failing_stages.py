@@ -263,7 +263,7 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(
     assert ended.value.exit_code == 1
     assert "Not computed: 22 cases." in lines[-23] and lines[-22] == "  claims: C01: ValueError: planted"
     assert lines[-2:] == ["  claims: and 2 more", f"    tracebacks: {path}"]
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report" / "claims.html").read_text(encoding="utf-8")
     assert "Not computed: 22 of claims" in page and "C22: ValueError: planted" in page
 
 
@@ -276,7 +276,7 @@ def test_a_figure_that_raises_costs_that_figure_only(
     def whole(_inputs: object) -> Figure:
         return Figure("whole", "", "A figure", "caption", (Panel("<svg />", "alt"),))
 
-    recipes = tuple(Recipe(key, "", key, (), draw) for key, draw in (("broken", broken), ("whole", whole)))
+    recipes = tuple(Recipe(key, "", key, (), draw, "hero") for key, draw in (("broken", broken), ("whole", whole)))
     monkeypatch.setattr(reproduce, "RECIPES", recipes)
     monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence())
     with pytest.raises(typer.Exit) as ended:

@@ -10,16 +10,18 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 
 from iapb.errors import ArgumentError
 from reports.figures.two_link_arm import arm_energies
-from reports.pages.builder import OUTCOME_MARKS
+from reports.pages.builder import FIRST_PAGE, OUTCOME_MARKS, build_report, link_across
 from reports.pages.formulas import formula, prose
 from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
-from reports.report import build_report, write_report
+from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
+from tests.reports.joined import joined
 from verification.claims import CLAIMS
 from verification.claims.c10_trajectory import FULL
 from verification.claims.conditions import full_grid
@@ -107,51 +109,66 @@ def full() -> Evidence:
 
 
 @pytest.fixture(scope="module", params=["empty", "full"])
-def page(request: pytest.FixtureRequest, full: Evidence) -> str:
+def pages(request: pytest.FixtureRequest, full: Evidence) -> dict[str, str]:
     return build_report(full if request.param == "full" else Evidence())
 
 
 def test_the_page_says_where_its_files_are_of_several_machines(full: Evidence) -> None:
     other = [replace(full.manifest[0], file=f"runs/{kernel}.h5", made_on=f"a processor, {kernel}")
              for kernel in ("Haswell", "Haswell2", "SkylakeX")]  # fmt: skip
-    page = " ".join(build_report(replace(full, manifest=tuple(other))).split())
+    page = " ".join(joined(replace(full, manifest=tuple(other))).split())
     assert "Mixed provenance." in page and "1 on a processor, SkylakeX" in page and "on 3 combinations" in page
     alike = tuple(replace(one, made_on="a processor, Haswell") for one in other)
-    assert "Mixed provenance." not in build_report(replace(full, manifest=alike))
+    assert "Mixed provenance." not in joined(replace(full, manifest=alike))
 
 
-def test_the_page_is_well_formed(page: str) -> None:
-    outline = Outline(page)
-    assert outline.wrong == []
-    assert outline.open == []
-    assert len(outline.ids) == len(set(outline.ids))
+def test_each_page_is_well_formed(pages: dict[str, str]) -> None:
+    for page in pages.values():
+        outline = Outline(page)
+        assert outline.wrong == []
+        assert outline.open == []
+        assert len(outline.ids) == len(set(outline.ids))
 
 
-def test_the_page_asks_for_nothing_and_runs_only_its_own_script(page: str) -> None:
-    outline = Outline(page)
-    assert all(link.startswith("#") or link == "data:," for link in outline.links)
-    (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.S)
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    assert f"script-src &#39;sha256-{digest}&#39;" in page
-    assert not re.search(r"\son\w+=|fetch\(|XMLHttpRequest|import\(|eval\(", page)
-    assert not re.search(r"@import|url\((?!#)", page)
+def test_each_page_asks_for_nothing_and_runs_only_its_own_script(pages: dict[str, str]) -> None:
+    for name, page in pages.items():
+        outside = {link.split("#")[0] for link in Outline(page).links if not link.startswith("#")} - {"data:,"}
+        assert {(Path(name).parent / link).as_posix().replace("report/../", "") for link in outside} <= set(pages)
+        (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.S)
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        assert f"script-src &#39;sha256-{digest}&#39;" in page
+        assert not re.search(r"\son\w+=|fetch\(|XMLHttpRequest|import\(|eval\(", page)
+        assert not re.search(r"@import|url\((?!#)", page)
 
 
-def test_every_anchor_resolves(page: str) -> None:
-    outline = Outline(page)
-    anchors = {link[1:] for link in outline.links if link.startswith("#")}
-    assert anchors <= set(outline.ids)
+def test_every_anchor_resolves(pages: dict[str, str]) -> None:
+    ids = {name.rpartition("/")[2]: set(Outline(page).ids) for name, page in pages.items()}
+    for name, page in pages.items():
+        for link in Outline(page).links:
+            file, mark, anchor = link.partition("#")
+            assert not mark or anchor in ids[(file or name).rpartition("/")[2]], (name, link)
 
 
-def test_every_section_is_there(page: str) -> None:
-    assert {section.id for section in SECTIONS} <= set(Outline(page).ids)
+def test_a_link_to_an_id_of_no_page_is_an_error() -> None:
+    pages = {"a.html": '<a href="#x">', "report/b.html": '<p id="x"><a href="#x"><a href="#y">', "c.html": '<p id="y">'}
+    assert link_across(pages) == {"a.html": '<a href="report/b.html#x">', "c.html": '<p id="y">',
+                                  "report/b.html": '<p id="x"><a href="#x"><a href="../c.html#y">'}
+    with pytest.raises(KeyError, match="z"):
+        link_across({"a.html": '<a href="#z">'})
+
+
+def test_every_section_has_its_page_and_every_page_leads_to_it(pages: dict[str, str]) -> None:
+    assert list(pages) == [FIRST_PAGE, *(section.page for section in SECTIONS)]
+    for section in SECTIONS:
+        assert section.id in Outline(pages[section.page]).ids
+        assert all(f"{section.id}.html#{section.id}" in page for name, page in pages.items() if name != section.page)
 
 
 def test_what_was_not_computed_is_said() -> None:
-    page = build_report(Evidence())
+    page = joined(Evidence())
     empty = [section for section in SECTIONS if not section.ready(Evidence())]
     assert page.count("<p class=\"absent\">Not computed in this run.</p>") == len(empty)
-    assert "reproduced" not in page.split("</style>")[1]
+    assert not any("reproduced" in part.split("<body>")[1] for part in build_report(Evidence()).values())
 
 
 def test_a_page_repeats_byte_for_byte(full: Evidence) -> None:
@@ -169,13 +186,13 @@ def test_a_short_formula_has_the_signs_of_the_long_one() -> None:
 
 
 def test_a_counterexample_shows_its_input_and_the_test_to_paste(full: Evidence) -> None:
-    page = build_report(full)
+    page = joined(full)
     assert "<code>assert gain &lt;= 0</code>" in page and '<th scope="row">e</th><td><code>0.5</code>' in page
     assert page.count("and a test to paste") == 1 and "[[1]]" in page
 
 
 def test_text_is_escaped_and_formulas_are_not(full: Evidence) -> None:
-    page = build_report(full)
+    page = joined(full)
     assert "KE never rises &lt;b&gt;" in page
     assert "<mfrac>" in page
 
@@ -186,7 +203,7 @@ def test_outcomes_are_told_by_a_mark_as_well_as_by_colour() -> None:
 
 
 def test_each_outcome_is_counted(full: Evidence) -> None:
-    page = build_report(full)
+    page = joined(full)
     assert f"1 {MIXED}" in page
     assert f"1 {REFUTED}" in page
 
@@ -201,7 +218,7 @@ def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
 
 
 def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
-    page = build_report(Evidence(hard_cases=(_hard_case(("factored", "stable", 1e-16), ("gram", "refused", None)),)))
+    page = joined(Evidence(hard_cases=(_hard_case(("factored", "stable", 1e-16), ("gram", "refused", None)),)))
     assert '<span class="good">✓</span> factored: stable' in page
     assert '<span class="bad">✕</span> gram: refused' in page
     assert "1 of 2 stable" in page
@@ -209,12 +226,12 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_is_no_number() -> None:
 
 
 def test_a_hard_case_without_its_files_says_so() -> None:
-    page = build_report(Evidence(hard_cases=(SKIPPED,)))
+    page = joined(Evidence(hard_cases=(SKIPPED,)))
     assert "Skipped: needs bowl.lcp." in page
 
 
 def test_a_figure_of_an_empty_table_has_no_panels_and_costs_nothing_else() -> None:
-    page = build_report(Evidence(topics=(on_hard_cases(()),)))
+    page = joined(Evidence(topics=(on_hard_cases(()),)))
     assert "stable on 0 of 0 hard cases" in page
 
 
@@ -228,7 +245,7 @@ def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
 
 
 def test_a_topic_shows_its_findings_and_the_tables_that_no_figure_shows(full: Evidence) -> None:
-    page = build_report(full)
+    page = joined(full)
     assert "Asked &lt;here&gt;." in page
     assert "It holds to 10<sup>−14</sup>." in page
     assert "<summary>Trees</summary>" in page
@@ -238,7 +255,7 @@ def test_a_topic_with_an_answer_stands_on_the_first_page_with_the_worst_of_its_f
     parts = (Part("a", REPRODUCED), Part("b", MIXED))
     topics = (finding_of("mechanics", "Linkages", "", "Most hold.", parts),
               finding_of("scene-ledger", "Scenes", "", "", parts))
-    first = build_report(Evidence(topics=topics)).split('<section id="verdict"')[1].split("</section>")[0]
+    first = joined(Evidence(topics=topics)).split('<section id="verdict"')[1].split("</section>")[0]
     assert "Most hold." in first and ">mixed<" in first and "Scenes" not in first
 
 
@@ -246,15 +263,24 @@ def test_prose_keeps_a_lone_dollar() -> None:
     assert str(prose("costs 5$ <i>")) == "costs 5$ &lt;i&gt;"
 
 
-def test_a_page_is_written_whole(tmp_path: Path) -> None:
-    target = write_report(tmp_path / "out" / "report.html", "<html>")
-    assert target.read_text() == "<html>"
-    assert [path.name for path in target.parent.iterdir()] == ["report.html"]
+def test_pages_are_written_whole_with_their_archive(tmp_path: Path) -> None:
+    pages = {FIRST_PAGE: "<html>", "report/idea.html": "<p>"}
+    target = write_report(tmp_path / "out", pages)
+    assert target.read_text() == "<html>" and (tmp_path / "out" / "report" / "idea.html").read_text() == "<p>"
+    assert sorted(path.name for path in target.parent.iterdir()) == ["report", "report.html", ARCHIVE_NAME]
+    archive = target.parent / ARCHIVE_NAME
+    with ZipFile(archive) as file:
+        assert {name: file.read(name).decode() for name in file.namelist()} == pages
+    first = archive.read_bytes()
+    write_report(tmp_path / "out", pages)
+    assert archive.read_bytes() == first
 
 
-def test_a_page_too_large_is_refused(tmp_path: Path) -> None:
+def test_pages_too_large_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="first page.*1000000"):
+        write_report(tmp_path, {FIRST_PAGE: "x" * (LARGEST_FIRST + 1)})
     with pytest.raises(ArgumentError, match="8000000"):
-        write_report(tmp_path / "report.html", "x" * 8_000_001)
+        write_report(tmp_path, {FIRST_PAGE: "", "report/idea.html": "x" * 8_000_001})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -270,8 +296,8 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
              for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
     table = table_of([Column(key) for key in piles[0]], piles)
     topic = finding_of("complementarity", "Piles", "", "No.", (Part("n.", REFUTED),), {"piles": table})
-    page = build_report(Evidence(claims=(found,), topics=(topic,)))
+    page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is the closest in 24 of 84 in x" in page and 'id="where-c10"' in page
     assert "where more than 14 contacts collide at once" in page and "25 % of its impulses pull" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
-    assert 'id="where-c10"' not in build_report(Evidence(claims=(fewer,)))
+    assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))

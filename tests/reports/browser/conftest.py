@@ -1,4 +1,4 @@
-"""The report of made-up records in a headless browser that is cut off from everything but the page.
+"""The report of made-up records in a headless browser that is cut off from everything but the report's pages.
 
 Without a browser the tests are skipped, and say so.
 """
@@ -21,8 +21,9 @@ from iapb.scene.mechanism import mechanism_of
 from iapb.scene.model import SpatialScene
 from reports.figures import RECIPES
 from reports.figures.two_link_arm import arm_energies
+from reports.pages.builder import build_report
 from reports.pages.records import Evidence
-from reports.report import build_report
+from reports.report import write_report
 from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -64,13 +65,14 @@ def browser() -> Iterator[Any]:
 
 @contextmanager
 def opened(started: Any, path: Path, size: tuple[int, int] = DESK, **context: Any) -> Iterator[Sight]:
-    """Open a page; any request of it is refused and remembered."""
+    """Open a page; any request of it but for another page of the report is refused and remembered."""
     own = path.resolve().as_uri()
+    pages = {page.resolve().as_uri() for page in path.parents[path.parent.name == "report"].rglob("*.html")}
     room = started.new_context(viewport={"width": size[0], "height": size[1]}, offline=True, **context)
     sight = Sight(room.new_page())
 
     def judge(route: Any) -> None:
-        if route.request.url.split("#")[0] == own or route.request.url.startswith("data:"):
+        if route.request.url.split("#")[0] in pages or route.request.url.startswith("data:"):
             route.continue_()
         else:
             sight.requests.append(route.request.url)
@@ -115,12 +117,10 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
 
 
 @pytest.fixture(scope="session")
-def path(evidence: Evidence, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of made-up records, with a few figures of each kind."""
+def first(evidence: Evidence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first page of the report of made-up records, with a few figures of each kind."""
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
-    target = tmp_path_factory.mktemp("page") / "report.html"
-    target.write_text(build_report(evidence, recipes), encoding="utf-8")
-    return target
+    return write_report(tmp_path_factory.mktemp("page"), build_report(evidence, recipes))
 
 
 @pytest.fixture(scope="module")
@@ -131,20 +131,25 @@ def started() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module", params=[DESK, PHONE], ids=["desk", "phone"])
-def sight(request: pytest.FixtureRequest, started: Any, path: Path) -> Iterator[Sight]:
-    """The page at both widths, to look at only."""
-    with opened(started, path, request.param) as seen:
+def sight(request: pytest.FixtureRequest, started: Any, first: Path) -> Iterator[Sight]:
+    """The first page at both widths, to look at and to go on from."""
+    with opened(started, first, request.param) as seen:
         yield seen
 
 
 @pytest.fixture
-def desk(started: Any, path: Path) -> Iterator[Sight]:
-    """A page of one's own, to change."""
-    with opened(started, path) as seen:
-        yield seen
+def see(started: Any, first: Path) -> Callable[..., Any]:
+    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a section's page or a file."""
+
+    def open_page(page: str | Path = "figures", size: tuple[int, int] = DESK, **context: Any) -> Any:
+        path = page if isinstance(page, Path) else first.parent / "report" / f"{page}.html"
+        return opened(started, path, size, **context)
+
+    return open_page
 
 
 @pytest.fixture
-def see(started: Any, path: Path) -> Callable[..., Any]:
-    """Return ``see(size=DESK, path=path, **context)``: a context manager that opens the page."""
-    return lambda size=DESK, path=path, **context: opened(started, path, size, **context)
+def desk(see: Callable[..., Any]) -> Iterator[Sight]:
+    """The page of the figures, one's own, to change."""
+    with see() as seen:
+        yield seen

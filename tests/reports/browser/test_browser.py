@@ -68,9 +68,27 @@ def check_page(sight: Any) -> None:
     assert sight.ask(OVERFLOW) <= 0
 
 
-def test_the_page_is_whole_at_any_width(sight: Any) -> None:
-    check_page(sight)
-    assert sight.ask("() => document.querySelectorAll('main figure').length") == 5
+def pages_of(first: Path) -> list[Path]:
+    return [first, *sorted((first.parent / "report").glob("*.html"))]
+
+
+def test_each_page_is_whole_at_any_width(sight: Any, first: Path) -> None:
+    figures = 0
+    for path in pages_of(first):
+        sight.page.goto(path.as_uri())
+        check_page(sight)
+        figures += sight.ask("() => document.querySelectorAll('main figure').length")
+    assert figures == 5
+
+
+def test_the_contents_lead_to_every_page_and_back(sight: Any, first: Path) -> None:
+    sight.page.goto(first.as_uri())
+    for path in pages_of(first)[1:]:
+        sight.page.locator(f"nav a[href$='{path.stem}.html#{path.stem}']").click()
+        sight.page.wait_for_url(f"{path.as_uri()}#{path.stem}")
+        assert sight.page.locator("nav [aria-current]").count() == 1
+    sight.page.locator("nav a").first.click()
+    sight.page.wait_for_url(f"{first.as_uri()}#verdict")
 
 
 def test_the_checks_see_a_page_that_is_not_whole(desk: Any) -> None:
@@ -79,7 +97,7 @@ def test_the_checks_see_a_page_that_is_not_whole(desk: Any) -> None:
         document.querySelector("main figure svg:not(.swatch)").style.height = "0";
         const wide = { textContent: "wide", style: "width: 3000px" };
         document.querySelector("main").append(Object.assign(document.createElement("p"), wide));
-        document.querySelector("h2").style.color = "#888";
+        document.querySelector("h3").style.color = "#888";
         document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
     }""")
     desk.page.wait_for_timeout(100)
@@ -87,64 +105,83 @@ def test_the_checks_see_a_page_that_is_not_whole(desk: Any) -> None:
     assert len(desk.ask(OUT_OF_SIGHT)) == 1
     assert desk.ask(OVERFLOW) > 1000
     assert desk.ask(CLIPPED) == ["wide"]
-    assert "H2." in desk.ask(PALE, LEAST_CONTRAST)
+    assert "H3." in desk.ask(PALE, LEAST_CONTRAST)
     assert desk.errors != []  # the page's own policy refused the picture, before any request
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_all_text_can_be_read(see: Callable[..., Any], scheme: str) -> None:
+def test_all_text_can_be_read(see: Callable[..., Any], first: Path, scheme: str) -> None:
     with see(color_scheme=scheme) as sight:
-        sight.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
-        assert sight.ask(PALE, LEAST_CONTRAST) == {}
+        for path in pages_of(first):
+            sight.page.goto(path.as_uri())
+            sight.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+            assert sight.ask(PALE, LEAST_CONTRAST) == {}
 
 
-def test_without_script_the_content_is_there(see: Callable[..., Any]) -> None:
-    with see(PHONE, java_script_enabled=False) as sight:
+def test_without_script_the_content_is_there(see: Callable[..., Any], first: Path) -> None:
+    with see(size=PHONE, java_script_enabled=False) as sight:
         page = sight.page
-        assert page.locator("figure").count() == 5
-        assert page.locator("#film-corner .cell").count() == 4 * 4
+        assert page.locator("figure").count() == 3
         assert page.locator("#fig07 [data-curve] path").count() > 0
         assert page.locator("button:visible, input:visible").count() == 0
-        box = page.locator("#film-obstacles .panel > svg").bounding_box()
+        assert sight.errors == []
+    with see(first, PHONE, java_script_enabled=False) as sight:
+        assert sight.page.locator("#film-corner .cell").count() == 4 * 4
+    with see("scene-ledger", PHONE, java_script_enabled=False) as sight:
+        box = sight.page.locator("#film-obstacles .panel > svg").bounding_box()
         assert box["width"] > 100 and box["height"] > 75
         assert sight.errors == []
 
 
-def test_the_keyboard_reaches_everything(desk: Any) -> None:
-    page = desk.page
-    desk.ask("() => { document.querySelector('#scene-ledger details').open = true; }")  # a table stands in it
-    page.keyboard.press("Tab")
-    assert desk.ask("() => document.activeElement.className") == "skip"
-    assert page.locator(".skip").bounding_box()["x"] >= 0
-    page.keyboard.press("Enter")
-    assert page.url.endswith("#content")
-    wanted = {"#fig07 .legend button", "#fig07 svg[data-trace]", ".controls button", ".controls input",
-              ".controls select", "summary", ".scroll"}
-    reached: set[str] = set()
-    for _ in range(120):
+FIGURE_PARTS = {"#fig07 .legend button", "#fig07 svg[data-trace]", "summary", ".scroll"}
+PLAYER_PARTS = {".controls button", ".controls input", ".controls select", ".ways a"}
+
+
+@pytest.mark.parametrize("wanted", [FIGURE_PARTS, PLAYER_PARTS], ids=["figure", "player"])
+def test_the_keyboard_reaches_everything(see: Callable[..., Any], first: Path, wanted: set[str]) -> None:
+    with see("figures" if wanted == FIGURE_PARTS else first) as sight:
+        page = sight.page
+        if wanted == FIGURE_PARTS:
+            sight.ask("() => { document.querySelector('#fig07 details').open = true; }")  # a table stands in it
         page.keyboard.press("Tab")
-        reached |= set(desk.ask(FOCUSED, list(wanted)))
-        if reached == wanted:
-            break
-    assert reached == wanted
+        assert sight.ask("() => document.activeElement.className") == "skip"
+        assert page.locator(".skip").bounding_box()["x"] >= 0
+        reached: set[str] = set()
+        for _ in range(120):
+            page.keyboard.press("Tab")
+            reached |= set(sight.ask(FOCUSED, list(wanted)))
+            if reached == wanted:
+                break
+        assert reached == wanted
+        page.goto(page.url.split("#")[0])
+        page.keyboard.press("Tab")
+        page.keyboard.press("Enter")
+        assert page.url.endswith("#content")
 
 
-def test_a_link_into_something_folded_unfolds_it(desk: Any) -> None:
-    desk.ask("() => { location.hash = '#C01'; }")
-    desk.page.wait_for_function("() => document.getElementById('C01').open")
+def test_a_link_into_something_folded_unfolds_it(see: Callable[..., Any], first: Path) -> None:
+    with see("claims") as sight:
+        sight.ask("() => { location.hash = '#C01'; }")
+        sight.page.wait_for_function("() => document.getElementById('C01').open")
+        sight.page.goto(first.as_uri())
+        sight.page.locator("main a", has_text="C01").click()
+        sight.page.wait_for_function("() => document.getElementById('C01')?.open")
 
 
-def test_print_shows_the_content_and_no_controls(desk: Any) -> None:
-    desk.page.emulate_media(media="print")
-    desk.ask("() => window.dispatchEvent(new Event('beforeprint'))")
-    assert desk.page.locator("#C01 .claim-body").is_visible()
-    assert desk.page.locator("#fig07 .numbers table").is_visible()
-    assert desk.page.locator(".controls:visible, .tools:visible, nav:visible").count() == 0
-    assert len(desk.page.pdf()) > 10_000
+def test_print_shows_the_content_and_no_controls(see: Callable[..., Any]) -> None:
+    for page, unfolded in (("claims", "#C01 .claim-body"), ("figures", "#fig07 .numbers table")):
+        with see(page) as sight:
+            sight.page.emulate_media(media="print")
+            sight.ask("() => window.dispatchEvent(new Event('beforeprint'))")
+            assert sight.page.locator(unfolded).is_visible()
+            assert sight.page.locator(".controls:visible, .tools:visible, nav:visible").count() == 0
+            assert len(sight.page.pdf()) > 10_000
 
 
 @pytest.mark.skipif(not REAL.is_file(), reason="no out/report.html here; `make reproduce` makes one")
 @pytest.mark.parametrize("width", [1400, 400])
 def test_the_report_that_is_here(see: Callable[..., Any], width: int) -> None:
-    with see((width, 900), REAL) as sight:
-        check_page(sight)
+    with see(REAL, (width, 900)) as sight:
+        for path in pages_of(REAL):
+            sight.page.goto(path.as_uri())
+            check_page(sight)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from reports.figures.corner import UNLIMITED
 from reports.figures.film import LARGEST, film, frames
@@ -15,6 +18,13 @@ MOVED = "(old) => document.querySelector('#film-corner [data-layer=bodies] path'
 DRAWN = """() => [...document.querySelectorAll("#film-obstacles [data-layer=bodies] path")]
     .map((path) => path.getAttribute("d"))"""
 TO_THE_END = "(input) => { input.value = input.max; input.dispatchEvent(new Event('input')); }"
+
+
+@pytest.fixture
+def desk(see: Callable[..., Any], first: Path) -> Iterator[Any]:
+    """The first page, where the corner is played back."""
+    with see(first) as seen:
+        yield seen
 
 
 def test_playback_moves_and_stops(desk: Any) -> None:
@@ -45,10 +55,11 @@ def test_playback_shows_the_poses_of_the_run(desk: Any, evidence: Evidence) -> N
     np.testing.assert_allclose(corners, expected, atol=0.1)  # units of the picture, of which there are 400
 
 
-def test_bodies_in_space_are_drawn_where_they_are(desk: Any, evidence: Evidence) -> None:
+def test_bodies_in_space_are_drawn_where_they_are(see: Callable[..., Any], evidence: Evidence) -> None:
     """The player and the still picture find the same faces, from quaternions and from matrices."""
-    desk.page.locator("#film-obstacles input[type=range]").evaluate(TO_THE_END)
-    drawn = desk.ask(DRAWN)
+    with see("scene-ledger") as sight:
+        sight.page.locator("#film-obstacles input[type=range]").evaluate(TO_THE_END)
+        drawn = sight.ask(DRAWN)
     run = evidence.inputs["space/arm_obstacles"]
     made = film(run, SIGHT["space/arm_obstacles"], [run])
     expected = [text for text in bodies_markup(made, run.steps) if "<path" in text]

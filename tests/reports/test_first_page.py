@@ -1,0 +1,60 @@
+"""What the first page says first: sentences made from findings, and nothing about what was not computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from reports.pages.first import answer, facts
+from reports.pages.records import Evidence
+from verification.claims.c11_forces import LARGE
+from verification.finding import (
+    MIXED,
+    NOT_COMPUTED,
+    REFUTED,
+    REPRODUCED,
+    WHERE,
+    Finding,
+    Part,
+    Region,
+    finding_of,
+    titled,
+)
+
+ROWS = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "theta", 1.0, 1.0),
+        ("other", "x", 99.0, 1.0))  # fmt: skip
+FORCES = finding_of("C11", "C11", "", "", (Part("p.", REPRODUCED),),
+                    {"C11": titled(("part", "coordinate", "IAPB", "PB"), ROWS)})
+NEAR_FLAT = Region((("tilt", "rad", None, 0.015),), share=0.05)
+PARTS = (Part("s.", WHERE, "x, on the full grid", 9, 40, region=NEAR_FLAT), Part("s.", REFUTED, "theta, there", 1, 40))
+PATH = finding_of("C10", "C10", "", "", PARTS)
+
+
+def topic(key: str, title: str, verdict: str) -> Finding:
+    return finding_of(key, title, "", f"answer of {key}", (Part("p.", verdict),))
+
+
+def test_the_answer_is_made_from_the_claims() -> None:
+    said = answer(Evidence(claims=(PATH, FORCES)))
+    assert "8 times as hard" in said and "median of 3 cases" in said  # 10, 3 and 8
+    assert "up to 0.9° of tilt" in said and "rotation is usually not" in said
+
+
+def test_without_a_region_the_answer_says_that_there_is_none() -> None:
+    parts = tuple(replace(part, region=None, verdict=REPRODUCED) for part in PATH.parts)
+    said = answer(Evidence(claims=(replace(PATH, parts=parts),)))
+    assert "no range of starts" in said and "rotation" not in said and "times as hard" not in said
+
+
+def test_nothing_is_said_of_what_was_not_computed() -> None:
+    assert answer(Evidence()) == "" and facts(Evidence()) == ()
+
+
+def test_the_facts_name_our_own_misses() -> None:
+    topics = (topic("exact-energy", "Energy", REPRODUCED), topic("engines", "Engines", MIXED),
+              topic("haptic-rate", "The haptic rate", NOT_COMPUTED))
+    made = {"commit": "c" * 40, "cpu": "P"}
+    said = {fact.label: fact.text for fact in facts(Evidence(topics=topics, provenance=made))}
+    assert said["Is it safe?"] == "answer of exact-energy" and "Is it fast?" not in said
+    assert said["What we miss"] == "Not everything holds in: Engines. Not computed: The haptic rate."
+    assert said["Made from"] == "commit cccccccccccc, P" and "Errors in the paper" not in said
+    assert "Every finding of ours holds." in {fact.text for fact in facts(Evidence(topics=topics[:1]))}
