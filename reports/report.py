@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import zipfile
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from pathlib import Path
 from iapb.errors import ArgumentError
 from reports.pages.builder import FIRST_PAGE
 
-LARGEST_FIRST, LARGEST_REPORT = 1_000_000, 8_000_000  # bytes: a report that cannot be mailed is not read
+LARGEST_FIRST, LARGEST_ARCHIVE = 1_000_000, 4_000_000  # bytes: a report that cannot be mailed is not read
 ARCHIVE_NAME = "report.zip"
 
 
@@ -24,22 +25,26 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
     Raises
     ------
     ArgumentError
-        If the first page is larger than LARGEST_FIRST, or all pages together than LARGEST_REPORT.
+        If the first page is larger than LARGEST_FIRST, or the archive than LARGEST_ARCHIVE.
     """
-    contents = {name: page.encode() for name, page in pages.items()}
-    for what, size, largest in (("first page", len(contents[FIRST_PAGE]), LARGEST_FIRST),
-                                ("pages", sum(map(len, contents.values())), LARGEST_REPORT)):  # fmt: skip
-        if size > largest:
-            raise ArgumentError(what, f"{size} bytes", f"at most {largest} bytes")
-    target = Path(folder)
-    for name in sorted(contents, key=lambda name: name == FIRST_PAGE):
-        _write(target / name, contents[name])
-    archive = target / f"{ARCHIVE_NAME}.partial"
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+    target, contents = Path(folder), {name: page.encode() for name, page in pages.items()}
+    packed = _archive(contents)
+    for what, content, largest in (("the first page", contents[FIRST_PAGE], LARGEST_FIRST),
+                                   ("the archive", packed, LARGEST_ARCHIVE)):  # fmt: skip
+        if len(content) > largest:
+            raise ArgumentError(what, f"{len(content)} bytes", f"at most {largest} bytes")
+    for name, content in sorted((contents | {ARCHIVE_NAME: packed}).items(), key=lambda item: item[0] == FIRST_PAGE):
+        _write(target / name, content)
+    return target / FIRST_PAGE
+
+
+def _archive(contents: Mapping[str, bytes]) -> bytes:
+    """Return a zip of files, the same bytes for the same files."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as file:
         for name in sorted(contents):
             file.writestr(zipfile.ZipInfo(name), contents[name], zipfile.ZIP_DEFLATED)
-    os.replace(archive, target / ARCHIVE_NAME)
-    return target / FIRST_PAGE
+    return packed.getvalue()
 
 
 def _write(target: Path, content: bytes) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -74,9 +75,10 @@ def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
 
 
 def provenance() -> dict[str, str]:
-    """Where the report comes from: the facts of every result, all seeds, the sources, and what is compared with."""
+    """Where the report comes from: its date, the facts of every result, all seeds, the sources, what is compared with."""
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
-    return collect_provenance(seeds=seeds, packages=PEERS) | {"sources": evidence_version()}
+    facts = collect_provenance(seeds=seeds, packages=PEERS)
+    return {"date": datetime.now(UTC).date().isoformat()} | facts | {"sources": evidence_version()}
 
 
 class _Kept:

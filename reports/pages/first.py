@@ -12,7 +12,7 @@ from statistics import median
 
 from reports.pages.records import Evidence
 from verification.claims.c11_forces import LARGE
-from verification.finding import MIXED, NOT_COMPUTED, REFUTED, Finding
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 
 ERRATA = (
     "(18) and (24) lack a factor ½ (C01, C02); (37) holds for another inverse than the pseudo-inverse; the rows (13) "
@@ -33,6 +33,8 @@ def answer(evidence: Evidence) -> str:
     """Say in two or three sentences whether an impulse makes a wall feel rigid; "" where nothing is known."""
     claims = {claim.key: claim for claim in evidence.claims}
     said = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
+    if any(topic.key == "exact-energy" and topic.verdict == REPRODUCED for topic in evidence.topics):
+        said.append("No impact of the engine ever gained energy.")
     return " ".join(said)
 
 
@@ -53,12 +55,12 @@ def _path(claim: Finding | None) -> Iterator[str]:
     tilts = [bound for part in claim.parts if part.region and not part.name.startswith("theta")
              for name, _, _, bound in part.region.bounds if name == "tilt" and bound is not None]  # fmt: skip
     if tilts:
-        yield (f"The hand's path is then the closest to that at a rigid wall where the peg starts nearly flat, up to "
-               f"{degrees(min(tilts)):.1f}° of tilt; beyond, springs alone are often as close or closer.")  # fmt: skip
+        yield (f"The path of the hand then comes closest to that at a rigid wall, if the peg starts nearly flat: up to "
+               f"{degrees(min(tilts)):.1f}° of tilt. Beyond, springs alone often come as close or closer.")  # fmt: skip
     elif claim.parts:
-        yield "There is no range of starts for which the hand's path is reliably the closest to that at a rigid wall."
+        yield "No range of starts was found in which the path of the hand is the closest to that at a rigid wall."
     if any(part.verdict == REFUTED and part.name.startswith("theta") for part in claim.parts):
-        yield "Its rotation is usually not."
+        yield "In rotation, impulses usually do not come closest."
 
 
 def facts(evidence: Evidence) -> tuple[Fact, ...]:
