@@ -75,7 +75,7 @@ def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
 
 
 def provenance() -> dict[str, str]:
-    """Where the report comes from: its date, the facts of every result, all seeds, the sources, what is compared with."""
+    """Where the report comes from: date, the facts of every result, all seeds, the sources, what is compared with."""
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
     facts = collect_provenance(seeds=seeds, packages=PEERS)
     return {"date": datetime.now(UTC).date().isoformat()} | facts | {"sources": evidence_version()}

@@ -15,7 +15,7 @@ REAL = Path(__file__).parents[3] / "out" / "report.html"
 # What a page must be at any width; each returns what is wrong.
 DEAD_ANCHORS = """() => [...document.querySelectorAll("a[href^='#']")].map((a) => a.getAttribute("href").slice(1))
     .filter((id) => !document.getElementById(id))"""
-OUT_OF_SIGHT = """() => [...document.querySelectorAll("main figure svg")]
+OUT_OF_SIGHT = """() => [...document.querySelectorAll("figure svg")]
     .filter((svg) => !svg.closest("details:not([open])") && !svg.parentElement.closest("svg"))
     .map((svg) => [svg.getAttribute("aria-label") || svg.className.baseVal, svg.getBoundingClientRect(),
                    svg.closest(".wide") !== null])  // a wide panel scrolls by itself
@@ -23,7 +23,7 @@ OUT_OF_SIGHT = """() => [...document.querySelectorAll("main figure svg")]
                                   || (!scrolls && (box.left < -1 || box.right > innerWidth + 1)))
     .map(([name]) => name)"""
 OVERFLOW = """() => document.documentElement.scrollWidth - innerWidth"""
-CLIPPED = """() => [...document.querySelectorAll("main p, main h2, main h3, main li, main dd, button, summary")]
+CLIPPED = """() => [...document.querySelectorAll("p, h1, main h2, main h3, main li, main dd, button, summary")]
     .filter((part) => part.checkVisibility() && !part.closest(".scroll, .display, .steps, .plain"))
     .filter((part) => part.getBoundingClientRect().right > innerWidth + 1)
     .map((part) => part.textContent.slice(0, 60))"""
@@ -77,7 +77,7 @@ def test_each_page_is_whole_at_any_width(sight: Any, first: Path) -> None:
     for path in pages_of(first):
         sight.page.goto(path.as_uri())
         check_page(sight)
-        figures += sight.ask("() => document.querySelectorAll('main figure').length")
+        figures += sight.ask("() => document.querySelectorAll('figure').length")
     assert figures == 5
 
 
