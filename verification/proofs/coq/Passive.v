@@ -1,0 +1,303 @@
+(* The arithmetic under the last step of the resolver (iapb/contact/kernels/passive.py, iapb/double_double.py), in binary64
+   with rounding to nearest and gradual underflow, for every size d.
+
+   Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
+   always; and [compensated], the running bound by induction on the number of terms, which both loops of `gain` use.
+
+   Numbers are real numbers of binary64's format whose exponent has no upper end: overflow is not modelled. *)
+
+From Coq Require Import ZArith Reals List Lia Lra Psatz.
+From Flocq Require Import Core Relative Plus_error Pff2Flocq.
+Import ListNotations.
+Open Scope R_scope.
+
+Definition fexp := FLT_exp (-1074) 53.
+Notation number := (generic_format radix2 fexp).
+Notation rnd := (round radix2 fexp ZnearestE).
+Definition u := (/ 2 * bpow radix2 (- (53) + 1)).   (* 2^-53 *)
+Definition eta := bpow radix2 (-1074).              (* the smallest number *)
+
+#[export] Instance prec_positive : Prec_gt_0 53 := eq_refl.
+
+Definition add x y := rnd (x + y).
+Definition subtract x y := rnd (x - y).
+Definition multiply x y := rnd (x * y).
+
+(* iapb.double_double.two_sum and two_product, operation by operation. *)
+Definition two_sum a b :=
+  let s := add a b in
+  let t := subtract s a in
+  (s, add (subtract a (subtract s t)) (subtract b t)).
+
+Definition splitter := bpow radix2 27 + 1.
+Definition high a := let t := multiply splitter a in subtract t (subtract t a).
+Definition two_product a b :=
+  let p := multiply a b in
+  let a_hi := high a in let a_lo := subtract a a_hi in
+  let b_hi := high b in let b_lo := subtract b b_hi in
+  (p, add (add (add (subtract (multiply a_hi b_hi) p) (multiply a_hi b_lo)) (multiply a_lo b_hi)) (multiply a_lo b_lo)).
+
+Lemma u_value : u = / 9007199254740992.
+Proof. unfold u. simpl. lra. Qed.
+
+Lemma u_positive : 0 < u.
+Proof. rewrite u_value. lra. Qed.
+
+Lemma number_round x : number (rnd x).
+Proof. apply generic_format_round; typeclasses eauto. Qed.
+
+Lemma even_choice : forall x : Z, negb (Z.even x) = negb (negb (Z.even (- (x + 1)))).
+Proof. intro x. rewrite Z.even_opp, Z.even_add. destruct (Z.even x); reflexivity. Qed.
+
+Lemma rnd_opposite x : rnd (- x) = - rnd x.
+Proof. apply round_NE_opp. Qed.
+
+Theorem two_sum_exact a b : number a -> number b -> fst (two_sum a b) + snd (two_sum a b) = a + b.
+Proof.
+  intros Fa Fb. unfold two_sum, add, subtract; simpl fst; simpl snd.
+  exact (TwoSum_correct (-1074) 53 (fun x => negb (Z.even x)) ltac:(lia) ltac:(lia) even_choice a b Fa Fb).
+Qed.
+
+Lemma high_flocq x : high x = rnd (rnd (x - rnd (x * (bpow radix2 27 + 1))) + rnd (x * (bpow radix2 27 + 1))).
+Proof.
+  unfold high, subtract, multiply, splitter. rewrite (Rmult_comm _ x).
+  set (p := rnd (x * _)).
+  replace (p - x) with (- (x - p)) by ring. rewrite rnd_opposite. f_equal. ring.
+Qed.
+
+Lemma dekker a b : number a -> number b ->
+  (a * b = 0 \/ bpow radix2 (-1074 + 2 * 53 - 1) <= Rabs (a * b) ->
+   a * b = fst (two_product a b) + snd (two_product a b)) /\
+  Rabs (a * b - (fst (two_product a b) + snd (two_product a b))) <= 7 / 2 * eta.
+Proof.
+  intros Fa Fb.
+  pose proof (Dekker radix2 (-1074) 53 (fun x => negb (Z.even x)) ltac:(lia) ltac:(lia) a b Fa Fb
+    (or_introl eq_refl)) as D.
+  change (53 - Z.div2 53)%Z with 27%Z in D.
+  unfold two_product, add, subtract, multiply; simpl fst; simpl snd.
+  rewrite (high_flocq a), (high_flocq b).
+  replace (rnd (rnd (rnd (a - rnd (a * (bpow radix2 27 + 1))) + rnd (a * (bpow radix2 27 + 1))) *
+           rnd (rnd (b - rnd (b * (bpow radix2 27 + 1))) + rnd (b * (bpow radix2 27 + 1)))) - rnd (a * b))
+    with (- rnd (a * b) + rnd (rnd (rnd (a - rnd (a * (bpow radix2 27 + 1))) + rnd (a * (bpow radix2 27 + 1))) *
+           rnd (rnd (b - rnd (b * (bpow radix2 27 + 1))) + rnd (b * (bpow radix2 27 + 1))))) by ring.
+  exact D.
+Qed.
+
+Theorem two_product_exact a b : number a -> number b -> a * b = 0 \/ bpow radix2 (-969) <= Rabs (a * b) ->
+  fst (two_product a b) + snd (two_product a b) = a * b.
+Proof. intros Fa Fb H. symmetry. apply (dekker a b Fa Fb). exact H. Qed.
+
+Theorem two_product_underflow a b : number a -> number b ->
+  Rabs (a * b - (fst (two_product a b) + snd (two_product a b))) <= 7 / 2 * eta.
+Proof. intros Fa Fb. apply (dekker a b Fa Fb). Qed.
+
+Print Assumptions two_sum_exact.
+Print Assumptions two_product_exact.
+Print Assumptions two_product_underflow.
+
+Lemma add_near x y : number x -> number y -> Rabs (x + y - add x y) <= u * Rabs (x + y).
+Proof.
+  intros Fx Fy. destruct (FLT_plus_error_N_ex radix2 (-1074) 53 (fun z => negb (Z.even z)) x y Fx Fy) as (d & Hd & E).
+  change (FLT_exp (-1074) 53) with fexp in E. unfold add. rewrite E. replace (x + y - (x + y) * (1 + d)) with (- d * (x + y)) by ring.
+  rewrite Rabs_mult, Rabs_Ropp. apply Rmult_le_compat_r; [apply Rabs_pos |].
+  apply Rle_trans with (1 := Hd). apply u_rod1pu_ro_le_u_ro.
+Qed.
+
+Lemma add_size x y : number x -> number y -> Rabs (add x y) <= (1 + u) * Rabs (x + y).
+Proof.
+  intros Fx Fy. replace (add x y) with ((x + y) - (x + y - add x y)) by ring.
+  apply Rle_trans with (1 := Rabs_triang _ _). rewrite Rabs_Ropp.
+  pose proof (add_near x y Fx Fy). lra.
+Qed.
+
+Lemma two_sum_low x y : number x -> number y -> Rabs (snd (two_sum x y)) <= u * Rabs (add x y).
+Proof.
+  intros Fx Fy. pose proof (two_sum_exact x y Fx Fy) as E.
+  destruct (FLT_plus_error_N_round_ex radix2 (-1074) 53 (fun z => negb (Z.even z)) x y Fx Fy) as (d & Hd & D).
+  change (FLT_exp (-1074) 53) with fexp in D. fold (add x y) in D.
+  change (fst (two_sum x y)) with (add x y) in E. set (t := snd (two_sum x y)) in *.
+  replace t with (d * add x y).
+  - rewrite Rabs_mult. apply Rmult_le_compat_r; [apply Rabs_pos | exact Hd].
+  - lra.
+Qed.
+
+(* A term stands for p + e + c; its weight bounds them. h + l stands for the sum: both loops of `gain`. *)
+Record term := Term { p : R; e : R; c : R; weight : R }.
+Definition step (state : R * R) (x : term) :=
+  let ht := two_sum (fst state) (p x) in
+  (fst ht, add (snd state) (add (add (snd ht) (e x)) (c x))).
+Definition summed (terms : list term) := fold_left step terms (0, 0).
+Definition exact (terms : list term) := fold_right (fun x rest => p x + e x + c x + rest) 0 terms.
+Definition weights (terms : list term) := fold_right (fun x rest => weight x + rest) 0 terms.
+
+(* |p| <= s, |e| <= u s + b, |c| <= g s + f of a term of weight s: b and f are what underflow adds. *)
+Definition fits (b g f : R) (x : term) :=
+  number (p x) /\ number (e x) /\ number (c x) /\
+  Rabs (p x) <= weight x /\ Rabs (e x) <= u * weight x + b /\ Rabs (c x) <= g * weight x + f.
+
+Section Running_bound.
+Variables (S G b g f : R).
+Hypotheses (g_positive : 0 <= g) (f_positive : 0 <= f).
+
+Let one := u * (G * S) + b + f.
+Definition low_bound (k s : R) := k * one + (u + g) * s.
+Definition error_bound (k s : R) :=
+  G * u * (2 * (k * (u * (G * S) + b) + u * s) + g * s + k * f + k * (k + 1) / 2 * one + k * ((u + g) * S)).
+
+Definition invariant (k : nat) (s x : R) (state : R * R) :=
+  number (fst state) /\ number (snd state) /\ Rabs (fst state) <= (1 + u) ^ k * s /\
+  Rabs (snd state) <= (1 + u) ^ (k + 2) * low_bound (INR k) s /\
+  Rabs (x - (fst state + snd state)) <= error_bound (INR k) s.
+
+Lemma power_at_least_one k : 1 <= (1 + u) ^ k.
+Proof. apply pow_R1_Rle. pose proof u_positive. lra. Qed.
+
+Lemma powers_grow j k : (j <= k)%nat -> (1 + u) ^ j <= (1 + u) ^ k.
+Proof. intro H. apply Rle_pow; [pose proof u_positive; lra | exact H]. Qed.
+
+Lemma invariant_step k s x state (y : term) :
+  (1 + u) ^ (k + 3) <= G -> 0 <= s -> s + weight y <= S -> fits b g f y -> invariant k s x state ->
+  invariant (k + 1) (s + weight y) (x + (p y + e y + c y)) (step state y).
+Proof.
+  intros HG Hs HS (Fp & Fe & Fc & Hp & He & Hc) (Fh & Fl & Hh & Hl & Hx).
+  destruct state as [h l]; simpl fst in *; simpl snd in *.
+  unfold step; simpl fst; simpl snd.
+  set (w := weight y) in *.
+  pose proof u_positive as Hu.
+  assert (Hw : 0 <= w) by (apply Rle_trans with (2 := Hp); apply Rabs_pos).
+  set (h' := add h (p y)). set (t := snd (two_sum h (p y))).
+  assert (Fh' : number h') by apply number_round.
+  assert (Ft : number t) by apply number_round.
+  assert (E : h' + t = h + p y) by exact (two_sum_exact h (p y) Fh Fp).
+  set (q := add t (e y)). assert (Fq : number q) by apply number_round.
+  set (r := add q (c y)). assert (Fr : number r) by apply number_round.
+  set (l' := add l r). assert (Fl' : number l') by apply number_round.
+  pose proof (power_at_least_one k) as P0.
+  pose proof (powers_grow 1 (k + 2) ltac:(lia)) as P1. rewrite pow_1 in P1.
+  pose proof (powers_grow 2 (k + 2) ltac:(lia)) as P2.
+  pose proof (powers_grow (k + 1) (k + 3) ltac:(lia)) as P3.
+  pose proof (powers_grow (k + 2) (k + 3) ltac:(lia)) as P4.
+  assert (Hh' : Rabs h' <= (1 + u) ^ (k + 1) * (s + w)).
+  { apply Rle_trans with (1 := add_size h (p y) Fh Fp). rewrite Nat.add_comm. simpl pow. rewrite Rmult_assoc.
+    apply Rmult_le_compat_l; [lra |]. apply Rle_trans with (1 := Rabs_triang _ _).
+    assert (w <= (1 + u) ^ k * w) by (rewrite <- (Rmult_1_l w) at 1; apply Rmult_le_compat_r; assumption). lra. }
+  assert (HW : Rabs h' <= G * S).
+  { apply Rle_trans with (1 := Hh'). apply Rmult_le_compat; [apply pow_le; lra | lra | lra | lra]. }
+  assert (Ht : Rabs t <= u * (G * S)).
+  { apply Rle_trans with (1 := two_sum_low h (p y) Fh Fp). apply Rmult_le_compat_l; [lra | exact HW]. }
+  set (m := u * (G * S) + u * w + b).
+  assert (Hte : Rabs (t + e y) <= m).
+  { apply Rle_trans with (1 := Rabs_triang _ _). unfold m. lra. }
+  assert (m_positive : 0 <= m) by (apply Rle_trans with (2 := Hte); apply Rabs_pos).
+  assert (Eq : Rabs (t + e y - q) <= u * m).
+  { apply Rle_trans with (1 := add_near t (e y) Ft Fe). apply Rmult_le_compat_l; lra. }
+  assert (Sq : Rabs q <= (1 + u) * m).
+  { apply Rle_trans with (1 := add_size t (e y) Ft Fe). apply Rmult_le_compat_l; lra. }
+  set (n := m + g * w + f).
+  assert (gw : 0 <= g * w) by (apply Rmult_le_pos; assumption).
+  assert (ugw : 0 <= u * (g * w)) by (apply Rmult_le_pos; lra).
+  assert (uf : 0 <= u * f) by (apply Rmult_le_pos; lra).
+  assert (n_positive : 0 <= n) by (unfold n; lra).
+  assert (Hqc : Rabs (q + c y) <= (1 + u) * n).
+  { apply Rle_trans with (1 := Rabs_triang _ _). unfold n. lra. }
+  assert (Er : Rabs (q + c y - r) <= u * ((1 + u) * n)).
+  { apply Rle_trans with (1 := add_near q (c y) Fq Fc). apply Rmult_le_compat_l; lra. }
+  assert (Sr : Rabs r <= (1 + u) ^ 2 * n).
+  { apply Rle_trans with (1 := add_size q (c y) Fq Fc). replace ((1 + u) ^ 2 * n) with ((1 + u) * ((1 + u) * n)) by ring.
+    apply Rmult_le_compat_l; lra. }
+  assert (Sn : (1 + u) ^ 2 * n <= (1 + u) ^ (k + 2) * n) by (apply Rmult_le_compat_r; assumption).
+  assert (K : INR (k + 1) = INR k + 1) by (rewrite plus_INR; reflexivity).
+  assert (Hlr : Rabs (l + r) <= (1 + u) ^ (k + 2) * low_bound (INR (k + 1)) (s + w)).
+  { apply Rle_trans with (1 := Rabs_triang _ _). rewrite K.
+    replace (low_bound (INR k + 1) (s + w)) with (low_bound (INR k) s + n) by (unfold low_bound, n, m, one; ring). lra. }
+  set (B := low_bound (INR (k + 1)) (s + w)) in *.
+  assert (El : Rabs (l + r - l') <= u * ((1 + u) ^ (k + 2) * B)).
+  { apply Rle_trans with (1 := add_near l r Fl Fr). apply Rmult_le_compat_l; lra. }
+  assert (B_positive : 0 <= B).
+  { assert (0 < (1 + u) ^ (k + 2)) by (apply pow_lt; lra).
+    apply Rmult_le_reg_l with (1 := H). rewrite Rmult_0_r. apply Rle_trans with (2 := Hlr). apply Rabs_pos. }
+  unfold invariant; simpl fst; simpl snd. repeat split; try assumption.
+  - apply Rle_trans with (1 := add_size l r Fl Fr).
+    replace (k + 1 + 2)%nat with (Datatypes.S (k + 2)) by lia. simpl pow. rewrite Rmult_assoc.
+    apply Rmult_le_compat_l; [lra | exact Hlr].
+  - change (Rabs (x + (p y + e y + c y) - (h' + l')) <= error_bound (INR (k + 1)) (s + w)).
+    replace (x + (p y + e y + c y) - (h' + l')) with
+      ((x - (h + l)) + ((t + e y - q) + ((q + c y - r) + (l + r - l')))) by lra.
+    apply Rle_trans with (1 := Rabs_triang _ _).
+    apply Rle_trans with (error_bound (INR k) s + (u * m + (u * ((1 + u) * n) + u * ((1 + u) ^ (k + 2) * B)))).
+    { apply Rplus_le_compat; [exact Hx |]. apply Rle_trans with (1 := Rabs_triang _ _).
+      apply Rplus_le_compat; [exact Eq |]. apply Rle_trans with (1 := Rabs_triang _ _). lra. }
+    assert (G1 : 1 <= G) by (apply Rle_trans with (2 := HG); apply power_at_least_one).
+    assert (A1 : u * m <= u * (G * m)).
+    { apply Rmult_le_compat_l; [lra |]. rewrite <- (Rmult_1_l m) at 1. apply Rmult_le_compat_r; assumption. }
+    assert (A2 : u * ((1 + u) * n) <= u * (G * n)).
+    { apply Rmult_le_compat_l; [lra |]. apply Rmult_le_compat_r; lra. }
+    assert (A3 : u * ((1 + u) ^ (k + 2) * B) <= u * (G * B)).
+    { apply Rmult_le_compat_l; [lra |]. apply Rmult_le_compat_r; lra. }
+    assert (A4 : B <= (INR k + 1) * one + (u + g) * S).
+    { unfold B, low_bound. rewrite K. apply Rplus_le_compat_l. apply Rmult_le_compat_l; lra. }
+    assert (A5 : u * (G * B) <= u * (G * ((INR k + 1) * one + (u + g) * S))).
+    { apply Rmult_le_compat_l; [lra |]. apply Rmult_le_compat_l; lra. }
+    apply Rle_trans with (error_bound (INR k) s +
+      (u * (G * m) + (u * (G * n) + u * (G * ((INR k + 1) * one + (u + g) * S))))); [lra |].
+    right. unfold error_bound, n, m. rewrite K. field.
+Qed.
+
+Lemma invariant_run terms : forall k s x state,
+  (1 + u) ^ (k + length terms + 2) <= G -> 0 <= s -> s + weights terms <= S -> Forall (fits b g f) terms ->
+  invariant k s x state ->
+  invariant (k + length terms) (s + weights terms) (x + exact terms) (fold_left step terms state).
+Proof.
+  induction terms as [| y terms IH]; intros k s x state HG Hs HS HF HI; simpl in *.
+  - rewrite Nat.add_0_r, !Rplus_0_r. exact HI.
+  - inversion HF as [| y' terms' Fy Fterms]; subst.
+    assert (Hw : 0 <= weight y) by (destruct Fy as (_ & _ & _ & Hp & _); apply Rle_trans with (2 := Hp); apply Rabs_pos).
+    assert (Hrest : 0 <= weights terms).
+    { clear - Fterms. induction terms as [| z terms IH]; simpl; [lra |].
+      inversion Fterms as [| z' terms' Fz F]; subst. destruct Fz as (_ & _ & _ & Hp & _).
+      assert (0 <= weight z) by (apply Rle_trans with (2 := Hp); apply Rabs_pos). specialize (IH F). lra. }
+    replace (k + Datatypes.S (length terms))%nat with (k + 1 + length terms)%nat by lia.
+    replace (s + (weight y + weights terms)) with (s + weight y + weights terms) by ring.
+    replace (x + (p y + e y + c y + exact terms)) with (x + (p y + e y + c y) + exact terms) by ring.
+    apply IH; try assumption; try lra.
+    + apply Rle_trans with (2 := HG). apply powers_grow. lia.
+    + apply invariant_step; try assumption; try lra.
+      apply Rle_trans with (2 := HG). apply powers_grow. lia.
+Qed.
+End Running_bound.
+
+(* The sum of n terms of total weight S as `gain` computes it: how far it is off, and how large its low part is. *)
+Theorem compensated terms G b g f : let n := INR (length terms) in let S := weights terms in
+  (1 + u) ^ (length terms + 2) <= G -> 0 <= b -> 0 <= g -> 0 <= f -> Forall (fits b g f) terms ->
+  Rabs (exact terms - (fst (summed terms) + snd (summed terms))) <= error_bound S G b g f n S /\
+  Rabs (fst (summed terms)) <= G * S /\
+  Rabs (snd (summed terms)) <= G * low_bound S G b g f n S.
+Proof.
+  intros n S HG Hb Hg Hf HF.
+  assert (HS : 0 <= S).
+  { subst S. clear - HF. induction terms as [| z terms IH]; simpl; [lra |].
+    inversion HF as [| z' terms' Fz F]; subst. destruct Fz as (_ & _ & _ & Hp & _).
+    assert (0 <= weight z) by (apply Rle_trans with (2 := Hp); apply Rabs_pos). specialize (IH F). lra. }
+  assert (Z : number 0) by apply generic_format_0.
+  destruct (invariant_run S G b g f Hg Hf terms 0 0 0 (0, 0)) as (_ & _ & Hh & Hl & Hx).
+  - simpl. exact HG.
+  - lra.
+  - simpl. unfold S. lra.
+  - exact HF.
+  - unfold invariant, low_bound, error_bound; simpl. rewrite Rplus_0_r, Rminus_0_r, Rabs_R0.
+    repeat split; try assumption; right; field.
+  - rewrite !Rplus_0_l in *. simpl Nat.add in *. unfold summed.
+    pose proof (power_at_least_one (length terms)). pose proof u_positive.
+    pose proof (powers_grow (length terms) (length terms + 2) ltac:(lia)).
+    assert (L : 0 <= low_bound S G b g f n S).
+    { unfold low_bound. assert (0 <= G) by lra. assert (0 <= u * (G * S)) by (apply Rmult_le_pos; [lra | apply Rmult_le_pos; lra]).
+      assert (0 <= n) by apply pos_INR.
+      assert (0 <= n * (u * (G * S) + b + f)) by (apply Rmult_le_pos; lra).
+      assert (0 <= (u + g) * S) by (apply Rmult_le_pos; lra). lra. }
+    repeat split.
+    + exact Hx.
+    + apply Rle_trans with (1 := Hh). apply Rmult_le_compat_r; lra.
+    + apply Rle_trans with (1 := Hl). apply Rmult_le_compat_r; lra.
+Qed.
+
+Print Assumptions compensated.
