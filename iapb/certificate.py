@@ -19,7 +19,7 @@ from iapb.contact.kernels.passive import gain_signs
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.mechanism import Mechanism
-from iapb.run import Run
+from iapb.run import Run, digests
 from iapb.scene.mechanism import largest_friction, mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Scene, scene_kind
 
@@ -171,7 +171,8 @@ def certify(run: Run) -> Certificate:
     """Judge every impact of a run exactly: energy, and whether impulses, velocities and contacts belong together.
 
     M is made again at the recorded configuration by the engine's kernels, which give the same bits on every x86-64
-    processor; the recorded generalized impulses, which must be M(v⁺ − v⁻), show that it is the one of the impact.
+    processor. Its recorded digest shows that it is the same to the last bit; the recorded generalized impulses, which
+    must be M(v⁺ − v⁻), that it is the one of the impact.
 
     Parameters
     ----------
@@ -185,6 +186,8 @@ def certify(run: Run) -> Certificate:
     ------
     ArgumentError
         The record holds a number that is not finite, or steps that the run does not have.
+    IapbError
+        M, made again, is not the one whose digest is recorded.
     """
     table = run.impacts
     _check_finite(run)
@@ -206,6 +209,10 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
+        other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
+        if len(other):
+            raise IapbError(f"impact {start + other[0]}: M, made again at its configuration, is not the recorded one; "
+                            "the record was changed, or the engine that wrote it computes M otherwise")
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
 
 

@@ -15,7 +15,7 @@ from iapb.distrust import distrust_of
 from iapb.haptics.kernels import PLANNED
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
-from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, quantities
+from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, digests, quantities
 from iapb.scene.model import SpatialScene
 
 Floats = NDArray[np.float64]
@@ -23,10 +23,11 @@ Floats = NDArray[np.float64]
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
 _STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C answer at least that often
 
-# What the loop writes; poses and energies follow from it.
+# What the loop writes; poses, energies and digests of M follow from it.
 STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
 STEPS = quantities(Run, "step")
-CONTACTS, IMPACTS = quantities(ContactTable, "contact"), quantities(ImpactTable)
+CONTACTS = quantities(ContactTable, "contact")
+IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
 _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
                       "device_actuator_work")
 
@@ -214,6 +215,8 @@ class Recorder:
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
         law, coupling = simulation.law, simulation.coupling
         steps: dict[str, Any] = {each.name: self.joined("steps", each.name) for each in STEPS}
+        impacts: dict[str, Any] = {each.name: self.joined("impacts", each.name) for each in IMPACTS}
+        struck = states["q"][impacts["step"] - self.first]
         run = Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
             scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
@@ -226,7 +229,7 @@ class Recorder:
             pose=system.mechanism.poses(states["q"], planar=not isinstance(simulation.scene, SpatialScene)),
             **steps,
             contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in CONTACTS}),
-            impacts=ImpactTable(**{each.name: self.joined("impacts", each.name) for each in IMPACTS}),
+            impacts=ImpactTable(**impacts, mass_digest=digests(system.mechanism.mass_matrices(struck))),
             energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
                                      for one in simulation.effects),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from hashlib import blake2b
 from html import escape
 from typing import Any
 
@@ -111,6 +112,15 @@ class ImpactTable:
         "impact", "1", "rows that approach still afterwards, -1 = the law does not say"))
     solved: Booleans = field(metadata=_along(
         "impact", "1", "0 where the law is not met (friction reduced); passive all the same"))
+    mass_digest: Integers = field(metadata=_along(
+        "impact", "1", "first 8 bytes of BLAKE2b of M, little-endian doubles row by row, as a signed integer"))
+
+
+def digests(matrices: Floats) -> Integers:
+    """Return the `mass_digest` of each of n matrices (n, d, d)."""
+    plain = np.ascontiguousarray(matrices, "<f8")
+    return np.array([int.from_bytes(blake2b(one.tobytes(), digest_size=8).digest(), "little", signed=True)
+                     for one in plain], np.int64)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
-from iapb.run import ContactTable, ImpactTable, Run, blank, quantities
+from iapb.run import ContactTable, ImpactTable, Run, blank, digests, quantities
 from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
 from reports.store.runs import write_run
 from verification.impacts import Floats, ImpactCase
@@ -91,7 +91,8 @@ def _impacts(case: ImpactCase, rows: tuple[int, ...], velocity_after: Floats) ->
         step=np.zeros(k, np.int64), group=np.zeros(k, np.int64), v_minus=np.tile(v, (k, 1)), v_plus=after,
         impulse=impulse, rows=np.array(rows, np.int64), rank=np.full(k, -1, np.int64), energy_lost=np.array(lost),
         scale=np.ones(k), clamp=np.full(k, np.nan), friction_share=np.ones(k),
-        approaching=np.where(given, closing, -1).astype(np.int64), solved=np.zeros(k, np.bool_))  # fmt: skip
+        approaching=np.where(given, closing, -1).astype(np.int64), solved=np.zeros(k, np.bool_),
+        mass_digest=np.repeat(digests(np.asarray(case.mass_matrix, np.float64)[None]), k))  # fmt: skip
 
 
 def _energy_lost(mass: Floats, before: Floats, after: Floats) -> float:

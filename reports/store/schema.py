@@ -24,7 +24,7 @@ from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Quantity, Run, quan
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
-FORMAT_VERSION = 3  # 2: names and units of velocities, which quaternions need; 3: poses
+FORMAT_VERSION = 4  # 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M
 
 # group -> its quantities, the record that holds them, and the quantity that a plotting tool shows first
 GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any], str]] = {

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import fields, replace
 from fractions import Fraction
+from hashlib import blake2b
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ import iapb.certificate
 from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene, load_scene, simulate
 from iapb.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
-from iapb.run import Run
+from iapb.run import Run, digests
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -174,6 +176,28 @@ def test_impulses_of_steps_need_their_impacts(cradle: Run) -> None:
     more = cradle.impulse.copy()
     more[table.step[0]] *= 1.0 + 1e-6
     assert not certify(replace(cradle, impulse=more)).passed
+
+
+def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) -> None:
+    """A configuration, a digest or the scene changed in the last bit: M is not the recorded one."""
+    table = cradle.impacts
+    assert table.mass_digest.all() and len(set(table.mass_digest)) == 1  # M of balls does not depend on where they are
+    changed = table.mass_digest.copy()
+    changed[1] += 1
+    heavier = cradle.scene_resolved | {"bodies": [
+        body | {"mass": np.nextafter(body["mass"], 2.0)} for body in cradle.scene_resolved["bodies"]]}
+    for forged, first in ((replace(cradle, impacts=replace(table, mass_digest=changed)), 1),
+                          (replace(cradle, scene_resolved=heavier), 0)):
+        with pytest.raises(IapbError, match=f"impact {first}: M"):
+            certify(forged)
+
+
+def test_digests_are_those_of_little_endian_doubles_row_by_row() -> None:
+    mass = np.array([[[1.0, 2.0], [3.0, 4.0]]])
+    hashed = blake2b(struct.pack("<4d", 1.0, 2.0, 3.0, 4.0), digest_size=8).digest()
+    digest = int.from_bytes(hashed, "little", signed=True)
+    assert digests(mass).tolist() == digests(np.asfortranarray(mass)).tolist() == [digest]
+    assert digests(mass.transpose(0, 2, 1))[0] != digest
 
 
 def test_contact_impulses_that_are_erased_are_missed(cradle: Run) -> None:

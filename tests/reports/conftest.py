@@ -43,6 +43,7 @@ def _impacts(rng: np.random.Generator, count: int, d: int) -> ImpactTable:
         friction_share=np.ones(count),
         approaching=np.zeros(count, np.int64),
         solved=np.ones(count, np.bool_),
+        mass_digest=np.zeros(count, np.int64),
     )
 
 
