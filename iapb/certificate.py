@@ -354,25 +354,25 @@ def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, floa
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")
-    span = residual = 0.0
-    for step in np.unique(impacts.step):
-        of_step = np.flatnonzero(impacts.step == step)
-        struck = [m for m in range(table.offsets[step], table.offsets[step + 1]) if table.impulse[m] != 0.0]
-        rows = np.array([_row(run, mechanism, int(step), m) for m in struck]).reshape(-1, mechanism.nv)
-        p, recorded = table.impulse[struck], run.impulse[step]
-        size = np.abs(rows).T @ np.abs(p) + np.abs(recorded)
-        span = max(span, _largest_share(np.abs(rows.T @ p - recorded).sum(keepdims=True), size.sum(keepdims=True)))
-        before, after = impacts.v_minus[of_step[0]], impacts.v_plus[of_step[-1]]
-        if equality and (impacts.scale[of_step] == 1.0).all() and len(rows):
-            off = np.abs(rows @ after + float(values[0]) * (rows @ before))
-            residual = max(residual, _largest_share(off, np.abs(rows) @ np.abs(before)))
+    steps, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
+    last = len(line) - 1 - np.unique(impacts.step[::-1], return_index=True)[1]
+    whole = np.bincount(line, impacts.scale != 1.0) == 0.0  # no impact of the step was scaled
+    step_of = np.repeat(np.arange(len(run.impulse)), np.diff(table.offsets))
+    struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
+    difference, size, residual = -run.impulse[steps], np.abs(run.impulse[steps]), 0.0
+    for start in range(0, len(struck), _BATCH):
+        m = struck[start : start + _BATCH]
+        k, normal = np.searchsorted(steps, step_of[m]), table.normal[m]  # (11), (12): nᵀ(J_a − J_b)
+        rows_a, rows_b = (mechanism.rows_along(run.q[steps[k]], body[m], table.point[m], normal)
+                          for body in (table.body_a, table.body_b))
+        rows = rows_a - rows_b
+        pushed = rows * table.impulse[m][:, None]
+        np.add.at(difference, k, pushed)
+        np.add.at(size, k, np.abs(pushed))
+        if equality:
+            before, after = impacts.v_minus[first[k]], impacts.v_plus[last[k]]
+            off = np.abs((rows * after).sum(axis=1) + float(values[0]) * (rows * before).sum(axis=1))
+            felt = np.abs(rows * before).sum(axis=1)
+            residual = max(residual, _largest_share(off[whole[k]], felt[whole[k]]))
+    span = _largest_share(np.abs(difference).sum(axis=1), size.sum(axis=1))
     return span, residual if equality else np.nan
-
-
-def _row(run: Run, mechanism: Mechanism, step: int, m: int) -> Floats:
-    """(11), (12): nᵀ(J_a − J_b) of contact m of the record."""
-    table, q = run.contacts, run.q[step]
-    row = table.normal[m] @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
-    if table.body_b[m] >= 0:
-        row = row - table.normal[m] @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
-    return np.asarray(row, np.float64)

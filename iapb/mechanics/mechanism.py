@@ -35,6 +35,7 @@ entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
     evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
     evaluation.is_configuration, evaluation.kinetic_energy, evaluation.mass_matrices_at, evaluation.mass_matrix_at,
     evaluation.misplaced_body, evaluation.planar_poses_along, evaluation.poses_along, evaluation.potential_energy,
+    evaluation.rows_along,
     kinematics.forward_kinematics, kinematics.frame_jacobian, kinematics.point_jacobian)})  # fmt: skip
 
 
@@ -223,6 +224,23 @@ class Mechanism:
         """Return J (3, d): velocity, world axes, of the world point [m] taken as fixed to the body."""
         place = finite_array("point", point, (3,), "m")
         return self._filled((3, self.nv), entries.point_jacobian, self._at(q), self.index(body), place)
+
+    def rows_along(self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike) -> Floats:
+        """Return directionᵀ J (n, d) of n world points (n, 3), fixed to a body each, at qs (n, nq).
+
+        A body -1 does not move.
+        """
+        places, fixed_to = float_rows("qs", qs, self.nq), np.ascontiguousarray(bodies, np.int64)
+        spots, along = float_rows("points", points, 3), float_rows("directions", directions, 3)
+        if not len(places) == len(fixed_to) == len(spots) == len(along):
+            raise ArgumentError("bodies, points and directions", len(spots), f"{len(places)} each, as many as qs")
+        if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
+            raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
+        out = np.empty((len(places), self.nv))
+        done = entries.rows_along(self._scratch.parts, places, fixed_to, spots, along, out)
+        if done < len(places):
+            self._refuse(f"qs[{done}]", places[done])
+        return out
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""

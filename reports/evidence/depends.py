@@ -6,6 +6,7 @@ import hashlib
 from pathlib import Path
 
 from reports.provenance import package_version
+from verification.proofs import coq_development
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared"  # files of others, where somebody has put them
 # The last fuzzing and fault injection (`make fuzz`); absent where only the package is installed.
@@ -36,6 +37,8 @@ def depends_of(stage: str) -> dict[str, str]:
     if stage == "survival":
         kept = LAST_RESULT.read_bytes() if LAST_RESULT.is_file() else b""
         folders[LAST_RESULT.name] = hashlib.sha256(kept).hexdigest() if kept else ABSENT
+    if stage in ("proofs", "Coq development"):
+        folders |= {"Coq": coq_development.version(), "coq": folder_hash(coq_development.FOLDER)}
     return folders | {name: package_version(name) for name in PACKAGES.get(stage, ())}
 
 

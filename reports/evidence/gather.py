@@ -24,6 +24,7 @@ from verification.finding import Failure, Finding, Table, attempt
 from verification.hard_cases import study as hard_cases
 from verification.laws import study as laws
 from verification.proofs import check_all, on_proofs
+from verification.proofs.coq_development import Theorem, theorems
 from verification.proofs.statement import ProofRecord
 
 Progress = Callable[[str, int, int], None]
@@ -50,11 +51,12 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
 
     ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth, workers=claims.cores()))
     proved = kept.stage("proofs", tuple[ProofRecord, ...], check_all)
+    in_coq = kept.stage("Coq development", tuple[Theorem, ...], theorems)
     broken = kept.stage("counterexamples", tuple[Finding, ...], laws.counterexamples)
     hard = kept.stage("hard cases", tuple[Finding, ...], partial(hard_cases.hard_cases, runner))
     timed = kept.stage("accuracy", Table, lambda done, lost: work_precision(progress=done, failures=lost), None)
     gains, properties, *others = (_topic(kept, name, runner, depth) for name in TOPICS)
-    topics = (gains, kept.finding("proofs", proved, on_proofs), properties,
+    topics = (gains, kept.finding("proofs", proved, partial(on_proofs, development=in_coq)), properties,
               kept.finding("hard cases", hard, hard_cases.on_hard_cases), *others)  # fmt: skip
     if kept.failures["claims"] and not ledger:
         topics = (failed_topic("claims", kept.failures["claims"][0]), *topics)

@@ -95,7 +95,8 @@ def test_what_a_stage_reads_beside_the_project_is_in_its_key(tmp_path, monkeypat
         found.append(depends.depends_of("complementarity"))
     assert len({Stage(tmp_path, "complementarity", int, {}, one).path for one in found}) == 3
     assert found[0]["problems"] == depends.ABSENT and "cvxpy" in found[0]
-    assert depends.depends_of("proofs") == {}
+    assert depends.depends_of("properties") == {}
+    assert set(depends.depends_of("proofs")) == {"Coq", "coq"}  # its version, and the hash of the development
     assert set(depends.depends_of("engines")) >= {"mujoco", "drake"}
 
 

@@ -31,8 +31,9 @@ from verification.finding import (
     table_of,
 )
 from verification.proofs.checking import checked
+from verification.proofs.coq_development import ARGUED, NOT_RUN, SAYS, Theorem
 from verification.proofs.second_tool import CERTIFIED, second_opinion
-from verification.proofs.statement import YES
+from verification.proofs.statement import NO, NOT_APPLICABLE, YES
 
 if TYPE_CHECKING:
     from verification.proofs.statement import ProofRecord, Statement
@@ -93,19 +94,33 @@ def _check_with_coq(name: str) -> ProofRecord:
     if name not in CERTIFIED:
         return record
     opinion = second_opinion(load(name))
-    return replace(record, coq="coqc is not installed" if opinion.verdict == "skipped" else opinion.answer)
+    return replace(record, coq=NOT_RUN if opinion.verdict == "skipped" else opinion.answer)
 
 
-def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = ()) -> Finding:
-    """How many statements are proved, and how many wrong twins refuted."""
-    rows = [{"statement": one.name, "holds": one.holds, "SymPy": one.sympy, "Coq": one.coq,
+def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
+              development: Sequence[Theorem] = ()) -> Finding:  # fmt: skip
+    """How many statements are proved, by whom, how many wrong twins are refuted, and what Coq proves of the code."""
+    rows = [{"statement": one.name, "holds": one.holds,
+             "own kernel": YES if all(step.accepted for step in one.steps) else NO, "SymPy": one.sympy, "Coq": one.coq,
              "wrong twins": len(one.twins)} for one in records]  # fmt: skip
-    columns = Column("statement"), Column("holds"), Column("SymPy"), Column("Coq"), Column("wrong twins")
-    table = table_of(columns, rows)
+    columns = "statement", "holds", "own kernel", "SymPy", "Coq", "wrong twins"
+    table = table_of(tuple(map(Column, columns)), rows)
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     sentence = (f"{proved} of {len(rows)} statements are proved by certificates that a machine expanded; "
                 f"SymPy confirms {sum(one.sympy == YES for one in records)}; "
                 f"{twins} deliberately altered statements are refuted by exact counterexamples.")
-    parts = (Part(sentence, REPRODUCED if proved == len(rows) else REFUTED),)
-    return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, parts, {"statements": table},
-                      failures)  # fmt: skip
+    parts = [Part(sentence, REPRODUCED if proved == len(rows) else REFUTED)]
+    tables = {"statements": table}
+    if development:
+        theorems = [{"theorem": one.name, "says": SAYS[one.name], "holds": one.holds, "own kernel": NOT_APPLICABLE,
+                     "SymPy": NOT_APPLICABLE, "Coq": one.coq, "assumes": ", ".join(one.axioms)} for one in development]
+        tables["theorems about the code"] = table_of(tuple(map(Column, theorems[0])), theorems)
+        asked = [one for one in development if one.holds is not None]
+        accepted = sum(one.holds is True for one in asked)
+        told = (f"Coq proves {accepted} of {len(development)} theorems about the checker and the arithmetic of the "
+                f"last step, with no axioms but those of the real numbers. {ARGUED}" if asked else
+                f"Coq is not installed: {len(development)} theorems about the code were not checked here.")  # fmt: skip
+        if asked:
+            parts.append(Part(told, REPRODUCED if accepted == len(development) else REFUTED))
+        sentence = f"{sentence} {told}"
+    return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, tuple(parts), tables, failures)

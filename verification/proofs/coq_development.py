@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from iapb.errors import IapbError, MissingDependencyError
+from verification.finding import Failure, counted, of_each
+from verification.proofs.statement import NO, YES
 
 FOLDER = Path(__file__).with_name("coq")
 PATIENCE = 600.0  # seconds for one file
@@ -20,20 +24,56 @@ PATIENCE = 600.0  # seconds for one file
 AXIOMS_OF_THE_REALS = frozenset({
     "ClassicalDedekindReals.sig_forall_dec", "ClassicalDedekindReals.sig_not_dec",
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
+NOT_RUN = "not run here"
+SAYS = {
+    "check_sound": "where the exact checker says yes, wᵀMw ≤ vᵀMv over the real numbers",
+    "check_complete": "where it says no of lists that fit, wᵀMw > vᵀMv",
+    "two_sum_exact": "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow",
+    "two_product_exact": "two_product(a, b) is a b exactly where it is 0 or at least 2⁻⁹⁶⁹",
+    "two_product_underflow": "two_product(a, b) is within 7/2 of 2⁻¹⁰⁷⁴ of a b always",
+    "compensated": "the running bound of both loops of `gain`: a sum of n terms, by induction on n",
+}
+# What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
+ARGUED = ("Argued in prose only: that the terms of `gain` meet the hypotheses of the running bound, with the constants "
+          "in its radius, the bounds of the other three evaluations, and that an overflow is never accepted.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 
 @dataclass(frozen=True)
 class Theorem:
-    """A theorem that Coq accepted, and the axioms that it leans on."""
+    """A theorem of the development, Coq's answer (yes, no, not run here), and the axioms that it leans on."""
 
     name: str
-    axioms: frozenset[str]
+    coq: str
+    axioms: tuple[str, ...] = ()
 
     @property
-    def holds(self) -> bool:
-        """Nothing is assumed beyond the real numbers."""
-        return self.axioms <= AXIOMS_OF_THE_REALS
+    def holds(self) -> bool | None:
+        """Coq accepts it, and nothing is assumed beyond the real numbers; None where Coq was not asked."""
+        return None if self.coq == NOT_RUN else self.coq == YES and AXIOMS_OF_THE_REALS.issuperset(self.axioms)
+
+
+def theorems(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[Theorem, ...]:
+    """Every theorem of the development: compiled where Coq is installed, else "not run here"."""
+    files = sorted(path.stem for path in FOLDER.glob("*.v"))
+    return tuple(of_each(counted(files, progress), _answered, failures))
+
+
+def _answered(name: str) -> tuple[Theorem, ...]:
+    if lacking(name):
+        return tuple(Theorem(one, NOT_RUN) for one in _asked(name))
+    with TemporaryDirectory() as folder:
+        try:
+            return compiled(name, Path(folder))
+        except IapbError:
+            return tuple(Theorem(one, NO) for one in _asked(name))
+
+
+def version() -> str:
+    """What `coqc` says of itself; "absent" without it."""
+    if shutil.which("coqc") is None:
+        return "absent"
+    return subprocess.run(["coqc", "--print-version"], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def lacking(name: str) -> str:
@@ -61,12 +101,16 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
         raise MissingDependencyError(reason.partition(" ")[0], "the Coq development", _HINT)
     shutil.copy(FOLDER / f"{name}.v", folder)
     said = _run(["coqc", "-q", f"{name}.v"], folder)
-    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
-    asked = [line.split()[2].rstrip(".") for line in source.splitlines() if line.startswith("Print Assumptions")]
-    answers = _assumptions(said)
+    asked, answers = _asked(name), _assumptions(said)
     if not asked or len(asked) != len(answers):
         raise IapbError(f"{name}.v asks for the assumptions of {len(asked)} theorems; Coq answers {len(answers)}")
-    return tuple(Theorem(one, axioms) for one, axioms in zip(asked, answers, strict=True))
+    return tuple(Theorem(one, YES, tuple(sorted(axioms))) for one, axioms in zip(asked, answers, strict=True))
+
+
+def _asked(name: str) -> list[str]:
+    """The theorems whose assumptions a file prints."""
+    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
+    return [line.split()[2].rstrip(".") for line in source.splitlines() if line.startswith("Print Assumptions")]
 
 
 def build_checker(folder: Path) -> Path:

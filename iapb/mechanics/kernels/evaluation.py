@@ -11,7 +11,7 @@ from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
-from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.mechanics.kernels.kinematics import forward_kinematics, motion_at
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 # Length of a quaternion or (cos, sin) pair given at the public border: single precision input passes.
@@ -93,6 +93,26 @@ def biases_at(at, q, v, out):
     for k in range(q.shape[0]):
         if not bias_at(at, q[k], v[k], out[k]):
             return k
+    return q.shape[0]
+
+
+@kernel
+def rows_along(at, q, body, point, direction, out):
+    """out (n, d) <- velocity of n world points, fixed to a body each, along directions; return the rows done.
+
+    A body -1 does not move. q (n, nq) holds the configuration of each.
+    """
+    m, w = at.mechanism, at.workspace
+    for i in range(q.shape[0]):
+        if not is_configuration(m, q[i]):
+            return i
+        forward_kinematics(m, q[i], w)
+        x, along = load(point, i), load(direction, i)
+        out[i] = 0.0
+        k = m.last_dof[body[i]] if body[i] >= 0 else -1
+        while k >= 0:
+            out[i, k] = dot(along, motion_at(m, w, k, x))
+            k = m.dof_parent[k]
     return q.shape[0]
 
 

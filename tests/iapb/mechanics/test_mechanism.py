@@ -150,6 +150,10 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
     np.testing.assert_allclose(
         mechanism.point_jacobian(q, body, point) @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6
     )
+    along = rng.normal(size=3)
+    rows = mechanism.rows_along([q, q], [-1, body], [point, point], [along, along])
+    expected = [0.0 * v, along @ mechanism.point_jacobian(q, body, point)]
+    np.testing.assert_allclose(rows, expected, atol=1e-13, rtol=1e-12)
     at_origin = mechanism.point_jacobian(q, body, positions[body])
     np.testing.assert_array_equal(mechanism.frame_jacobian(q, body)[:3], at_origin)
     spin = (turned - unturned) @ rotations[body].T / (2 * STEP)
@@ -227,6 +231,8 @@ def test_names_units_and_layout():
         (lambda: two_link_arm().mass_matrix([0.0]), "q"),
         (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
         (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
+        (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
+        (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
         (
             lambda: Mechanism([rod("a", None, 0, Joint("continuous"))]).mass_matrix([1.0, 1.0]),
             "q of body 'a'",

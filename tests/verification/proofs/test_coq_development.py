@@ -11,8 +11,18 @@ import pytest
 
 from iapb.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
-from verification.proofs import coq_development
-from verification.proofs.coq_development import FOLDER, build_checker, compiled, lacking
+from verification.finding import REFUTED, REPRODUCED
+from verification.proofs import coq_development, on_proofs
+from verification.proofs.coq_development import (
+    FOLDER,
+    NOT_RUN,
+    Theorem,
+    build_checker,
+    compiled,
+    lacking,
+    theorems,
+)
+from verification.proofs.statement import NO, YES
 
 IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
 needs_ocaml = pytest.mark.skipif(
@@ -76,8 +86,8 @@ def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, tmp_
     assert not any(word in source for word in ("Admitted", "admit.", "Axiom ", "Parameter ", "Abort"))
     if reason := lacking(name):
         pytest.skip(reason)
-    theorems = compiled(name, tmp_path)
-    assert all(theorem.holds for theorem in theorems), theorems
+    found = compiled(name, tmp_path)
+    assert all(theorem.holds for theorem in found), found
 
 
 def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,6 +99,21 @@ def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.Mon
     (folder := tmp_path / "out").mkdir()
     monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
     (theorem,) = compiled("Wrong", folder)
-    assert theorem.name == "all" and theorem.axioms == {"easy"} and not theorem.holds
+    assert theorem == Theorem("all", YES, ("easy",)) and theorem.holds is False
     with pytest.raises(IapbError, match="Unable to unify"):
         compiled("Open", folder)
+
+
+def test_without_coq_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    found = theorems(lambda *done: None, [])
+    assert len(found) >= 6 and {theorem.coq for theorem in found} == {NOT_RUN}
+    finding = on_proofs([], (), found)
+    assert "not checked here" in finding.answer and len(finding.parts) == 1
+
+
+@pytest.mark.parametrize(("answer", "axioms", "verdict"), [
+    (YES, ("Classical_Prop.classic",), REPRODUCED), (YES, ("easy",), REFUTED), (NO, (), REFUTED)])  # fmt: skip
+def test_a_refused_theorem_or_a_strange_axiom_refutes(answer: str, axioms: tuple[str, ...], verdict: str) -> None:
+    finding = on_proofs([], (), [Theorem("check_sound", YES), Theorem("compensated", answer, axioms)])
+    assert finding.parts[1].verdict == verdict
