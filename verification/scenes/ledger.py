@@ -253,7 +253,8 @@ def _impacts(measures: Sequence[Measure]) -> Part:
     return Part(
         f"Of {sum(m['impacts'] for m in measures)} impacts, with up to {most['most rows in one impact']} rows at once "
         f"({most['scene']}), the one that adds most energy, summed in doubles, adds {gained:.0e} of what its scene "
-        + ("turns over: rounding of the sum." if rounding else "turns over."), REPRODUCED if rounding else REFUTED)  # fmt: skip
+        + ("turns over: rounding of the sum." if rounding else "turns over."),
+        REPRODUCED if rounding else REFUTED)  # fmt: skip
 
 
 def _order(books: Sequence[OpenBooks]) -> Part:
