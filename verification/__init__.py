@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from verification.cost.impacts import which_method as which_method
     from verification.cost.impacts import work_precision as work_precision
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
@@ -20,6 +21,7 @@ _HOME = {
     "check_passivity": "verification.laws",
     "bulk_impacts": "verification.laws",
     "judge_hard_cases": "verification.hard_cases",
+    "which_method": "verification.cost.impacts",
     "work_precision": "verification.cost.impacts",
     "compare_worlds": "verification.worlds.comparison",
 }

@@ -24,6 +24,7 @@ Call = Callable[[], object]
 
 LEAST_ROUNDS = 3  # even of what takes long
 _SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
+_WARMED = 2e-2  # seconds: what takes longer feels cold caches too little for a call more
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,17 @@ def seconds(call: Call, times: int = 1) -> float:
 
 
 def sampler(call: Call) -> Callable[[], float]:
-    """Return a contestant for `take_turns`: `call`, as often in one sample as the clock needs."""
+    """Return a contestant for `take_turns`: `call`, as often in one sample as the clock needs, a warm one before it."""
     times = 1
-    while seconds(call, times) * times < _SHORTEST_SAMPLE:
+    while (spent := seconds(call, times) * times) < _SHORTEST_SAMPLE:
         times *= 4
-    return lambda: seconds(call, times)
+
+    def sample() -> float:
+        if spent < _WARMED:
+            call()
+        return seconds(call, times)
+
+    return sample
 
 
 def take_turns(

@@ -465,20 +465,16 @@ def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
 # Impacts on which equalities and complementarity have the same exact answer, so that both can be measured: the approach
 # is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes at every contact, so that the equality law (21) and
 # Newton's LCP have one and the same v⁺ (to the rounding of v⁻ in nearly dependent directions).
-def timed_problems(families: tuple[str, ...] = ("conditioning", "contacts"), seed: int = 0) -> tuple[ImpactCase, ...]:
-    """Return the problems: conditioning of M and of the rows at d = 6, c = 4; contact counts 4 to 300 at d = 12."""
-    problems = []
-    if "conditioning" in families:
-        for condition in (1e0, 1e4, 1e8):
-            for closeness in (1.0, 1e-4, 1e-8):
-                problems.append(_timed_problem("conditioning", 6, 4, condition, closeness, seed))
-    if "contacts" in families:
-        for contacts in (4, 12, 60, 300):
-            problems.append(_timed_problem("contacts", 12, contacts, 1e2, 1.0, seed))
-    return tuple(problems)
+TIMED_HARDNESS = tuple((condition, closeness) for condition in (1e0, 1e3, 1e6) for closeness in (1.0, 1e-3, 1e-6))
 
 
-def _timed_problem(family: str, d: int, c: int, condition: float, closeness: float, seed: int) -> ImpactCase:
+def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[ImpactCase, ...]:
+    """Return nine impacts of one size: three conditions of M, three distances of the rows, e = 0, 1/2 and 1 in turn."""
+    return tuple(_timed_problem(coordinates, contacts, condition, closeness, (0.0, 0.5, 1.0)[(k + k // 3) % 3], seed)
+                 for k, (condition, closeness) in enumerate(TIMED_HARDNESS))
+
+
+def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float, seed: int) -> ImpactCase:
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
     axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
     mass = axes * condition ** -np.linspace(0.0, 1.0, d) @ axes.T
@@ -486,23 +482,25 @@ def _timed_problem(family: str, d: int, c: int, condition: float, closeness: flo
     rows = _near_rows(rng, d, c, closeness)
     lower = np.linalg.cholesky(mass)
     whitened = np.linalg.solve(lower, rows.T).T
-    approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.linalg.norm(whitened, axis=1))
+    length = np.linalg.norm(whitened, axis=1)
+    approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
     sliding = rng.normal(size=d)
     _, values, right = np.linalg.svd(whitened, full_matrices=False)
     for direction in right[values > 1e-12 * values[0]]:
         sliding -= (direction @ sliding) * direction
     sliding /= max(float(np.linalg.norm(sliding)), 1.0)
     v = np.linalg.solve(lower.T, approach / float(np.linalg.norm(approach)) + sliding)
-    return ImpactCase(mass, rows, v, 0.5, family, mass_condition=condition, closeness=closeness)
+    return ImpactCase(mass, rows, v, e, "timed", mass_condition=condition, closeness=closeness)
 
 
 def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Floats:
-    """Half of the rows lie `closeness` beside the other half; many contacts span two thirds of the motion."""
+    """Half of the rows lie beside the other half, by this share of them; many contacts span two thirds of d."""
     rank = min(c, (2 * d) // 3)
     base = rng.integers(-4, 5, size=(c, rank)) @ rng.integers(-4, 5, size=(rank, d)).astype(float)
     if c <= d:
         base = rng.normal(size=(c, d))
     if closeness < 1.0:
         half = c // 2
-        base[half:] = base[: c - half] + closeness * rng.normal(size=(c - half, d))
+        copied = base[: c - half]
+        base[half:] = copied + closeness * np.linalg.norm(copied, axis=1)[:, None] * rng.normal(size=(c - half, d))
     return base

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import statistics
+import re
+from datetime import date
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table as Printed
 
+from iapb.errors import ArgumentError
 from reports.commands.progress import stage_progress
 from reports.figures.numbers import format_cell
-from verification.cost.impacts import work_precision
+from reports.provenance import processor
+from verification.cost.impacts import choices, short_time, which_method, work_precision
 from verification.cost.study import haptic_study
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Table
 
@@ -21,8 +24,14 @@ LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that tak
 def bench(
     full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compiling: minutes.")] = False,
     tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
+    budget: Annotated[str, typer.Option("--budget", help="Which method for an impact in this time, as 50us?")] = "",
+    contacts: Annotated[int, typer.Option("--contacts", help="Size of that impact.")] = 20,
+    coordinates: Annotated[int, typer.Option("--coordinates", help="Size of that impact.")] = 6,
 ) -> None:
     """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
+    if budget:
+        _answer(seconds_of(budget), contacts, coordinates)
+        return
     with stage_progress() as progress:
         topic = haptic_study("full" if full else "quick", progress)
         methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
@@ -30,12 +39,12 @@ def bench(
     for name, numbers in topic.tables.items():
         if tables or name not in LONG:
             _print(console, name.capitalize(), numbers)
+    _print(console, "Which method for a budget", choices(methods))
     if tables:
         _print(console, "What a microsecond buys", methods)
     words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
     for part in topic.parts:
         console.print(f"• {words[part.verdict]}: {part.sentence}", highlight=False, markup=False)
-    console.print(_methods(methods), highlight=False, markup=False)
     if not tables:
         console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
     if topic.failures:
@@ -53,14 +62,24 @@ def _print(console: Console, title: str, numbers: Table) -> None:
     console.print(table)
 
 
-def _methods(numbers: Table) -> str:
-    """One line per method: worst error, worst residual and median time over the problems, failures counted."""
-    rows = numbers.records()
-    lines = ["Impact methods over all problems: worst relative error, median time, failures"]
-    for method in dict.fromkeys(row["method"] for row in rows):
-        here = [row for row in rows if row["method"] == method]
-        done = [row for row in here if row["outcome"] == "ok"]
-        worst = max(row["relative error"] for row in done)
-        median = statistics.median(row["time"] for row in done)
-        lines.append(f"  {method:<18} {worst:8.1e}  {median:9.1f} µs  {len(here) - len(done)} of {len(here)} failed")
-    return "\n".join(lines)
+UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+def seconds_of(text: str) -> float:
+    """A time such as 50us, 0.5ms or 1e-4 (seconds)."""
+    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ns|us|µs|ms|s|)\s*", text)
+    try:
+        return float(found[1]) * UNITS[found[2] or "s"]  # type: ignore[index]
+    except (TypeError, ValueError):
+        raise ArgumentError("budget", text, "a time such as 50us, 0.5ms or 1e-4 (seconds)") from None
+
+
+def _answer(budget: float, contacts: int, coordinates: int) -> None:
+    """The answer in one sentence per way of calling, and where it was measured."""
+    found = which_method(budget, contacts, coordinates)
+    for choice in found:
+        print(choice)
+    if not found:
+        print(f"In {short_time(budget)} no method solves {contacts} contacts on {coordinates} coordinates without a "
+              "gain of energy.")
+    print(f"Measured on {processor()}, {date.today()}, on nine hard impacts of this size.")

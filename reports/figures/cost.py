@@ -3,87 +3,257 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.labels import label_marks
+from reports.figures.labels import SIZE, label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot
-from reports.figures.style import STYLES, LineStyle, line_arguments, numbered, series_legend
+from reports.figures.style import (
+    AMBER,
+    BLUE,
+    FORCE,
+    GREEN,
+    MUTED,
+    PURPLE,
+    STYLES,
+    VERMILION,
+    LineStyle,
+    line_arguments,
+    series_legend,
+)
+from verification.cost.impacts import (
+    CALLED,
+    IAPB,
+    LEMKE,
+    LONGEST,
+    NO_GAIN,
+    PRINTED,
+    QP,
+    SWEEPS,
+    by_way,
+    choices,
+    lost_to_rivals,
+    short_time,
+)
 from verification.finding import Table
 
 Row = Mapping[str, Any]
 
-NO_GAIN = "No method gained energy on these problems."
-SOME_GAIN = "A method that gains energy is not safe to hold, however fast or accurate it is."
-_METHODS = (
-    "Each mark is one method on one problem; lower left is better. Marks at the very bottom mean none that double "
-    "precision can show. Crosses at the upper rim are failures, after the time at which they were given up. "
+_LOOKS: dict[str, tuple[str, LineStyle]] = {  # method -> its name at the curve, and its look
+    IAPB: ("IAPB", LineStyle(BLUE, "o", (), 1.8)),
+    SWEEPS: ("Gauss-Seidel", LineStyle(VERMILION, "s", (), 1.4)),
+    LEMKE: ("Lemke", LineStyle(GREEN, "^", (), 1.4)),
+    CALLED: ("IAPB, Python", LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
+    PRINTED: ("printed, numpy", LineStyle(PURPLE, "D", (4, 2), 1.2, filled=False)),
+    QP: ("DAQP, Python", LineStyle(AMBER, "v", (4, 2), 1.2, filled=False)),
+}
+_SHADES = ((1e-9, 0.30), (1e-6, 0.20), (1e-3, 0.10))  # largest error -> shade of the cell
+
+
+@recipe(
+    "which-method", "Which method for my budget?", "work_precision", section="accuracy",
+    caption="Find the row of your impact and the column of your time: the method that solves all of nine hard impacts "
+    "of that size in time and without a gain of energy, or most of them, with the least of the largest errors (below "
+    "1e-9 the fastest). Below its name: where it is stopped early, that error relative to |v⁻|, and how many of the "
+    "nine end in time where not all do. Blue: below 1e-3, the darker the more exact; an error near 1 solves next to "
+    "nothing. Compiled methods; the numbers name those to call from Python. The nine: M of condition 1, 1e3 and 1e6, "
+    "rows apart by 1, 1e-3 and 1e-6 of themselves, e = 0, 1/2 and 1; d is the number of coordinates.",
+)  # fmt: skip
+def which_method(numbers: Table) -> Drawn:
+    """A cell per size and budget."""
+    found = choices(numbers)
+    sizes = list(dict.fromkeys(found.select(("contacts", "coordinates")).rows))
+    budgets = list(dict.fromkeys(found.column("budget")))
+    with Plot("which-method", (6.8, 0.46 * len(sizes) + 0.7)) as plot:
+        for row in found.records():
+            x, y = budgets.index(row["budget"]), sizes.index((row["contacts"], row["coordinates"]))
+            largest = row["largest error"]
+            shade = next((shade for most, shade in _SHADES if largest is not None and largest <= most), 0.0)
+            plot.axes.fill_between((x - 0.48, x + 0.48), y - 0.46, y + 0.46, color=BLUE, alpha=shade, linewidth=0)
+            plot.axes.text(x, y - 0.2, row["method"], ha="center", va="center", fontsize=8.5)
+            if largest is not None:
+                plot.axes.text(x, y + 0.2, _cell_note(row), ha="center", va="center", fontsize=7.0)
+        plot.without_lines()
+        plot.axes.set_xticks(range(len(budgets)), [short_time(1e-6 * budget) for budget in budgets])
+        plot.axes.xaxis.tick_top()
+        plot.axes.set_yticks(range(len(sizes)), [f"{c} contact{'s' * (c > 1)}, d = {d}" for c, d in sizes])
+        plot.axes.set(xlim=(-0.5, len(budgets) - 0.5), ylim=(len(sizes) - 0.5, -0.5))
+        plot.axes.tick_params(length=0)
+    told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}"
+                     for row in found.records())
+    return Drawn((Panel(plot.svg, told, wide=True),), found)
+
+
+def _cell_note(row: Row) -> str:
+    stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
+    share = "" if row["share solved"] > 99 else f", {row['share solved']:.0f} %"
+    return f"{stopped}{power_of_error(row['largest error'])}{share}"
+
+
+def power_of_error(value: float) -> str:
+    """An error in a few characters: 7e-14."""
+    return f"{value:.0e}".replace("e-0", "e-") if value < 0.1 else f"{value:.1f}"
+
+
+_MARKS = (
+    "Lower left is better. Each mark is the median of nine hard impacts of that size, the thin line above it reaches "
+    "to the largest error; a curve joins what stopping early buys (IAPB after 1, 2, 4 ... rows, Gauss-Seidel after 1, "
+    "4, 16 ... sweeps). Filled: compiled; empty: called from Python. The grey steps join what no other method beats in "
+    "both. A red ring: it made energy in some of the nine; a cross at the rim: it failed on some, or took more than "
+    "10 ms. "
 )
 
 
-@recipe("work-precision", "What a microsecond buys", "work_precision", section="accuracy", caption=_METHODS)
-def work_precision(numbers: Table) -> Drawn:
-    """Draw error, residual and energy gain against time, as far as there is any."""
-    looks = {method: numbered(number) for number, method in enumerate(dict.fromkeys(numbers.column("method")))}
-    found = {column: numbers.column(column) for column in ("relative error", "restitution residual",
-             "relative energy gain") if column in numbers.keys}  # fmt: skip
-    columns = [column for column, values in found.items() if any(value is not None and value > 0.0 for value in values)]
-    panels = tuple(Panel(_methods(numbers, looks, column), f"{column} against time for {', '.join(looks)}.", column)
-                   for column in columns)  # fmt: skip
-    legend = tuple((method, replace(look, width=0.0)) for method, look in looks.items())
-    return Drawn(panels, numbers, legend, _METHODS + (SOME_GAIN if "relative energy gain" in columns else NO_GAIN))
+@recipe(
+    "impact-accuracy", "What a microsecond buys", "work_precision", section="accuracy",
+    caption=_MARKS,
+)  # fmt: skip
+def impact_accuracy(numbers: Table) -> Drawn:
+    """A panel per size."""
+    sizes = dict.fromkeys(numbers.select(("contacts", "coordinates")).rows)
+    panels = tuple(
+        Panel(_impacts(numbers.where(contacts=c, coordinates=d), f"impact-accuracy-{c}"),
+              f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}.",
+              f"{c} contact{'s' * (c > 1)}, {d} coordinates") for c, d in sizes)  # fmt: skip
+    lost = lost_to_rivals(numbers)
+    said = ""
+    for c in dict.fromkeys(lost.column("contacts")):
+        here = lost.where(contacts=c).records()
+        best = max(here, key=lambda row: float(row["ratio"]))
+        cases = len({row["problem"] for row in here})
+        said += (f"At {c} contact{'s' * (c > 1)} {best['solver']} is up to {best['ratio']:.2g} times as fast as IAPB "
+                 f"(compiled, {cases} of 9 impacts): it neither orders rows nor proves that no energy is made. ")
+    said = said or "No compiled complementarity solver is as exact as IAPB in less time at any of these sizes."
+    return Drawn(panels, numbers, tuple((name, look) for name, look in _LOOKS.values()),
+                 _MARKS + said)
 
 
-def _methods(numbers: Table, looks: Mapping[str, LineStyle], column: str) -> str:
-    with Plot(f"work-precision-{column.split()[-1]}", (4.1, 3.2)) as plot:
-        for method, look in looks.items():
-            mine = numbers.where(method=method)
-            plot.marks([(float(time), max(float(error), 1e-18)) for time, error in mine.select(("time", column)).rows
-                        if None not in (time, error)], look, markersize=6)  # fmt: skip
-            lost = mine.column("failed after") if "failed after" in mine.keys else []
-            plot.lost([float(time) for time in lost if time is not None], look, 0.985)
-        plot.log("time [µs]", column)
+def _impacts(numbers: Table, key: str) -> str:
+    with Plot(key, (4.1, 3.2)) as plot:
+        names, ends, front = [], [], []
+        for method, (name, look) in _LOOKS.items():
+            points = []
+            for rows in by_way(numbers.where(method=method)).values():
+                good = [row for row in rows if row["outcome"] == "ok"]
+                lost = [row["failed after"] for row in rows if row["outcome"] != "ok"]
+                if lost:
+                    plot.lost([min(float(np.median(lost)), 1e6 * LONGEST)], look, 0.985)
+                if len(good) < len(rows) / 2:
+                    continue
+                time = float(np.median([row["time"] for row in good]))
+                errors = [max(row["relative error"], 1e-17) for row in good]
+                middle = float(np.median(errors))
+                points.append((time, middle))
+                plot.axes.vlines(time, middle, max(errors), color=look.color, linewidth=0.7, alpha=0.6)
+                if any(row["relative energy gain"] > NO_GAIN for row in good):
+                    plot.axes.plot(time, middle, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
+            front += points
+            points.sort()
+            plot.curve(points, look)
+            if points:
+                names.append(name)
+                ends.append(points[-1])
+        steps, least = [], np.inf
+        for time, error in sorted(front):
+            if error < least:
+                steps += [(time, least), (time, error)] if np.isfinite(least) else [(time, error)]
+                least = error
+        if steps:
+            plot.axes.plot(*zip(*steps, (1e6 * LONGEST, least), strict=True), color=MUTED, linewidth=3, alpha=0.25)
+        plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 2e4), ylim=(1e-17, 10.0))
+        label_marks(plot.axes, names, ends)
     return plot.svg
 
 
-_ERRORS = {"position": "positions [lengths]", "velocity": "velocities [speeds]", "energy": "energy [kinetic]"}
+_TOLERANCES = (1e-3, 1e-6, 1e-9)
 
 
 @recipe(
-    "trajectory-precision", "What accuracy of a whole motion costs", "haptic-rate/motions", section="haptic-rate",
-    caption="Each mark is one run with one step, lower left is better; lines join the steps of a method. A curve that "
-    "ends level has an error that no step mends: the model of contact decides, not the step. Crosses at the upper rim "
-    "are runs that failed or would take too long. Marks at the very bottom: no error that double precision or the "
-    "samples can show.",
+    "budget-share", "How many hard impacts a budget solves", "work_precision", section="accuracy",
+    caption="Higher and further left is better: of the 54 hard impacts of all sizes, the share that a method has "
+    "solved to the given error, without making energy, when the budget is over. A curve that ends below 100 % fails on "
+    "the rest whatever the time: it stays too inexact, makes energy, finds no solution or needs more than 10 ms.",
 )  # fmt: skip
-def trajectory_precision(numbers: Table) -> Drawn:
-    """A panel per scene and error."""
-    legend = series_legend(tuple(dict.fromkeys(numbers.column("method"))))
+def budget_share(numbers: Table) -> Drawn:
+    """A panel per tolerance."""
+    panels = tuple(Panel(_share(numbers, error), f"Share of impacts solved to {error:g} against time for "
+                         f"{', '.join(_LOOKS)}.", f"error below {power_of_error(error)}")
+                   for error in _TOLERANCES)  # fmt: skip
+    return Drawn(panels, None, tuple((name, look) for name, look in _LOOKS.values()))
+
+
+def _share(numbers: Table, tolerance: float) -> str:
+    cases = len(set(numbers.select(("contacts", "problem")).rows))
+    with Plot(f"budget-share-{power_of_error(tolerance)}", (4.1, 3.0)) as plot:
+        ends: list[tuple[float, str, LineStyle]] = []
+        for method, (name, look) in _LOOKS.items():
+            first: dict[tuple[int, str], float] = {}
+            for row in numbers.where(method=method, outcome="ok").records():
+                if row["relative error"] <= tolerance and row["relative energy gain"] <= NO_GAIN:
+                    case = row["contacts"], row["problem"]
+                    first[case] = min(row["time"], first.get(case, np.inf))
+            times = sorted(first.values())
+            heights = [100.0 * k / cases for k in range(len(times) + 1)]
+            plot.axes.step([0.05, *times, 1e6 * LONGEST], [*heights, heights[-1]], where="post",
+                           **line_arguments(look, marked=False))
+            ends.append((heights[-1], f"{name} {heights[-1]:.0f} %", look))
+        plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * LONGEST), ylim=(0, 104))
+        plot.axes.set_yticks(range(0, 101, 20), [str(height) for height in range(0, 101, 20)])
+        plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
+        place = np.inf
+        for height, name, look in sorted(ends, key=lambda end: -end[0]):
+            place = min(height, place - 6.5)
+            plot.axes.text(1.2e6 * LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
+    return plot.svg
+
+
+_MOTION_ERRORS = {"position": "error of position [lengths]", "energy made": "energy made [kinetic]"}
+_MOTIONS = ("IAPB, semi-implicit Euler", "IAPB, Runge-Kutta 4", "PB, semi-implicit Euler", "rigid (QP per step)",
+            "MuJoCo", "Drake")  # at most six curves; the numbers have all
+
+
+@recipe(
+    "trajectory-precision", "What accuracy of a whole motion costs", "haptic-rate/motions", "haptic-rate/worth",
+    section="accuracy",
+    caption="Lower left is better: each mark is one run with one step, a line joins the steps of a method. A curve "
+    "that ends level has an error that no step mends: the model of contact decides, not the step. Beside it the most "
+    "by which the energy of the bodies exceeded that at the start; marks at the bottom made none. Crosses at the upper "
+    "rim are runs that failed or would take too long. The numbers say what ten times the accuracy costs each method.",
+)  # fmt: skip
+def trajectory_precision(numbers: Table, worth: Table) -> Drawn:
+    """Two panels per scene: error, and energy made."""
+    looks = dict(series_legend([name for name in dict.fromkeys(numbers.column("method")) if name in _MOTIONS]))
     panels = tuple(
-        Panel(_motions(numbers.where(scene=scene).records(), dict(legend), column, f"{number}-{column}"),
-              f"{scene}: error of {label} against CPU time for {', '.join(dict(legend))}.", f"{scene}: {label}")
-        for number, scene in enumerate(dict.fromkeys(numbers.column("scene"))) for column, label in _ERRORS.items()
+        Panel(_motions(numbers.where(scene=scene).records(), looks, column, f"{number}-{column.split()[-1]}"),
+              f"{scene}: {label} against computing time for {', '.join(looks)}.", f"{scene}: {label}")
+        for number, scene in enumerate(dict.fromkeys(numbers.column("scene")))
+        for column, label in _MOTION_ERRORS.items()
     )  # fmt: skip
-    return Drawn(panels, numbers, legend)
+    return Drawn(panels, worth, tuple(looks.items()))
 
 
 def _motions(rows: list[dict[str, Any]], looks: Mapping[str, LineStyle], column: str, key: str) -> str:
-    with Plot(f"trajectory-precision-{key}", (4.1, 3.1)) as plot:
+    with Plot(f"trajectory-precision-{key}", (4.1, 2.9)) as plot:
+        names, ends = [], []
         for method, look in looks.items():
             here = [row for row in rows if row["method"] == method]
-            plot.curve([(row["time"], max(row[column], 1e-9)) for row in here if row[column] is not None], look)
+            points = [(row["time"], max(row[column], 1e-9)) for row in here if row[column] is not None and row["time"]]
+            plot.curve(points, look)
             plot.lost([row["time"] for row in here if row["outcome"] != "ok" and row["time"]], look, 0.98)
-        plot.log("CPU time [ms]", f"error of {column}")
-        plot.axes.axhline(1.0, **line_arguments(STYLES["bound"], marked=False) | {"alpha": 0.4, "linewidth": 0.8})
+            if points:
+                names.append(method.replace("semi-implicit Euler", "Euler").replace("Runge-Kutta 4", "RK4")
+                             .replace(" (QP per step)", ""))
+                ends.append(points[-1])
+        plot.log("computing time [ms per simulated second]", _MOTION_ERRORS[column], ylim=(5e-10, 10.0))
+        label_marks(plot.axes, names, ends)
     return plot.svg
 
 
 @recipe(
-    "anytime", "Stopping an impact early", "haptic-rate/budgets", section="haptic-rate",
+    "anytime", "What each row of the budget buys", "haptic-rate/budgets", section="accuracy",
     caption="Plastic impacts stopped after so many rows, the largest unmet one first. What is not yet resolved falls "
     "with every row, and at the rank to rounding; the energy taken never exceeds what the whole impact takes, so no "
     "budget is unsafe.",

@@ -118,10 +118,11 @@ def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(many_bodies, "_cost", broken(_step_of, (50).__eq__))
     monkeypatch.setattr(study, "_robots", broken(lambda depth: None, lambda depth: True))
     monkeypatch.setattr(start_up, "_timed", broken(lambda *_: (1.0, 1.0), lambda *_: True))
-    monkeypatch.setattr(impacts, "SIZES", ((6, 24),))
+    monkeypatch.setattr(impacts, "TRUNCATED", ((6, 24),))
     monkeypatch.setattr(impacts, "_stopped", broken(_stopped, lambda cases, budget: budget == 1))
     monkeypatch.setattr(trajectories, "Judge", broken(lambda scene: scene, lambda scene: "cradle" in scene.title))
     ways = {name: name for name in ("IAPB, midpoint", "PB, midpoint", "other")}
+    monkeypatch.setattr(trajectories, "TRAJECTORY_SCENES", dict(list(trajectories.TRAJECTORY_SCENES.items())[:3]))
     monkeypatch.setattr(trajectories, "methods", lambda: ways)
     monkeypatch.setattr(trajectories, "over_steps", broken(_motions, lambda scene, way, *_: way == "other"))
     topic = study.haptic_study()
@@ -154,4 +155,4 @@ def _stopped(cases: Any, budget: int) -> list[dict[str, Any]]:
 
 
 def _motions(*_: Any) -> list[dict[str, Any]]:
-    return [{"position": 0.1, "time": 1.0, "outcome": "ok", "note": ""}]
+    return [{"position": 0.1, "energy made": 0.0, "time": 1.0, "outcome": "ok", "note": ""}]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -144,14 +145,14 @@ def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
 
 
 def of_accuracy(patch: Patch, folder: Path) -> list[str]:
-    problem = impacts.timed_problems()[0]
-    patch.setattr(impacts, "timed_problems", lambda: (problem,))
+    problem = impacts.timed_problems(4, 3)[0]
+    patch.setattr(impacts, "timed_problems", lambda *_: (problem,))
     patch.setattr(impacts, "_ENOUGH", 0.0)
-    name = next(iter(impacts.METHODS))
-    patch.setitem(impacts.METHODS, name, broken(impacts.METHODS[name], lambda problem: True))
+    first, *others = ways = [way for way in impacts.WAYS if way.rows < 3]
+    ways[0] = replace(first, make=broken(first.make, lambda problem: True))
     failures: list[Failure] = []
-    table = impacts.work_precision(progress=nothing, failures=failures)
-    assert table.column("method") == list(impacts.METHODS)[1:]
+    table = impacts.work_precision([(4, 3)], ways=ways, progress=nothing, failures=failures)
+    assert table.column("work") == [way.work for way in others]
     return [failure.case.removeprefix(problem.label) for failure in failures]
 
 
@@ -221,7 +222,7 @@ STAGES: dict[Callable[[Patch, Path], list[str]], list[str]] = {
     of_bulk: ["factored, no clamp"],
     of_cross_checks: ["peg_corner", "daqp"],
     of_hard_cases: ["grazing, svd", "lost"],
-    of_accuracy: [", factored"],
+    of_accuracy: [", IAPB, 1 row"],
     of_effects: ["peg_corner, impulses", "arm_pushing"],
     of_runs: ["hole/IAPB"],
     of_survival: ["corner/PB"],

@@ -12,7 +12,7 @@ from iapb import resolve_impact
 from iapb.compiled import block, kernel
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.errors import MissingDependencyError, SolverError
-from iapb.mechanics.kernels.cholesky import cholesky
+from iapb.mechanics.kernels.cholesky import cholesky, from_whitened, to_whitened
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase
@@ -46,33 +46,93 @@ def printed_call(case: ImpactCase) -> Call:
 
 @kernel
 def repeat_impact(  # type: ignore[no-untyped-def]
-    mass_matrix, lower, v, restitution, columns, work, v_plus, momentum, times
+    mass_matrix, lower, v, restitution, columns, budget, work, v_plus, momentum, times
 ):
-    """Factor M, copy the rows and resolve the impact, `times` times."""
+    """Factor M, copy the rows and resolve the impact with at most `budget` rows, `times` times."""
     d, count = columns.shape
     for _ in range(times):
         cholesky(mass_matrix, lower)
         for k in range(d):
             for i in range(count):
                 work.columns[k, i] = columns[k, i]
-        factored_impact(mass_matrix, lower, v, restitution, count, rank_tolerance(lower), d, True, work, v_plus,
-                        momentum)
+        factored_impact(mass_matrix, lower, v, restitution, count, rank_tolerance(lower), budget, True, work,
+                        v_plus, momentum)
 
 
 class KernelCall:
     """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
 
-    def __init__(self, case: ImpactCase) -> None:
+    def __init__(self, case: ImpactCase, budget: int | None = None) -> None:
         self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
         self.columns, self.restitution = np.ascontiguousarray(case.contact_jacobian.T), case.restitution
         d, c = len(self.v), case.contacts
+        self.budget = d if budget is None else budget
         self.lower, self.v_plus, self.momentum = np.zeros((d, d)), np.zeros(d), np.zeros(d)
         self.work = block(make_impact_work(d, c))
 
     def repeated(self, times: int) -> None:
         """Resolve the impact `times` times."""
-        repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.work, self.v_plus,
-                      self.momentum, times)
+        repeat_impact(self.mass, self.lower, self.v, self.restitution, self.columns, self.budget, self.work,
+                      self.v_plus, self.momentum, times)
+
+    def __call__(self) -> Floats:
+        """v⁺ (d,)."""
+        self.repeated(1)
+        return self.v_plus
+
+
+@kernel
+def repeat_sweeps(  # type: ignore[no-untyped-def]
+    mass_matrix, lower, v, restitution, rows, sweeps, whitened, share, impulses, v_plus, times
+):
+    """Newton's LCP by sweeps of projected Gauss-Seidel over the contacts, as physics engines do it, `times` times.
+
+    No Delassus matrix: each contact reads u and corrects it; `whitened` is A (c, d), `share` its squared lengths.
+    """
+    c, d = rows.shape
+    for _ in range(times):
+        cholesky(mass_matrix, lower)
+        to_whitened(lower, v, v_plus)
+        for i in range(c):
+            impulses[i] = share[i] = 0.0
+            for k in range(d):
+                rest = rows[i, k]
+                for m in range(k):
+                    rest -= lower[k, m] * whitened[i, m]
+                whitened[i, k] = rest / lower[k, k]
+                share[i] += whitened[i, k] * whitened[i, k]
+        for i in range(c):  # what each contact is to leave with
+            impulses[c + i] = 0.0
+            for k in range(d):
+                impulses[c + i] -= restitution * rows[i, k] * v[k]
+        for _sweep in range(sweeps):
+            for i in range(c):
+                if share[i] == 0.0:
+                    continue
+                closing = -impulses[c + i]
+                for k in range(d):
+                    closing += whitened[i, k] * v_plus[k]
+                wanted = max(0.0, impulses[i] - closing / share[i])
+                change = wanted - impulses[i]
+                impulses[i] = wanted
+                for k in range(d):
+                    v_plus[k] += change * whitened[i, k]
+        from_whitened(lower, v_plus, v_plus)
+
+
+class SweepsCall:
+    """Projected Gauss-Seidel on arrays that are allocated once."""
+
+    def __init__(self, case: ImpactCase, sweeps: int) -> None:
+        mass, rows, v = (np.ascontiguousarray(array) for array in case.arrays)
+        c, d = rows.shape
+        self.v_plus = np.zeros(d)
+        self.given = (mass, np.zeros((d, d)), v, case.restitution, rows, sweeps, np.zeros((c, d)), np.zeros(c),
+                      np.zeros(2 * c), self.v_plus)
+
+    def repeated(self, times: int) -> None:
+        """Resolve the impact `times` times."""
+        repeat_sweeps(*self.given, times)
 
     def __call__(self) -> Floats:
         """v⁺ (d,)."""

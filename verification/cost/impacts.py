@@ -1,9 +1,14 @@
-"""What a microsecond buys at one impact: error, energy and restitution against time, and what a budget of rows buys."""
+"""What a microsecond buys at one impact: error, energy and restitution against time, and which method to take.
+
+Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`), compiled or from Python,
+with more and more work where it can be stopped early. `choose` reads the table: which method for a budget of time.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -11,105 +16,145 @@ from typing import Any
 import numpy as np
 
 from iapb import resolve_impact
-from iapb.errors import IapbError
+from iapb.errors import ArgumentError, IapbError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
-from verification.clock import Times, seconds, take_turns
-from verification.cost.calls import Call, Floats, engine_call, random_impact, solver_call
+from verification.clock import Times, sampler, seconds, take_turns
+from verification.cost.calls import (
+    Call,
+    Floats,
+    KernelCall,
+    LemkeCall,
+    SweepsCall,
+    engine_call,
+    printed_call,
+    random_impact,
+    solver_call,
+)
 from verification.finding import Column, Failure, Table, attempt, of_each, table_of
 from verification.impacts import ImpactCase, timed_problems
 
-_solver = partial(solver_call, needs_answer=True)
-METHODS: dict[str, Callable[[ImpactCase], Call]] = {
-    "factored": partial(engine_call, method="factored"),
-    "gram_pinv": partial(engine_call, method="gram_pinv"),
-    "gram_cholesky": partial(engine_call, method="gram_cholesky"),
-    "damped": partial(engine_call, method="damped"),
-    "svd": partial(engine_call, method="svd"),
-    # complementarity: pivoting, sweeps, active sets, proximal, and an interior point modelled by cvxpy
-    "lemke LCP": partial(_solver, name="lemke"),
-    "gauss_seidel LCP": partial(_solver, name="gauss_seidel"),
-    "daqp QP": partial(_solver, name="daqp"),
-    "quadprog QP": partial(_solver, name="quadprog"),
-    "proxqp QP": partial(_solver, name="proxqp"),
-    "cvxpy QP": partial(_solver, name="cvxpy_clarabel"),
-    # the anytime form: what a budget of rows buys
-    "factored, 1 row": partial(engine_call, method="factored", budget=1),
-    "factored, 2 rows": partial(engine_call, method="factored", budget=2),
-    "factored, 4 rows": partial(engine_call, method="factored", budget=4),
-}
-ROUNDS = 30
-_ENOUGH = 0.5  # seconds spent on one method of one problem; slow methods get fewer rounds
+COMPILED, PYTHON = "compiled", "from Python"
+IAPB, SWEEPS, LEMKE = "IAPB", "Gauss-Seidel", "Lemke"
+CALLED, PRINTED, QP = "IAPB from Python", "printed formula (numpy)", "DAQP from Python"
+
+
+@dataclass(frozen=True)
+class Way:
+    """A method with an amount of work: how an impact is resolved by it; `rows`: a budget below the coordinates."""
+
+    method: str
+    work: str
+    called: str
+    make: Callable[[ImpactCase], Call]
+    rows: int = 0
+
+
+ROWS, REPEATED = (1, 2, 4, 8, 16), (1, 4, 16, 64, 256, 1024)
+# To add a method: a line here.
+WAYS: tuple[Way, ...] = (
+    *(Way(IAPB, f"{rows} row{'s' * (rows > 1)}", COMPILED, partial(KernelCall, budget=rows), rows)
+      for rows in ROWS),
+    Way(IAPB, "all rows", COMPILED, KernelCall),
+    *(Way(SWEEPS, f"{sweeps} sweep{'s' * (sweeps > 1)}", COMPILED, partial(SweepsCall, sweeps=sweeps))
+      for sweeps in REPEATED),
+    Way(LEMKE, "all pivots", COMPILED, LemkeCall),
+    Way(CALLED, "all rows", PYTHON, partial(engine_call, method="factored")),
+    Way(PRINTED, "as printed", PYTHON, printed_call),
+    Way(QP, "active set", PYTHON, partial(solver_call, name="daqp", needs_answer=True)),
+)
+METHODS = tuple(dict.fromkeys(way.method for way in WAYS))
+SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
+ROUNDS = 5
+LONGEST = 1e-2  # [s] the largest budget: a method that needs more is timed once, and not on the other impacts of a size
+_ENOUGH = 0.02  # [s] spent on one method of one impact; slow methods get fewer rounds
+NO_GAIN = 1e-12  # a relative gain of energy below this is rounding
 
 METHOD_COLUMNS = (
-    Column("method", condition=True),
-    Column("problem", condition=True),
-    Column("time", "µs", timed=True),
-    Column("quartiles", "µs", timed=True),
-    Column("relative error"),
-    Column("relative energy gain"),
-    Column("restitution residual"),
-    Column("failed after", "µs", timed=True),
-    Column("outcome"),
+    Column("contacts", condition=True), Column("coordinates", condition=True), Column("problem", condition=True),
+    Column("method", condition=True), Column("work", condition=True), Column("called", condition=True),
+    Column("time", "µs", timed=True), Column("quartiles", "µs", timed=True), Column("relative error", timed=True),
+    Column("relative energy gain", timed=True), Column("restitution residual", timed=True),
+    Column("failed after", "µs", timed=True), Column("outcome", timed=True),
 )
 
 
 def work_precision(
-    problems: Iterable[ImpactCase] | None = None,
-    methods: Iterable[str] | None = None,
-    rounds: int = ROUNDS,
-    progress: Callable[[int, int], None] | None = None,
-    failures: list[Failure] | None = None,
+    sizes: Iterable[tuple[int, int]] = SIZES, rounds: int = ROUNDS, ways: Sequence[Way] = WAYS,
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> Table:
-    """Measure error, energy gain and time of every method on every problem, methods in turn.
+    """Measure error, energy gain and time of every method on nine impacts of each size.
 
     Parameters
     ----------
-    problems : by default `timed_problems()`, which know their exact answers
-    methods : names of impact methods, by default all
-    rounds : how often each is timed
-    progress : called with (problems done, problems) after each
+    sizes : (contacts, coordinates) of each size
+    rounds : how often each is timed, in random order, a warm call before it
+    ways : methods, each with an amount of work
+    progress : called with (impacts done, impacts) after each
     failures : receives what raises anything but an `IapbError`, which is a row; without it that passes through
 
     Returns
     -------
     Table
-        one row per problem and method: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric;
-        (KE⁺ − KE⁻)/KE⁻ exactly, 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", or "failed"
-        with its reason, and then the time until the method gave up is all there is.
+        one row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric; (KE⁺ − KE⁻)/KE⁻
+        exactly, 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", "too slow" (more than LONGEST),
+        or "failed" with its reason, and then the time until the method gave up is all there is.
     """
-    chosen = timed_problems() if problems is None else tuple(problems)
-    names = tuple(METHODS if methods is None else methods)
-    records: list[dict[str, Any]] = []
-    for done, problem in enumerate(chosen, start=1):
-        with one_thread():
-            records += _measure(problem, names, rounds, failures)
-        if progress is not None:
-            progress(done, len(chosen))
-    note = ("Medians of warm calls from Python, in turn; errors against exact rational arithmetic, in the kinetic "
-            "metric. A negative gain is a loss and is drawn as none.")  # fmt: skip
-    return table_of(METHOD_COLUMNS, records, digits=3, note=note)
+    chosen, records = tuple(sizes), list[dict[str, Any]]()
+    slow: set[tuple[str, str]] = set()  # ways that were too slow before
+    for number, (contacts, coordinates) in enumerate(chosen):
+        problems = timed_problems(contacts, coordinates)
+        for done, problem in enumerate(problems, start=1 + number * len(problems)):
+            with one_thread():
+                found = _measure(problem, [way for way in ways if way.rows < coordinates], slow, rounds, failures)
+            records += found
+            slow |= {(row["method"], row["work"]) for row in found if row["outcome"] == TOO_SLOW}
+            if progress is not None:
+                progress(done, len(chosen) * len(problems))
+    note = ("Medians in random order, a warm call before each, processor time of the thread; errors against exact "
+            "rational arithmetic, in the kinetic metric. A negative gain is a loss and counts as none.")
+    return table_of(METHOD_COLUMNS, records, digits=3, note=note, timed_rows=True)
+
+
+TOO_SLOW = "too slow"
 
 
 def _measure(
-    problem: ImpactCase, names: tuple[str, ...], rounds: int, failures: list[Failure] | None
+    problem: ImpactCase, ways: Sequence[Way], slow: set[tuple[str, str]], rounds: int, failures: list[Failure] | None
 ) -> list[dict[str, Any]]:
-    calls: dict[str, Call] = {}
+    calls: dict[tuple[str, str], Call] = {}
 
-    def attempted(name: str) -> Floats | str:
-        calls[name] = METHODS[name](problem)
-        return _try(calls[name])
+    def attempted(way: Way) -> tuple[Floats | str, float]:
+        call = calls[way.method, way.work] = way.make(problem)
+        _try(call)  # a method compiles at its first call
+        answer: list[Floats | str] = []
+        spent = seconds(lambda: answer.append(_try(call)))
+        return (answer[0] if isinstance(answer[0], str) else answer[0].copy()), spent
 
-    tried = {name: attempt(f"{problem.label}, {name}", partial(attempted, name), failures) for name in names}
-    answers = {name: answer for name, answer in tried.items() if answer is not None}  # trying them warms up, too
-    working = {name: partial(seconds, calls[name]) for name, answer in answers.items() if not isinstance(answer, str)}
+    tried = {(way.method, way.work): attempt(f"{problem.label}, {way.method}, {way.work}", partial(attempted, way),
+                                             failures) for way in ways if (way.method, way.work) not in slow}
+    answers = {key: found for key, found in tried.items() if found is not None}
+    working = {key: sampler(calls[key]) for key, (answer, spent) in answers.items()
+               if not isinstance(answer, str) and spent < LONGEST}
     times = take_turns(working, rounds, warm=False, enough=_ENOUGH)
-    return [
-        {"method": name, "problem": problem.label} | (
-            {"outcome": f"failed: {answer}", "failed after": 1e6 * seconds(partial(_try, calls[name]))}
-            if isinstance(answer, str) else {"outcome": "ok", **_timing(times[name]), **_quality(problem, answer)})
-        for name, answer in answers.items()
-    ]  # fmt: skip
+    rows = []
+    for way in ways:
+        key = way.method, way.work
+        if key not in answers and key not in slow:
+            continue
+        answer, spent = answers.get(key, ("", LONGEST))
+        row = {"contacts": problem.contacts, "coordinates": problem.coordinates, "problem": problem.label,
+               "method": way.method, "work": way.work, "called": way.called}
+        if key in slow:
+            row |= {"outcome": TOO_SLOW, "failed after": 1e6 * LONGEST}
+        elif isinstance(answer, str):
+            row |= {"outcome": f"failed: {answer}", "failed after": 1e6 * spent}
+        elif spent >= LONGEST:
+            row |= {"outcome": TOO_SLOW, "failed after": 1e6 * spent}
+        else:
+            row |= {"outcome": "ok", **_timing(times[key]), **_quality(problem, answer)}
+        rows.append(row)
+    return rows
 
 
 def _try(call: Call) -> Floats | str:
@@ -146,7 +191,163 @@ def _residual(case: ImpactCase, v_plus: Floats) -> float:
     return float(np.max(np.abs(J @ v_plus + case.restitution * (J @ v)) / scale))
 
 
-SIZES = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
+@dataclass(frozen=True)
+class Choice:
+    """The method for a budget of time at one size, and what it gives there.
+
+    Attributes
+    ----------
+    budget : [s].  contacts, coordinates : the size.  method, work, called : what to take.
+    time : its median [s].
+    error : median relative error of v⁺ over the impacts that it solves in time; largest : the largest.
+    share : of the impacts: solved within the budget without a gain of energy.
+    """
+
+    budget: float
+    contacts: int
+    coordinates: int
+    method: str
+    work: str
+    called: str
+    time: float
+    error: float
+    largest: float
+    share: float
+
+    def __str__(self) -> str:
+        stopped = self.work.split()[0].isdigit()
+        how = f", stopped after {self.work}" if stopped else ""
+        called = " (compiled)" if self.called == COMPILED else ""
+        return (f"With {short_time(self.budget)} for {self.contacts} contacts on {self.coordinates} coordinates take "
+                f"{self.method}{how}{called}: {short_time(self.time)} an impact, relative error of the "
+                f"velocity {self.error:.0e} (largest {self.largest:.0e}); {100 * self.share:.0f} % of the hard cases "
+                "end in time without a gain of energy.")
+
+
+BUDGETS = (5e-7, 5e-6, 5e-5, 5e-4, 5e-3)  # [s]
+_EQUAL = 1e-9  # errors below this count as equal: the faster method is taken
+_MOST = 0.99  # share of the cases that a method must solve in time, where any does
+
+
+def choose(measured: Table, budget: float, contacts: int, coordinates: int, called: str = COMPILED) -> Choice | None:
+    """Return the way for a budget [s] at a measured size; None where none answers in time without a gain of energy.
+
+    It solves all of the nine impacts in time, or else most of them, with the least of the median errors; of those below
+    1e-9, the fastest.
+    """
+    found: list[Choice] = []
+    for rows in by_way(measured.where(contacts=contacts, coordinates=coordinates, called=called)).values():
+        good = [row for row in rows if row["outcome"] == "ok" and row["time"] <= 1e6 * budget
+                and row["relative energy gain"] <= NO_GAIN]
+        if good:
+            errors = [row["relative error"] for row in good]
+            found.append(Choice(
+                budget, contacts, coordinates, good[0]["method"], good[0]["work"], called,
+                1e-6 * float(np.median([row["time"] for row in good])), float(np.median(errors)), max(errors),
+                len(good) / len(rows)))
+    return min(found, key=lambda one: (-min(one.share, _MOST), max(one.largest, _EQUAL), one.time), default=None)
+
+
+def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """The rows of each method and amount of work."""
+    ways: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in measured.records():
+        ways.setdefault((row["method"], row["work"]), []).append(row)
+    return ways
+
+
+def which_method(budget: float, contacts: int, coordinates: int, rounds: int = ROUNDS) -> tuple[Choice, ...]:
+    """Measure one size on this machine and return what to take, compiled and from Python.
+
+    Parameters
+    ----------
+    budget : time for one impact [s].
+    contacts, coordinates : the size of the impact.
+
+    Raises
+    ------
+    ArgumentError
+        A budget or size that is not positive.
+    """
+    for name, value in (("budget", budget), ("contacts", contacts), ("coordinates", coordinates)):
+        if not value > 0:
+            raise ArgumentError(name, value, "a number above 0")
+    measured = work_precision([(contacts, coordinates)], rounds)
+    found = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
+    return tuple(choice for choice in found if choice is not None)
+
+
+def short_time(seconds_: float) -> str:
+    """A time in words: 0.5 µs, 50 µs, 5 ms."""
+    return f"{1e3 * seconds_:.2g} ms" if seconds_ >= 1e-3 else f"{1e6 * seconds_:.3g} µs"
+
+
+CHOICE_COLUMNS = (
+    Column("contacts", condition=True), Column("coordinates", condition=True), Column("budget", "µs", condition=True),
+    Column("method", timed=True), Column("work", timed=True), Column("time", "µs", timed=True),
+    Column("error", timed=True), Column("largest error", timed=True), Column("share solved", "%", timed=True),
+    Column("from Python", timed=True),
+)
+
+
+def choices(measured: Table) -> Table:
+    """What `choose` says for every size that was measured and every budget."""
+    records: list[dict[str, Any]] = []
+    for contacts, coordinates in dict.fromkeys(measured.select(("contacts", "coordinates")).rows):
+        for budget in BUDGETS:
+            best = choose(measured, budget, contacts, coordinates)
+            python = choose(measured, budget, contacts, coordinates, PYTHON)
+            records.append({"contacts": contacts, "coordinates": coordinates, "budget": 1e6 * budget} | (
+                {"method": "none"} if best is None else {
+                    "method": best.method, "work": best.work, "time": 1e6 * best.time, "error": best.error,
+                    "largest error": best.largest, "share solved": 100.0 * best.share}) | {
+                "from Python": "none" if python is None else f"{python.method}, {short_time(python.time)}"})
+    return table_of(CHOICE_COLUMNS, records, digits=2,
+                    note="Compiled methods; the last column is for calls from Python.")
+
+
+def lost_to_rivals(measured: Table) -> Table:
+    """Where a complementarity solver, compiled like IAPB, gets as far (or within 1e-6) in less time."""
+    records: list[dict[str, Any]] = []
+    rows = measured.where(called=COMPILED, outcome="ok").records()
+    ours = {(row["contacts"], row["problem"]): row for row in rows if row["work"] == "all rows"}
+    for row in rows:
+        mine = ours[row["contacts"], row["problem"]]
+        good = row["relative error"] <= max(1e-6, mine["relative error"]) and row["relative energy gain"] <= NO_GAIN
+        if row["method"] != IAPB and good and row["time"] < mine["time"]:
+            records.append({"contacts": row["contacts"], "problem": row["problem"], "solver": row["method"],
+                            "work": row["work"], "time": row["time"], "IAPB": mine["time"],
+                            "ratio": mine["time"] / row["time"]})
+    return table_of((Column("contacts", condition=True), Column("problem", condition=True),
+                     Column("solver", condition=True), Column("work", condition=True), Column("time", "µs", timed=True),
+                     Column("IAPB", "µs", timed=True), Column("ratio", timed=True)), records, digits=3, timed_rows=True)
+
+
+def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 9) -> Table:
+    """Time each method right after each other one: a fair clock gives the same times whatever ran before."""
+    problem = timed_problems(contacts, coordinates)[4]
+    calls = {way.method: way.make(problem) for way in WAYS if not isinstance(_try(way.make(problem)), str)}
+    timers = {method: sampler(call) for method, call in calls.items()}
+
+    def after(before: str, method: str) -> float:
+        calls[before]()
+        return timers[method]()
+
+    pairs = [(before, method) for before in calls for method in calls if before != method]
+    times = take_turns({pair: partial(after, *pair) for pair in pairs}, rounds)
+    records = []
+    for method in calls:
+        medians = {before: 1e6 * times[before, method].median for before in calls if before != method}
+        slowest, fastest = max(medians, key=lambda name: medians[name]), min(medians, key=lambda name: medians[name])
+        records.append({"method": method, "least": medians[fastest], "after": fastest, "most": medians[slowest],
+                        "then after": slowest, "spread": 100.0 * (medians[slowest] / medians[fastest] - 1.0)})
+    columns = (Column("method", condition=True), Column("least", "µs", timed=True), Column("after", timed=True),
+               Column("most", "µs", timed=True), Column("then after", timed=True), Column("spread", "%", timed=True))
+    return table_of(columns, records, digits=3, note=f"Medians of {rounds} samples, {contacts} contacts, "
+                                                     f"{coordinates} coordinates.")
+
+
+TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
 BUDGET_COLUMNS = (
     Column("coordinates", condition=True),
     Column("contacts", condition=True),
@@ -164,12 +365,12 @@ def anytime(
 ) -> Table:
     """Resolve random plastic impacts with every budget from 0 rows to the rank."""
     records: list[dict[str, Any]] = []
-    for done, (d, c) in enumerate(SIZES, start=1):
+    for done, (d, c) in enumerate(TRUNCATED, start=1):
         cases = [random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0) for k in range(impacts)]
         records += of_each(range((cases[0].rank or 0) + 1), partial(_stopped, cases), failures,
                            lambda budget, d=d, c=c: f"budget of {budget} rows, d = {d}, c = {c}")  # type: ignore[misc]  # fmt: skip
         if progress is not None:
-            progress(done, len(SIZES))
+            progress(done, len(TRUNCATED))
     return table_of(BUDGET_COLUMNS, records, digits=3,
                     note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, of |v⁻|.")  # fmt: skip
 

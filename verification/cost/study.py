@@ -29,12 +29,12 @@ from verification.cost.growth import (
     power_law,
     scaling,
 )
-from verification.cost.impacts import anytime
+from verification.cost.impacts import anytime, order_bias
 from verification.cost.many_bodies import LEAST_BODIES, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.start_up import start_up
 from verification.cost.step_cost import IAPB, KERNEL, Rivals, impact_cost, rivals
-from verification.cost.trajectories import BELOW, trajectory_precision
+from verification.cost.trajectories import BELOW, trajectory_precision, worth
 from verification.finding import (
     MIXED,
     NOT_COMPUTED,
@@ -101,7 +101,10 @@ def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tup
     yield "solvers", impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say, failures=failures)
     yield "start", start_up(depth, failures)
     yield "budgets", anytime(40 if full else 15, within("budgets"), failures)
-    yield "motions", trajectory_precision(depth=depth, progress=within("whole motions"), failures=failures)
+    motions = trajectory_precision(depth=depth, progress=within("whole motions"), failures=failures)
+    yield "motions", motions
+    yield "worth", worth(motions)
+    yield "order bias", order_bias()
 
 
 def _races(rounds: int, progress: Callable[[int, int], None], failures: list[Failure]) -> Table:
@@ -139,7 +142,7 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
     """Say what the tables show."""
     failures, parts = list(failures), list[Part]()
     for say in (_say_races, _say_printed, _say_solvers, _say_growth, _say_rate, _say_bodies, _say_robots, _say_start,
-                _say_motions, _say_budgets):  # fmt: skip
+                _say_motions, _say_worth, _say_budgets, _say_order):  # fmt: skip
         subject = say.__name__.removeprefix("_say_")
         parts += attempt(f"sentences on {subject}", lambda say=say: list(say(tables)), failures) or []  # type: ignore[misc]
     met = sum(part.verdict == REPRODUCED for part in parts)
@@ -315,7 +318,8 @@ def _say_motions(tables: Tables) -> Iterator[Part]:
         best = {name: min(chosen, key=lambda run: (run["position"], run["time"]))
                 for name in ("IAPB", "PB", "rigid", "MuJoCo")
                 if (chosen := [run for run in here if run["method"].startswith(name)])}  # fmt: skip
-        text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms" for name, run in best.items())
+        text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms per simulated second"
+                         for name, run in best.items())
         sentence = f"Whole motion, {scene}: smallest error of position (in lengths) {text}"
         met = best["IAPB"]["position"] <= best["PB"]["position"]
         if "MuJoCo" in best:
@@ -323,8 +327,28 @@ def _say_motions(tables: Tables) -> Iterator[Part]:
             as_good = [run["time"] for run in ours if run["position"] <= best["MuJoCo"]["position"]]
             met = met and bool(as_good) and min(as_good) <= best["MuJoCo"]["time"]
             if as_good:
-                sentence += f"; IAPB is as exact as MuJoCo's best after {min(as_good):.3g} ms"
+                sentence += f"; IAPB is as exact as MuJoCo's best after {min(as_good):.3g} ms per second"
         yield _part(sentence + (f". {lost} runs failed or timed out." if lost else "."), met)
+
+
+def _say_worth(tables: Tables) -> Iterator[Part]:
+    if "worth" not in tables:
+        return
+    rows = tables["worth"].records()
+    costs = [f"{row['method']} {row['tenfold accuracy costs']:.2g}" for row in rows if row["tenfold accuracy costs"]]
+    never = [row["method"] for row in rows if not row["most exact for its time"]]
+    yield _part(f"Ten times the accuracy of a whole motion costs, in times the computing time: {', '.join(costs)}; no "
+                "step buys it where the model of contact decides. Never worth its time, for another is faster and more "
+                f"exact on every scene: {', '.join(never) or 'none'}.", True)
+
+
+def _say_order(tables: Tables) -> Iterator[Part]:
+    if "order bias" not in tables:
+        return
+    rows = tables["order bias"].records()
+    worst = max(rows, key=lambda row: float(row["spread"]))
+    yield _part(f"The same method timed right after each other one: medians differ by at most {worst['spread']:.2g} % "
+                f"({worst['method']}). Asked for: within 10 %.", worst["spread"] <= 10.0)
 
 
 def _error(run: Row) -> str:

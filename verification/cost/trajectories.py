@@ -67,7 +67,7 @@ def peg_landing() -> FixedScene:
 
 TRAJECTORY_SCENES: dict[str, Callable[[], FixedScene]] = {
     made.__name__: made for made in (cradle, bouncing_ball, peg_landing)
-}
+} | {name: partial(fixed_scene, name) for name in ("bernoulli", "box_on_four_corners", "box_on_sixteen_corners")}
 
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ STEPS = {
 ENGINES = ("mujoco", "bullet", "drake")  # those of the adapters that take any step
 REPEATS = 2  # below ONCE seconds
 ONCE = 0.05
-LONGEST = {"quick": 0.4, "full": 20.0}  # [s] for one run
+LONGEST = {"quick": 0.2, "full": 20.0}  # [s] for one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene, step, duration -> motion, seconds
@@ -89,17 +89,18 @@ COLUMNS = (
     Column("scene", condition=True),
     Column("method", condition=True),
     Column("step", "ms", condition=True),
-    Column("time", "ms", timed=True),
+    Column("time", "ms/s", timed=True),
     Column("position"),
     Column("velocity"),
     Column("energy"),
     Column("signed energy"),
+    Column("energy made"),
     Column("outcome", timed=True),
     Column("note", timed=True),
 )
 NOTE = (
     "Position in lengths of the body (sup norm), velocity in largest speeds (L¹, at samples a millisecond apart), "
-    "energy at the end in largest kinetic energies."
+    "energies in largest kinetic energies."
 )
 BELOW = "below the truth's bound"
 Record = dict[str, Any]
@@ -118,7 +119,8 @@ def trajectory_precision(
         velocity : mean over the samples of the largest error of a body's velocity (at an impact any two motions that
             are not simultaneous differ by the whole jump)
         signed energy : error of the energy at the end; positive is a gain
-        time : of the run; until it failed, or expected where it was not tried
+        energy made : most by which kinetic and potential energy exceeded that at the start; elastic energy not counted
+        time : of the run per simulated second; until it failed, or expected where it was not tried
     """
     names, ways = tuple(scenes or TRAJECTORY_SCENES), methods()
     records: list[Record] = []
@@ -135,6 +137,48 @@ def trajectory_precision(
                 if progress is not None:
                     progress(done * len(ways) + turn, len(names) * len(ways))
     return table_of(COLUMNS, records, digits=3, note=NOTE)
+
+
+WORTH_COLUMNS = (
+    Column("method", condition=True), Column("least error", timed=True), Column("tenfold accuracy costs", timed=True),
+    Column("most exact for its time", "scenes", timed=True), Column("energy made", timed=True),
+    Column("failed", "runs", timed=True),
+)
+
+
+def worth(motions: Table) -> Table:
+    """Per method, over all scenes: its errors, what ten times the accuracy costs, and where no other is better.
+
+    The cost of ten times the accuracy is 10^(−1/slope) of error over time, by least squares in logarithms over the
+    runs of a scene down to its least error; the median over the scenes in which the error falls at all.
+    """
+    records: list[dict[str, Any]] = []
+    for method in dict.fromkeys(motions.column("method")):
+        factors, best, least, made = [], [], [], 0.0
+        for scene in dict.fromkeys(motions.column("scene")):
+            here = motions.where(scene=scene, outcome="ok").records()
+            mine = [row for row in here if row["method"] == method]
+            if not mine:
+                continue
+            made = max(made, *(row["energy made"] for row in mine))
+            best += [scene] * any(on_front(row, here) for row in mine)
+            last = min(range(len(mine)), key=[row["position"] for row in mine].__getitem__)
+            least.append(mine[last]["position"])
+            time, error = (np.log10([row[key] for row in mine[: last + 1] if row["time"] > 0.0])
+                           for key in ("time", "position"))
+            if len(time) > 1 and error[0] - error[-1] > 0.5:
+                factors.append(10.0 ** (-1.0 / float(np.polyfit(time, error, 1)[0])))
+        runs = motions.where(method=method)
+        records.append({"method": method, "least error": float(np.median(least)) if least else None,
+                        "tenfold accuracy costs": float(np.median(factors)) if factors else None,
+                        "most exact for its time": len(best), "energy made": made,
+                        "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
+    return table_of(WORTH_COLUMNS, records, digits=2, note="Errors of position: medians over the scenes.")
+
+
+def on_front(row: Record, others: Sequence[Record]) -> bool:
+    """Whether no other run of the scene is both faster and more exact."""
+    return not any(one["time"] < row["time"] and one["position"] < row["position"] for one in others)
 
 
 def methods() -> dict[str, Motion]:
@@ -162,7 +206,8 @@ def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[flo
     per_step = 0.0
 
     def add(step: float, outcome: str, note: str, seconds: float, **errors: float) -> None:
-        records.append({"step": 1e3 * step, "time": 1e3 * seconds, "outcome": outcome, "note": note, **errors})
+        records.append({"step": 1e3 * step, "time": 1e3 * seconds / scene.duration, "outcome": outcome, "note": note,
+                        **errors})
 
     for step in sorted(steps, reverse=True):
         expected = per_step * scene.duration / step
@@ -203,6 +248,7 @@ class Judge:
         grid = self._at(np.linspace(0.0, scene.duration, 1001))
         self.speed = float(np.linalg.norm(grid.velocity, axis=-1).max())
         self.kinetic = float(grid.kinetic_energy(scene).max())
+        self.start = float(grid.kinetic_energy(scene)[0] + grid.potential_energy(scene)[0])
         bound, mass = self.truth.bound, sum(body.mass for body in scene.bodies)
         # an event that comes late by `instant` leaves a body for so long with a velocity off by the whole jump
         late = 2.0 * self.speed * bound.instant * len(self.truth.events) / scene.duration
@@ -228,7 +274,9 @@ class Judge:
         below = [name for name, value in found.items() if value < self.bounds[name]]
         found = {name: max(value, self.bounds[name]) for name, value in found.items()}
         note = f"{', '.join(below)} {BELOW}" if below else ""
-        return found | {"signed energy": float(np.copysign(found["energy"], signed))}, note
+        gain = motion.kinetic_energy(self.scene) + motion.potential_energy(self.scene) - self.start
+        made = max(0.0, float(gain.max()) / self.kinetic - self.bounds["energy"])
+        return found | {"signed energy": float(np.copysign(found["energy"], signed)), "energy made": made}, note
 
     def _points(self, motion: Trajectory) -> tuple[Floats, Floats]:
         beside = rotation(motion.orientation) @ np.array([0.5 * self.scene.length, 0.0, 0.0])

@@ -15,12 +15,12 @@ from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
 from verification.cost.effects import summary
 from verification.cost.growth import FACTORED, PRINTED, RATE_COLUMNS, SCALING_COLUMNS, fitted
-from verification.cost.impacts import BUDGET_COLUMNS
+from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
 from verification.cost.start_up import COLUMNS as START_COLUMNS
 from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL
 from verification.cost.study import _rate, finding
-from verification.cost.trajectories import BELOW
+from verification.cost.trajectories import BELOW, worth
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
 from verification.mechanics.robot_timing import MANY, ONE
@@ -56,7 +56,8 @@ def _bodies(*counts: int, step: Callable[[int], float], tested: Callable[[int], 
 
 def _run(method: str, step: float, error: float | None, time: float, outcome: str = "ok", note: str = "") -> Any:
     return {"scene": "ball", "method": method, "step": step, "time": time, "position": error, "velocity": error,
-            "energy": error, "signed energy": error, "outcome": outcome, "note": note}  # fmt: skip
+            "energy": error, "signed energy": error, "energy made": error, "outcome": outcome,
+            "note": note}  # fmt: skip
 
 
 def _budget(budget: int, gain: float = 0.0) -> Any:
@@ -71,7 +72,7 @@ def tables() -> Tables:
     robots = titled(("robot", "quantity", "form", "ratio"), [("arm", "bias", form, 0.9) for form in (ONE, MANY)])
     late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0},
             {"method": "the printed formula", "coordinates": 3, "contacts": 60, "late calls": 0}]  # fmt: skip
-    motions = [_run("IAPB, midpoint", 1.0, 1e-3, 1.0), _run("PB, midpoint", 1.0, 1.0, 1.0),
+    motions = [_run("IAPB, Runge-Kutta 4", 1.0, 1e-3, 1.0), _run("PB, semi-implicit Euler", 1.0, 1.0, 1.0),
                _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")]  # fmt: skip
     return {
         "steps against MuJoCo": _races(0.05),
@@ -84,7 +85,8 @@ def tables() -> Tables:
         "solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4), ("Lemke kernel", 2e-6)),
         "start": Table(START_COLUMNS, (("iapb --help", 0.4, 0.3, 1, 0.5),)),
         "budgets": table_of(BUDGET_COLUMNS, [_budget(budget) for budget in range(5)]),
-        "motions": table_of(MOTION_COLUMNS, motions),
+        "motions": table_of(MOTION_COLUMNS, motions), "worth": worth(table_of(MOTION_COLUMNS, motions)),
+        "order bias": titled(("method", "spread"), [("IAPB", 4.0)]),
     }  # fmt: skip
 
 
@@ -99,7 +101,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
     assert {part.verdict for part in found.parts} == {found.verdict} == {REPRODUCED}
     assert "0.05 times MuJoCo's as box (8 contacts" in found.parts[0].sentence
     assert "600 at d = 3 (60 by the printed formula)" in found.parts[5].sentence
-    assert found.timed and not found.parts[-1].timed
+    assert found.timed and not found.parts[-2].timed
 
 
 @pytest.mark.parametrize(
@@ -111,6 +113,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "iapb --help takes 0.90 s"),
         ({"bodies": _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2.00"),
         ({"bodies": _bodies(20, 200, step=float, tested=lambda n: n * n)}, "pairs tested"),
+        ({"order bias": titled(("method", "spread"), [("IAPB", 14.0)])}, "at most 14 % (IAPB)"),
         ({"budgets": table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
     ],
 )
@@ -128,14 +131,14 @@ def test_an_error_that_the_truth_cannot_show_is_not_called_an_error(tables: Tabl
     runs = [*tables["motions"].records(), _run("MuJoCo", 0.2, 1e-9, 50.0, note=f"position, energy {BELOW}")]
     sentence = next(part.sentence for part in _found(tables | {"motions": table_of(MOTION_COLUMNS, runs)}).parts
                     if "Whole motion" in part.sentence)  # fmt: skip
-    assert f"MuJoCo {BELOW} of 1.0e-09 in 50 ms" in sentence
+    assert f"MuJoCo {BELOW} of 1.0e-09 in 50 ms per simulated second" in sentence
 
 
 def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
     motions = trajectory_precision.draw(inputs)
-    assert len(motions.panels) == 3
-    assert [name for name, _ in motions.legend] == ["IAPB, midpoint", "PB, midpoint", "MuJoCo"]
+    assert len(motions.panels) == 2
+    assert [name for name, _ in motions.legend] == ["IAPB, Runge-Kutta 4", "PB, semi-implicit Euler", "MuJoCo"]
     without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
     assert motions.panels[0].svg != trajectory_precision.draw(without).panels[0].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
@@ -157,10 +160,19 @@ def test_bench_ends_with_1_where_a_row_failed(
     failed = Failure("impact of 4 contacts", "SolverError", "no solution")
     topic = Finding("haptic-rate", "The haptic rate", "", "", NOT_COMPUTED, failures=(failed,))
     monkeypatch.setattr(command, "haptic_study", lambda *_: topic)
-    monkeypatch.setattr(command, "work_precision", lambda **_: Table(()))
-    monkeypatch.setattr(command, "_methods", lambda _: "")
+    monkeypatch.setattr(command, "work_precision", lambda **_: Table(METHOD_COLUMNS))
     with pytest.raises(typer.Exit) as ended:
-        command.bench(False, False)
+        command.bench(False, False, "", 20, 6)
     assert ended.value.exit_code == 1 and "Not computed: impact of 4 contacts: SolverError" in capsys.readouterr().out
     monkeypatch.setattr(command, "haptic_study", lambda *_: replace(topic, failures=()))
-    command.bench(False, False)
+    command.bench(False, False, "", 20, 6)
+
+
+def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
+    """Error over time with slope −1/2 costs a hundredfold; a method behind another on every scene is on no front."""
+    runs = [_run(name, 1.0, error, time)
+            for name, errors in (("good", (1e-1, 1e-2, 1e-3)), ("late", (2e-1, 2e-1, 2e-1)))
+            for error, time in zip(errors, (1.1, 1.1e2, 1.1e4), strict=True)]
+    good, late = worth(table_of(MOTION_COLUMNS, runs)).records()
+    assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["most exact for its time"] == 1
+    assert late["tenfold accuracy costs"] is None and late["least error"] == 2e-1

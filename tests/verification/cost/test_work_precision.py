@@ -1,15 +1,37 @@
-"""Accuracy against time: the problems have one truth for all methods, and the records hide nothing."""
+"""Accuracy against time: the impacts have one truth for all methods, the records hide nothing, a budget is kept."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from verification.cost.impacts import METHODS, work_precision
+from iapb import ArgumentError
+from reports.commands.bench import seconds_of
+from reports.figures.cost import budget_share, impact_accuracy
+from reports.figures.cost import which_method as drawn_choices
+from verification import which_method
+from verification.cost import impacts
+from verification.cost.calls import KernelCall, LemkeCall, SweepsCall, engine_call
+from verification.cost.impacts import (
+    COMPILED,
+    IAPB,
+    METHOD_COLUMNS,
+    SWEEPS,
+    TOO_SLOW,
+    WAYS,
+    choices,
+    choose,
+    lost_to_rivals,
+    order_bias,
+    work_precision,
+)
+from verification.finding import Table, table_of
 from verification.impacts import timed_problems
 
+PROBLEMS = [problem for size in ((1, 3), (4, 3), (20, 6), (60, 12)) for problem in timed_problems(*size)]
 
-@pytest.mark.parametrize("problem", timed_problems(), ids=lambda problem: problem.label)
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.label)
 def test_equalities_and_complementarity_have_the_same_answer(problem: object) -> None:
     """Impulses that push only solve the equalities, as far as v in doubles knows its nearly dependent directions."""
     J, v, e = problem.contact_jacobian, problem.velocity, problem.restitution
@@ -24,22 +46,101 @@ def test_equalities_and_complementarity_have_the_same_answer(problem: object) ->
     assert np.abs(J @ truth + e * (J @ v)).max() <= 1e-12 * np.abs(J).max() * np.abs(v).max()
 
 
-def test_a_small_study_is_complete_and_ordered() -> None:
-    problems = timed_problems(("contacts",))[:2]
+@pytest.fixture(scope="module")
+def measured() -> Table:
     seen: list[tuple[int, int]] = []
-    found = work_precision(problems, rounds=4, progress=lambda done, of: seen.append((done, of)))
-    assert [row[:2] for row in found.rows] == [(m, p.label) for p in problems for m in METHODS]
-    assert seen == [(1, 2), (2, 2)]
-    assert set(found.column("outcome")) == {"ok"} and min(found.column("time")) > 0.0
-    errors = dict(found.where(problem=problems[0].label).select(("method", "relative error")).rows)
-    assert errors["factored"] < 1e-14 and errors["svd"] < 1e-13
-    assert errors["factored"] < errors["cvxpy QP"] < errors["factored, 2 rows"] < errors["factored, 1 row"]
-    assert set(found.column("relative energy gain")) == {0.0}
+    found = work_precision([(4, 3)], rounds=3, progress=lambda done, of: seen.append((done, of)))
+    assert seen == [(k, 9) for k in range(1, 10)]
+    return found
 
 
-def test_a_failure_is_recorded_with_its_reason() -> None:
-    """More contacts than coordinates: the Cholesky of W refuses, and the row says so."""
-    row = work_precision(timed_problems(("contacts",))[2:3], ["gram_cholesky"], rounds=3).records()[0]
-    assert row["outcome"].startswith("failed: ") and "independent rows" in row["outcome"]
-    assert row["relative error"] is row["time"] is None
+def test_a_small_study_is_complete_and_its_answers_are_right(measured: Table) -> None:
+    ways = [way for way in WAYS if way.rows < 3]
+    assert len(measured.rows) == 9 * len(ways)
+    assert min(measured.where(outcome="ok").column("time")) > 0.0
+    ours = measured.where(method=IAPB, work="all rows")
+    assert set(ours.column("outcome")) == {"ok"}
+    assert max(ours.column("relative error")) < 1e-12 and max(ours.column("relative energy gain")) == 0.0
+    one, two = (max(measured.where(method=IAPB, work=work).column("relative error")) for work in ("1 row", "2 rows"))
+    assert one > two > 1e-12
+    assert max(measured.where(method=SWEEPS, work="1024 sweeps").column("relative error")) < one
+
+
+def test_every_compiled_rival_solves_an_easy_impact() -> None:
+    case = timed_problems(4, 3)[0]
+    truth = np.array([float(x) for x in case.truth])
+    for call in (KernelCall(case), SweepsCall(case, 4096), LemkeCall(case), engine_call(case, "factored")):
+        assert case.distance(call(), truth) < 1e-9, call
+
+
+def rows_of(*ways: tuple[str, str, float, float, float]) -> Table:
+    """(method, work, time [µs], error, gain) on two impacts alike."""
+    return table_of(METHOD_COLUMNS, [
+        {"contacts": 4, "coordinates": 3, "problem": problem, "method": method, "work": work, "called": COMPILED,
+         "time": time, "relative error": error, "relative energy gain": gain, "failed after": time,
+         "outcome": "ok" if time < 1e4 else TOO_SLOW}
+        for problem in ("a", "b") for method, work, time, error, gain in ways])
+
+
+KNOWN = rows_of((IAPB, "1 row", 1.0, 0.5, 0.0), (IAPB, "all rows", 3.0, 1e-15, 0.0),
+                (SWEEPS, "4 sweeps", 0.4, 0.1, 0.0), (SWEEPS, "64 sweeps", 2.0, 1e-10, 1e-3),
+                ("Lemke", "all pivots", 2.5, 1e-11, 0.0),
+                ("slow", "all", 1e5, 1e-16, 0.0))
+
+
+def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> None:
+    def chosen(budget: float) -> tuple[str, str] | None:
+        found = choose(KNOWN, budget, 4, 3)
+        return None if found is None else (found.method, found.work)
+
+    assert chosen(3e-7) is None
+    assert chosen(5e-7) == chosen(2e-6) == (SWEEPS, "4 sweeps")  # the more exact one makes energy
+    assert chosen(2.6e-6) == chosen(1.0) == ("Lemke", "all pivots")  # below 1e-9 the faster one
+    assert "stopped after 4 sweeps" in str(choose(KNOWN, 5e-7, 4, 3))
+    assert choices(KNOWN).column("method") == [SWEEPS, *["Lemke"] * 4]
+
+
+def test_where_a_rival_is_faster_is_said() -> None:
+    assert [row["solver"] for row in lost_to_rivals(KNOWN).records()] == ["Lemke", "Lemke"]
+    assert "Lemke is up to 1.2 times as fast as IAPB" in impact_accuracy.draw({"work_precision": KNOWN}).caption
+
+
+def test_figures_show_every_size_and_failure() -> None:
+    inputs = {"work_precision": KNOWN}
+    assert "0.5 µs: Gauss-Seidel" in drawn_choices.draw(inputs).panels[0].alt
+    assert len(budget_share.draw(inputs).panels) == 3
+    without = {"work_precision": KNOWN.where(outcome="ok")}
+    slow = impact_accuracy.draw({"work_precision": rows_of((IAPB, "all rows", 1e5, 1e-15, 0.0))})
+    assert slow.panels[0].svg != impact_accuracy.draw(without).panels[0].svg
+
+
+def test_a_failure_is_recorded_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = [way for way in WAYS if way.method == impacts.QP]
+    monkeypatch.setattr(impacts, "_try", lambda call: "no solution")
+    row = work_precision([(4, 3)], 3, ways).records()[0]
+    assert row["outcome"] == "failed: no solution" and row["relative error"] is row["time"] is None
     assert row["failed after"] > 0.0
+
+
+def test_order_bias_has_a_row_per_method() -> None:
+    rows = order_bias(rounds=3).records()
+    assert [row["method"] for row in rows] == list(impacts.METHODS)
+    assert all(row["spread"] >= 0.0 and row["after"] != row["method"] for row in rows)
+
+
+def test_a_size_is_measured_when_asked_for() -> None:
+    compiled, python = which_method(1.0, 2, 3, rounds=3)
+    assert (compiled.called, compiled.share) == (COMPILED, 1.0) and compiled.largest < 1e-9 and python.time > 0.0
+    with pytest.raises(ArgumentError, match="budget"):
+        which_method(0.0, 2, 3)
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("50us", 5e-5), ("0.5 ms", 5e-4), ("1e-4", 1e-4), ("3µs", 3e-6)])
+def test_budgets_are_read(text: str, seconds: float) -> None:
+    assert seconds_of(text) == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("text", ["fast", "50 miles", "", "e", "1e"])
+def test_what_is_no_budget_is_refused(text: str) -> None:
+    with pytest.raises(ArgumentError, match="budget"):
+        seconds_of(text)
