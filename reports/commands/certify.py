@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, TextIO
 
@@ -16,6 +17,7 @@ from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import RunFileError
+from reports.commands.as_json import Json, print_json
 from reports.store.runs import read_run
 
 _GIVEN = ("mass_matrix", "v_minus", "v_plus")
@@ -26,6 +28,7 @@ def certify(
         metavar="RUN...", help="Run files (.h5), folders of them, or impacts of another engine (.npz).")],
     export: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Write every impact as a line of integers, for the checker that Coq proves.")] = None,
+    json_: Json = False,
 ) -> None:
     """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
     with ExitStack() as stack:
@@ -33,6 +36,18 @@ def certify(
         if target:
             target.write(f"{EXPORT_HEAD}\n")
         found = {path: certificate_of(path, target) for given in files for path in _files(given)}
+    failed = [path for path, one in found.items() if not one.passed]
+    if json_:
+        judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
+        print_json({"passed": not failed, "files": judged})
+    else:
+        _print(found, failed)
+    if failed:
+        raise typer.Exit(1)
+
+
+def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:
+    """A row for each file, what is certified of it, and the first gain."""
     table = Table(title="Impacts, judged in real arithmetic")
     for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "sum − impulse",
                     "restitution"):
@@ -42,7 +57,6 @@ def certify(
         sizes = ("not judged" if np.isnan(x) else f"{x:.1e}" for x in residuals)
         table.add_row(path.name, str(one.impacts), str(one.gains), str(one.by_integers + one.checked), *sizes)
     Console().print(table)
-    failed = [path for path, one in found.items() if not one.passed]
     impacts, gains = sum(one.impacts for one in found.values()), sum(one.gains for one in found.values())
     print(f"{impacts} impacts of {len(found)} files: {gains} gained energy (exact).")
     for path in found:
@@ -50,8 +64,6 @@ def certify(
     for path in failed[:1]:
         if found[path].counterexample:
             print(f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}")
-    if failed:
-        raise typer.Exit(1)
 
 
 def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:

@@ -15,6 +15,7 @@ import typer
 from iapb.errors import ArgumentError
 from reference.datasets import problem_files
 from reference.fclib import write_fclib
+from reports.commands.as_json import Json, print_json
 from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress
 from reports.commands.run import Values, scene_given
@@ -65,7 +66,7 @@ def compare(
         help="Write our own problems to this folder as FCLIB files, and stop.")] = None,
     out: Annotated[Path | None, typer.Option(
         help="File of the results, .h5 or .json; default: in out/compare. The figure stands beside it.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
+    json_: Json = False,
 ) -> None:
     """Compare the worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
     if only_problems and not problems:
@@ -99,7 +100,7 @@ def compare(
             lines, place = _study_lines(found, study.problems), out or FOLDER / "complementarity.h5"
     _keep(found, place, figure)
     if json_:
-        print(json.dumps(plain_finding(found), ensure_ascii=False, indent=1))
+        print_json(plain_finding(found))
     else:
         _print(found, lines, place, figure)
     if found.failures:

@@ -12,6 +12,7 @@ from iapb import decide_effects
 from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError
 from reference.worlds import find_world
+from reports.commands.as_json import Json, print_json
 from reports.commands.progress import stage_progress
 from reports.commands.run import Rendering, SceneName, scene_given
 from verification.cost.effects import NOTHING, effects_of, summary
@@ -26,17 +27,21 @@ def effects(
     measure: Annotated[bool, typer.Option(
         "--measure", help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "
         "and what changes without it. Takes seconds.")] = False,
+    json_: Json = False,
 ) -> None:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
     source = scene_given(scene, None)
     if measure:
-        _measure(source, world or "IAPB")
+        _measure(source, world or "IAPB", json_)
         return
     if world is None:
         found = decide_effects(source)
     else:
         chosen = find_world(world, rendering)
         found = decide_effects(source, chosen.law, chosen.coupling_in(source))
+    if json_:
+        print_json({"scene": source.name, "world": world, "effects": found})
+        return
     on = [effect for effect in found if effect.active]
     ignored = ignored_fields(found)
     said = f" ({world} ignores {', '.join(ignored)})" if ignored else ""
@@ -50,12 +55,15 @@ def effects(
     print(f"{len(on)} of {len(found)} effects are on; the others cost nothing.")
 
 
-def _measure(source: Any, world: str) -> None:
+def _measure(source: Any, world: str, json_: bool) -> None:
     """A table of what each effect costs and changes, and which ones give least error for the time they save."""
     if world not in ("IAPB", "PB"):
         raise ArgumentError("world", world, "IAPB or PB with --measure: the worlds of the compiled engine")
     with stage_progress() as progress:
         found = effects_of(source, world, lambda done, total: progress("with and without each effect", done, total))
+    if json_:
+        print_json({"scene": source.name, "world": world, "measured": found.records()})
+        return
     best = {row["effect"]: row["best of its error"] for row in summary({source.name: found}).records()}
     caption = "Best of its error: no other effect saves more time at the cost of no larger error."
     table = Table(title=f"Effects of {source.name} in {world}, measured", show_lines=True, caption=caption)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from reports.commands.run import describe
+from iapb.run import Run
+from reports.commands.as_json import Json, print_json
+from reports.commands.run import describe, run_as_json
 from reports.counterexamples import recheck_command
 from reports.store.impact import BrokenImpact, read_broken_impact
 from reports.store.runs import read_provenance, read_stored
@@ -19,10 +21,17 @@ from reports.store.runs import read_provenance, read_stored
 def inspect(
     file: Annotated[Path, typer.Argument(help="A run file (.h5, or .h5.partial of an interrupted run).")],
     impacts: Annotated[int, typer.Option(min=0, help="How many impacts to list.")] = 10,
+    json_: Json = False,
 ) -> None:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
     run, entry = read_stored(file)
     broken = read_broken_impact(file)
+    if json_:
+        print_json(_as_json(run, impacts) | {
+            "broken law": broken and {"law": broken.law, "resolver": broken.resolver, "statement": broken.statement,
+                                      "residual": broken.value, "allowed": broken.tolerance, "test": broken.test},
+            "provenance": read_provenance(file), "run_key": entry.run_key, "content_hash": entry.content_hash})
+        return
     if broken is None:
         describe(run, existed=True)
         print("Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}.")
@@ -43,6 +52,16 @@ def inspect(
     for name, text in read_provenance(file).items():
         print(f"  {name}: {text.splitlines()[0] if text else ''}")
     print(f"\nrun key      {entry.run_key}\ncontent hash {entry.content_hash}")
+
+
+def _as_json(run: Run, count: int) -> dict[str, Any]:
+    """The run, its first impacts, its energy at the end and its effects."""
+    table = run.impacts
+    names = ("rows", "rank", "energy_lost", "scale", "clamp", "approaching")
+    listed = [{"time": run.time[table.step[i]]} | {name: getattr(table, name)[i] for name in names}
+              for i in range(min(count, len(table.step)))]
+    energy = {name: values[-1] for name, values in run.energy.items()} if run.steps else {}
+    return run_as_json(run) | {"impacts": listed, "energy": energy, "effects": run.effects}
 
 
 def _list_impacts(run: object, count: int) -> None:

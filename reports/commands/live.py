@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
@@ -13,6 +14,7 @@ from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
 from iapb.simulation import INTERRUPTED, Simulation
 from reference.worlds import find_world
+from reports.commands.as_json import Json, print_json
 from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
 from reports.live.budget import calibrated
 from reports.live.loop import Loop
@@ -38,6 +40,7 @@ def live(
     budget: Annotated[bool, typer.Option(help="Give impacts the rows that the time left allows, or all.")] = True,
     set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
+    json_: Json = False,
 ) -> None:
     """Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable."""
     if not 0.0 < rate < float("inf"):
@@ -52,7 +55,8 @@ def live(
         ticks = round(seconds * rate)
         log = open_log(out, name, simulation, world, ticks)
         try:
-            stopped = _held(simulation, ticks, budget, port if view else None, log)
+            stopped = _held(simulation, ticks, budget, port if view else None, log,
+                            sys.stderr if json_ else sys.stdout)
             run, timetable, pace = finish_live(log.path, stopped, log.steps)
         except BaseException:
             log.close(remove=log.steps == 0)
@@ -60,25 +64,29 @@ def live(
                 print(f"What was done is in {log.path}; iapb store repair {out} makes it readable.", file=sys.stderr)
             raise
         log.close(remove=True)
-    describe(pace)
-    print(f"Run: {run}\nTimetable: {timetable}")
+    if json_:
+        print_json(asdict(pace) | {"run": run, "timetable": timetable, "stopped": stopped})
+    else:
+        describe(pace)
+        print(f"Run: {run}\nTimetable: {timetable}")
+        if stopped:
+            print(f"Stopped: {stopped}. What was done is in the files.")
     if stopped:
-        print(f"Stopped: {stopped}. What was done is in the files.")
         raise typer.Exit(130 if stopped == INTERRUPTED else 1)
 
 
-def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, log: RunLog) -> str:
-    """Do the ticks, with a viewer where there is a port for it; return what stopped them."""
+def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, log: RunLog, to: TextIO) -> str:
+    """Do the ticks, with a viewer where there is a port for it, said to a stream; return what stopped them."""
     rows = calibrated(simulation, simulation.system.dt) if budget else None
     length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
     if port is None:
         loop = Loop(simulation, ticks, budget=rows, log=log)
-        print(f"Under way for {length}", flush=True)
+        print(f"Under way for {length}", file=to, flush=True)
         return loop.stream()
     viewer = Viewer(simulation, port)
     try:
         loop = Loop(simulation, ticks, budget=rows, audience=viewer, log=log)
-        print(f"See it, and drag the handle, at {viewer.start()} for {length}", flush=True)
+        print(f"See it, and drag the handle, at {viewer.start()} for {length}", file=to, flush=True)
         return loop.stream()
     finally:
         viewer.stop()

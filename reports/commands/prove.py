@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
+from reports.commands.as_json import Json, print_json
 from verification.proofs import all_proofs, check, load
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 
@@ -13,8 +15,12 @@ from verification.proofs.second_tool import CERTIFIED, second_opinion
 def prove(
     name: Annotated[str | None, typer.Argument(help="A statement; without it all are checked and listed.")] = None,
     second_tool: Annotated[bool, typer.Option("--second-tool", help="Let Coq check the certificates, too.")] = False,
+    json_: Json = False,
 ) -> None:
     """Check every machine-checked statement, or print the proof of one."""
+    if json_:
+        _print_json(all_proofs() if name is None else (name,), second_tool)
+        return
     if name is not None:
         print(check(name).as_text())
         _ask_second_tool((name,) if second_tool else ())
@@ -31,6 +37,16 @@ def prove(
     if second_tool:
         _ask_second_tool(CERTIFIED)
     if failed:
+        raise typer.Exit(1)
+
+
+def _print_json(names: Sequence[str], second_tool: bool) -> None:
+    """Print verdicts, and what Coq says; end with 1 where one is not proved or refused."""
+    records = [check(name) for name in names]
+    opinions = [second_opinion(load(name)) for name in names if second_tool and name in CERTIFIED]
+    print_json({"statements": [{"name": one.name, "title": one.title, "verdict": one.verdict, "seconds": one.seconds}
+                               for one in records], "coq": opinions})
+    if any(one.verdict != "proved" for one in records) or any(one.verdict == "refused" for one in opinions):
         raise typer.Exit(1)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from iapb.errors import ArgumentError
+from reports.commands.as_json import Json, print_json
 from reports.difference import DIFFERS, Difference, compare_reports
 from reports.difference_text import PARTS, SHOWN, lines, parts, sentences, unlike
 from reports.numbers_file import read_numbers
@@ -27,6 +29,7 @@ def report(
     old: Annotated[Path, typer.Argument(help="A report, its folder, or its numbers.json.")],
     new: Annotated[Path, typer.Argument(help="The other one.")],
     tolerance: Annotated[float, typer.Option(min=0.0, help="Relative difference up to which numbers agree.")] = 1e-9,
+    json_: Json = False,
 ) -> None:
     """Say which numbers of two reports agree exactly, within a tolerance, or not; end with 1 where some differ."""
     if not math.isfinite(tolerance):
@@ -34,6 +37,12 @@ def report(
     first, second = read_numbers(old), read_numbers(new)
     found = compare_reports(first, second, tolerance)
     reasons = unlike(first.provenance, second.provenance)
+    if json_:
+        print_json({"differs_in": reasons, "depths": [first.depth, second.depth], "tolerance": tolerance,
+                    "cells": Counter(cell.state for cell in found.cells), "differing": found.of(DIFFERS),
+                    "tables_of_old_alone": found.tables_old, "tables_of_new_alone": found.tables_new,
+                    "runs_same": found.runs_same, "runs_other": found.runs_other, "runs_single": found.runs_single})
+        raise typer.Exit(1 if found.count(DIFFERS) else 0)
     print(f"The reports differ in {', '.join(reasons)}." if reasons else "Same code, packages and processor.")
     if first.depth != second.depth:
         print(f"The old report is {first.depth}, the new one {second.depth}: many numbers are of one only.")

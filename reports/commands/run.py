@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,13 +9,16 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from iapb.checks import Caution, check_scene
+from iapb.checks import check_scene
 from iapb.effects import ignored_fields
 from iapb.errors import RunFileError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import INTERRUPTED
+from iapb.system import System
+from reference.time_stepping import RigidConstraints, cost_of
 from reference.worlds import find_world
+from reports.commands.as_json import Json, print_json
 from reports.commands.progress import step_progress
 from reports.runner import Runner
 from reports.store.folder import Place
@@ -49,7 +51,7 @@ def run(
     set_: Values = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped or killed.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
-    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")] = False,
+    json_: Json = False,
 ) -> None:
     """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.
 
@@ -57,7 +59,10 @@ def run(
     The memory that it takes does not depend on the number of steps; a run that is killed can be resumed.
     """
     source, runner = scene_given(scene, set_), Runner(out)
-    cautions = check_scene(source, find_world(world, rendering).law)
+    law = find_world(world, rendering).law
+    cautions, (said, _) = check_scene(source, law), cost_in_words(source, law)
+    if said:
+        print(f"{source.name} in {world}: {said}.", file=sys.stderr)
     for caution in cautions:
         print(f"Warning: {caution}.", file=sys.stderr)
     left = log_of(out / runner.file_of(source, world, rendering))
@@ -69,8 +74,9 @@ def run(
     with opened_run(place.partial if stopped else place.path) as (result, entry):
         if entry.run_key != place.key:
             raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
+        file = place.path if result.complete else place.partial
         if json_:
-            print(json.dumps(_as_json(result, place, cautions), indent=1, ensure_ascii=False))
+            print_json(run_as_json(result) | {"warnings": cautions, "file": file})
         else:
             _tell(result, place, streamed, resume)
         distrust = result.distrust
@@ -80,6 +86,20 @@ def run(
         raise typer.Exit(DISTRUSTED)
 
 
+def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
+    """Say what a rigid world will take, where that is long; and whether it refuses. Nothing of other laws."""
+    if not isinstance(law, RigidConstraints):
+        return "", False
+    cost, steps = cost_of(System(scene)), scene.steps
+    rows = f"{cost.contacts:,} contacts of {cost.coordinates:,} coordinates in each step"
+    if cost.too_large:
+        return f"{rows}: more than the rigid worlds take; fewer bodies, or the world IAPB", True
+    if cost.seconds * steps < WORTH_SAYING:
+        return "", False
+    return f"{rows}, about {duration(cost.seconds)} a step and {duration(cost.seconds * steps)} in all", False
+
+
+WORTH_SAYING = 60.0  # seconds
 DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
 
 
@@ -97,15 +117,14 @@ def _tell(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> No
         print("Go on with the same command and --resume.")
 
 
-def _as_json(run: Run, place: Place, cautions: tuple[Caution, ...]) -> dict[str, Any]:
+def run_as_json(run: Run) -> dict[str, Any]:
     """What happened, as plain values."""
     return {
         "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling, "steps": run.steps,
         "dt": run.dt, "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
         "deepest_penetration": deepest(run),
         "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
-        "warnings": [caution._asdict() for caution in cautions], "remarks": run.remarks, "distrust": run.distrust,
-        "file": str(place.path if run.complete else place.partial),
+        "ignores": ignored_fields(run.effects), "remarks": run.remarks, "distrust": run.distrust,
     }  # fmt: skip
 
 

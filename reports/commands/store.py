@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from iapb.errors import ArgumentError, IapbError
+from reports.commands.as_json import Json, print_json
 from reports.commands.progress import stage_progress
 from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
-from reports.resimulate import repeat_run
+from reports.resimulate import Repetition, repeat_run
 from reports.store.care import (
     DAMAGED,
     FOREIGN,
@@ -51,6 +52,7 @@ def store(
     action: Annotated[Action, typer.Argument(help=_ACTION)],
     where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (check, again).")] = Path("out"),
     delete: Annotated[bool, typer.Option("--delete", help="gc: remove what it lists.")] = False,
+    json_: Json = False,
 ) -> None:
     """Look after the run and table files below a folder.
 
@@ -63,48 +65,56 @@ def store(
     if delete and action is not Action.gc:
         raise typer.BadParameter("is for gc", param_hint="--delete")
     if action is Action.gc:
-        _gc(where, delete)
+        _gc(where, delete, json_)
     else:
-        {Action.check: _check, Action.repair: _repair, Action.again: _again, Action.mark: _mark}[action](where)
+        {Action.check: _check, Action.repair: _repair, Action.again: _again, Action.mark: _mark}[action](where, json_)
 
 
-def _check(where: Path) -> None:
+def _check(where: Path, json_: bool) -> None:
     with stage_progress() as progress:
         states = check_store(where, partial(progress, "files read whole"))
-    _tell(states)
+    _tell(states, json_)
     if where.is_file() and states[0].state == FOREIGN:
         raise typer.Exit(1)
     if any(state.state == DAMAGED for state in states):
-        print(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
+        if not json_:
+            print(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
         raise typer.Exit(1)
 
 
-def _repair(where: Path) -> None:
+def _repair(where: Path, json_: bool) -> None:
     with stage_progress() as progress:
         states = repair_store(where, partial(progress, "files read whole"))
-    _tell(states)
-    for log in logs_of_killed(where):
-        try:
-            _tell_recovered(log)
-        except IapbError as error:
-            print(f"{log}: left as it is: {str(error).removeprefix(f'{log}: ')}")
+    recovered = [line for log in logs_of_killed(where) for line in _recovered(log)]
     aside = sum(not state.path.exists() for state in states)
+    if json_:
+        _tell(states, json_, logs=recovered, aside=aside)
+        return
+    _tell(states)
+    for line in recovered:
+        print(line)
     print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
 
 
-def _tell_recovered(log: Path) -> None:
+def _recovered(log: Path) -> Iterator[str]:
     """Make what is whole in a log readable, and say so."""
-    if not is_live(log):
-        print(f"{recover(log)}: what a killed run did; iapb run --resume goes on")
+    try:
+        if not is_live(log):
+            yield f"{recover(log)}: what a killed run did; iapb run --resume goes on"
+            return
+        yield f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable"
+        if is_damaged(log):
+            yield f"{log}: damaged; what is before the damage is in the run, the log is kept"
+        else:
+            log.unlink()
+    except IapbError as error:
+        yield f"{log}: left as it is: {str(error).removeprefix(f'{log}: ')}"
+
+
+def _tell(states: Sequence[FileState], json_: bool = False, **more: Any) -> None:
+    if json_:
+        print_json({"files": states, "count": Counter(state.state for state in states)} | more)
         return
-    print(f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable")
-    if is_damaged(log):
-        print(f"{log}: damaged; what is before the damage is in the run, the log is kept")
-    else:
-        log.unlink()
-
-
-def _tell(states: Sequence[FileState]) -> None:
     for state in states:
         if state.state != WHOLE:
             print(f"{state.path}: {state.state}: {state.why}")
@@ -113,47 +123,60 @@ def _tell(states: Sequence[FileState]) -> None:
     print(f"{len(states)} files: {parts or 'none'}")
 
 
-def _gc(where: Path, delete: bool) -> None:
+def _gc(where: Path, delete: bool, json_: bool) -> None:
     found = garbage(where)
     size = sum(state.size for state in found) / 1e6
-    for state in found:
-        print(f"{state.path}: {state.state}: {state.why}")
     if delete:
         collect_garbage(found)
+    if json_:
+        print_json({"files": found, "megabytes": size, "removed": delete})
+        return
+    for state in found:
+        print(f"{state.path}: {state.state}: {state.why}")
     print(f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of "
           "the present code, of your own code and all foreign files are kept.")
 
 
-def _mark(where: Path) -> None:
+def _mark(where: Path, json_: bool) -> None:
     found = mark_stores(where)
+    if json_:
+        print_json({"marked": found})
+        return
     for folder in found:
         print(f"{folder}: marked as a store")
     print(f"{len(found)} folders marked." if found else "No folder with whole results that is not marked yet.")
 
 
-def _again(where: Path) -> None:
+def _again(where: Path, json_: bool) -> None:
     files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
-    same = 0
+    found: dict[Path, Repetition | str] = {}
     with stage_progress() as progress:
         for done, path in enumerate(files):
             progress("runs simulated again", done, len(files))
-            same += _tell_again(path)
-    print(f"{same} of {len(files)} runs came out the same.")
+            try:
+                found[path] = repeat_run(path)
+            except IapbError as error:
+                found[path] = f"not simulated again: {str(error).removeprefix(f'{path}: ')}"
+            if not json_:
+                _tell_again(path, found[path])
+    same = sum(not isinstance(one, str) and one.same for one in found.values())
+    if json_:
+        print_json({"same": same, "files": {path: {"failed": one} if isinstance(one, str) else
+                                            {"same": one.same, "differs": one.differs} for path, one in found.items()}})
+    else:
+        print(f"{same} of {len(files)} runs came out the same.")
     if same < len(files):
         raise typer.Exit(1)
 
 
-def _tell_again(path: Path) -> bool:
-    """Simulate one run again, and say what differs and by how much; whether nothing does."""
-    try:
-        found = repeat_run(path)
-    except IapbError as error:
-        print(f"{path}: not simulated again: {str(error).removeprefix(f'{path}: ')}")
-        return False
+def _tell_again(path: Path, found: Repetition | str) -> None:
+    """Say what differs in a run that was simulated again, and by how much."""
+    if isinstance(found, str):
+        print(f"{path}: {found}")
+        return
     print(f"{path}: " + ("the same to the last bit" if found.same else "differs in"))
     for one in found.differs:
         print(f"  {one.name}: {one.how}")
     made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
     if not found.same and made != here:
         print(f"  it was stored under {made}; this is {here}")
-    return found.same

@@ -12,6 +12,7 @@ from iapb.compiling import compiling_told, to_stderr
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
+from reports.commands.as_json import Json, print_json
 from reports.commands.progress import stage_progress
 from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
@@ -23,6 +24,7 @@ from verification.laws.kit import IMPACTS as KIT_IMPACTS
 from verification.laws.kit import LawCount
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
+LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
 _SHOWN = 20  # counterexamples listed; all are in their folder
 
 
@@ -50,14 +52,17 @@ def verify(
         help="Instead, an engine on the fixed scenes: mujoco, drake, ... or all; may be repeated.")] = None,
     scene: Annotated[list[str] | None, typer.Option(
         help="With --simulator: only this fixed scene; may be repeated.")] = None,
+    json_: Json = False,
 ) -> None:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
     if scene and not simulator:
         raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
     if (contract != "equality" or laws) and (full or simulator or recheck is not None):
         raise typer.BadParameter("not with --full, --simulator or --recheck", param_hint="--contract, --laws")
+    if json_ and (full or recheck is not None):
+        raise typer.BadParameter("not with --full or --recheck, which say where their files are", param_hint="--json")
     if simulator:
-        verify_simulators(simulator, scene or ())
+        verify_simulators(simulator, scene or (), json_)
         return
     if recheck is not None:
         passed = print_recheck(recheck, allow_code)
@@ -65,18 +70,25 @@ def verify(
         passed = verify_full(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
     else:
         named = [name for given in laws or () for name in given.split(",") if name]
-        passed = _kit(resolver, contract, named if laws else None, impacts, seed, unequal)
+        passed = _kit(resolver, contract, named if laws else None, impacts, seed, unequal, json_)
     if not passed:
         raise typer.Exit(1)
 
 
-def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | None, seed: int, unequal: bool) -> bool:
+def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | None, seed: int, unequal: bool,
+         json_: bool) -> bool:
     tested = function_named("--resolver", resolver)
     with stage_progress() as progress:
         report = check_passivity(tested, contract=contract, laws=laws, impacts=impacts or KIT_IMPACTS, seed=seed,
                                  unequal_restitution=unequal,
                                  progress=lambda done, total: progress("impacts", done, total))
-    print(report)
+    if json_:
+        print_json({
+            "resolver": report.resolver, "contract": report.contract, "impacts": report.impacts, "seed": report.seed,
+            "passed": report.passed, "unfinished": report.unfinished, "report": str(report),
+            "laws": [{name: getattr(one, name) for name in LAW_FIELDS} for one in report.verdicts]})
+    else:
+        print(report)
     return report.passed
 
 
@@ -136,7 +148,7 @@ def print_recheck(path: Path, allow_code: bool) -> bool:
     return kept
 
 
-def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
+def verify_simulators(simulators: Sequence[str], scenes: Sequence[str], json_: bool = False) -> None:
     """Run the scenes and print what came of them; `all` names every engine.
 
     Raises
@@ -155,6 +167,9 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> None:
     with stage_progress() as progress:
         records = compare_engines(names, chosen,
                                   progress=lambda done, total: progress("pairs of engine and scene", done, total))
+    if json_:
+        print_json({"records": records})
+        return
     for name in names:
         for choice in SETTINGS:
             of_engine = [record for record in records if record.engine == name and record.choice == choice]
