@@ -31,11 +31,14 @@ SAYS = {
     "two_sum_exact": "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow",
     "two_product_exact": "two_product(a, b) is a b exactly where it is 0 or at least 2⁻⁹⁶⁹",
     "two_product_underflow": "two_product(a, b) is within 7/2 of 2⁻¹⁰⁷⁴ of a b always",
-    "compensated": "the running bound of both loops of `gain`: a sum of n terms, by induction on n",
+    "compensated": "the running bound of a double-double sum of n terms, by induction on n",
+    "loop_error": "either loop of `gain`, a double-double sum of n products of pairs: its error and its size",
+    "sign_kept": "a sum that is at most 0 as computed is at most 0",
+    "accepted_never_gains": "high + (low + radius) ≤ 0 as computed, and a radius that bounds the error: Γ ≤ 0",
 }
 # What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
-ARGUED = ("Argued in prose only: that the terms of `gain` meet the hypotheses of the running bound, with the constants "
-          "in its radius, the bounds of the other three evaluations, and that an overflow is never accepted.")
+ARGUED = ("Argued in prose only: that the bounds of both loops of `gain` together are below its radius, the bounds "
+          "of the other three evaluations, and that an overflow is never accepted.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 

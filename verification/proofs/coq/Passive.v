@@ -2,7 +2,8 @@
    with rounding to nearest and gradual underflow, for every size d.
 
    Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
-   always; and [compensated], the running bound by induction on the number of terms, which both loops of `gain` use.
+   always; [compensated], the running bound by induction on the number of terms; [loop_error], the error of either loop of
+   `gain`; [accepted_never_gains], what the comparison with 0 shows. That both loops' bounds are below the radius is not.
 
    Numbers are real numbers of binary64's format whose exponent has no upper end: overflow is not modelled. *)
 
@@ -301,3 +302,195 @@ Proof.
 Qed.
 
 Print Assumptions compensated.
+
+(* The terms of both loops: x = hi + lo from two_sum, |lo| <= u |hi|; y = hi + lo with |hi| <= m, |lo| <= q m + z. In a row
+   y is a pair from two_sum as well (m = |hi|, q = u, z = 0); over the rows y is the sum of a row. *)
+Record factors := Factors { x_hi : R; x_lo : R; y_hi : R; y_lo : R; m : R }.
+Definition product (t : factors) := (x_hi t + x_lo t) * (y_hi t + y_lo t).
+Definition product_term (t : factors) :=
+  let pe := two_product (x_hi t) (y_hi t) in
+  Term (fst pe) (snd pe) (add (multiply (x_hi t) (y_lo t)) (multiply (x_lo t) (y_hi t)))
+       ((1 + u) * (Rabs (x_hi t) * m t) + eta).
+Definition sized (q z big : R) (t : factors) :=
+  number (x_hi t) /\ number (x_lo t) /\ number (y_hi t) /\ number (y_lo t) /\ Rabs (x_hi t) <= big /\
+  Rabs (x_lo t) <= u * Rabs (x_hi t) /\ Rabs (y_hi t) <= m t /\ Rabs (y_lo t) <= q * m t + z.
+(* What p + e + c leaves of the product. *)
+Definition rest (q z : R) (t : factors) :=
+  u * (3 + u) * (Rabs (x_hi t) * (q * m t + z)) + u * (2 + u) * (u * (Rabs (x_hi t) * m t)) + 5 * eta.
+
+Lemma eta_positive : 0 < eta.
+Proof. apply bpow_gt_0. Qed.
+
+Lemma multiply_near x y : Rabs (x * y - multiply x y) <= u * Rabs (x * y) + / 2 * eta.
+Proof.
+  destruct (error_N_FLT radix2 (-1074) 53 ltac:(lia) (fun z => negb (Z.even z)) (x * y)) as (d & f & Hd & Hf & _ & E).
+  change (FLT_exp (-1074) 53) with fexp in E. unfold multiply. rewrite E.
+  replace (x * y - (x * y * (1 + d) + f)) with (- d * (x * y) + - f) by ring.
+  apply Rle_trans with (1 := Rabs_triang _ _). rewrite Rabs_mult, !Rabs_Ropp.
+  apply Rplus_le_compat; [| exact Hf]. apply Rmult_le_compat_r; [apply Rabs_pos | exact Hd].
+Qed.
+
+Lemma multiply_size x y a : Rabs (x * y) <= a -> Rabs (multiply x y) <= (1 + u) * a + / 2 * eta.
+Proof.
+  intro H. replace (multiply x y) with (x * y - (x * y - multiply x y)) by ring.
+  apply Rle_trans with (1 := Rabs_triang _ _). rewrite Rabs_Ropp.
+  pose proof (multiply_near x y). pose proof u_positive.
+  assert (u * Rabs (x * y) <= u * a) by (apply Rmult_le_compat_l; lra). lra.
+Qed.
+
+Section Products.
+Variables (q z big : R).
+Hypotheses (q_positive : 0 <= q) (z_positive : 0 <= z).
+Let g := (1 + u) * (q + u).
+Let f := (1 + u) * (1 + u) * (big * z) + 2 * eta.
+
+Lemma product_fits t : sized q z big t ->
+  fits (4 * eta) g f (product_term t) /\
+  Rabs (product t - (p (product_term t) + e (product_term t) + c (product_term t))) <= rest q z t.
+Proof.
+  intros (Fx & Fxl & Fy & Fyl & Hbig & Hxl & Hy & Hyl).
+  pose proof u_positive as Hu. pose proof eta_positive as He.
+  assert (u1 : u <= 1) by (rewrite u_value; lra).
+  set (X := Rabs (x_hi t)) in *. set (Y := m t) in *.
+  assert (HX : 0 <= X) by apply Rabs_pos.
+  assert (HY : 0 <= Y) by (apply Rle_trans with (2 := Hy); apply Rabs_pos).
+  assert (XY : 0 <= X * Y) by (apply Rmult_le_pos; assumption).
+  set (T := X * (q * Y + z)). set (V := u * (X * Y)).
+  assert (qY : 0 <= q * Y) by (apply Rmult_le_pos; assumption).
+  assert (HT : 0 <= T) by (apply Rmult_le_pos; lra).
+  assert (HV : 0 <= V) by (apply Rmult_le_pos; lra).
+  assert (B0 : Rabs (x_hi t * y_hi t) <= X * Y).
+  { rewrite Rabs_mult. apply Rmult_le_compat; try apply Rabs_pos; [right; reflexivity | exact Hy]. }
+  assert (B1 : Rabs (x_hi t * y_lo t) <= T).
+  { rewrite Rabs_mult. apply Rmult_le_compat; try apply Rabs_pos; [right; reflexivity | exact Hyl]. }
+  assert (B2 : Rabs (x_lo t * y_hi t) <= V).
+  { rewrite Rabs_mult. unfold V. rewrite <- Rmult_assoc.
+    apply Rmult_le_compat; try apply Rabs_pos; assumption. }
+  assert (B3 : Rabs (x_lo t * y_lo t) <= u * T).
+  { rewrite Rabs_mult. unfold T. rewrite <- Rmult_assoc.
+    apply Rmult_le_compat; try apply Rabs_pos; assumption. }
+  set (k1 := multiply (x_hi t) (y_lo t)). set (k2 := multiply (x_lo t) (y_hi t)).
+  assert (F1 : number k1) by apply number_round. assert (F2 : number k2) by apply number_round.
+  assert (E1 : Rabs (x_hi t * y_lo t - k1) <= u * T + / 2 * eta).
+  { apply Rle_trans with (1 := multiply_near _ _). apply Rplus_le_compat_r. apply Rmult_le_compat_l; lra. }
+  assert (E2 : Rabs (x_lo t * y_hi t - k2) <= u * V + / 2 * eta).
+  { apply Rle_trans with (1 := multiply_near _ _). apply Rplus_le_compat_r. apply Rmult_le_compat_l; lra. }
+  assert (S12 : Rabs (k1 + k2) <= (1 + u) * (T + V) + eta).
+  { apply Rle_trans with (1 := Rabs_triang _ _).
+    pose proof (multiply_size _ _ _ B1). pose proof (multiply_size _ _ _ B2). unfold k1, k2. lra. }
+  set (k := add k1 k2).
+  assert (E3 : Rabs (k1 + k2 - k) <= u * ((1 + u) * (T + V) + eta)).
+  { apply Rle_trans with (1 := add_near k1 k2 F1 F2). apply Rmult_le_compat_l; lra. }
+  assert (S3 : Rabs k <= (1 + u) * ((1 + u) * (T + V) + eta)).
+  { apply Rle_trans with (1 := add_size k1 k2 F1 F2). apply Rmult_le_compat_l; lra. }
+  pose proof (two_product_underflow (x_hi t) (y_hi t) Fx Fy) as D.
+  set (pp := fst (two_product (x_hi t) (y_hi t))) in *. set (ee := snd (two_product (x_hi t) (y_hi t))) in *.
+  assert (Sp : Rabs pp <= (1 + u) * (X * Y) + / 2 * eta) by exact (multiply_size _ _ _ B0).
+  assert (Ep : Rabs (x_hi t * y_hi t - pp) <= u * (X * Y) + / 2 * eta).
+  { apply Rle_trans with (1 := multiply_near _ _). apply Rplus_le_compat_r. apply Rmult_le_compat_l; lra. }
+  assert (uV : 0 <= u * V) by (apply Rmult_le_pos; lra).
+  assert (uT : 0 <= u * T) by (apply Rmult_le_pos; lra).
+  assert (ueta : u * eta <= / 4 * eta) by (apply Rmult_le_compat_r; [lra | rewrite u_value; lra]).
+  assert (ueta0 : 0 <= u * eta) by (apply Rmult_le_pos; lra).
+  split.
+  - unfold fits, product_term; cbv zeta; simpl p; simpl e; simpl c; simpl weight. fold pp ee k1 k2 k X Y.
+    assert (Fk : number k) by apply number_round.
+    repeat split; try apply number_round.
+    + change (Rabs pp <= (1 + u) * (X * Y) + eta). lra.
+    + change (Rabs ee <= u * ((1 + u) * (X * Y) + eta) + 4 * eta).
+      replace ee with ((x_hi t * y_hi t - pp) - (x_hi t * y_hi t - (pp + ee))) by ring.
+      apply Rle_trans with (1 := Rabs_triang _ _). rewrite Rabs_Ropp.
+      replace (u * ((1 + u) * (X * Y) + eta)) with (u * (X * Y) + u * V + u * eta) by (unfold V; ring). lra.
+    + change (Rabs k <= g * ((1 + u) * (X * Y) + eta) + f). apply Rle_trans with (1 := S3).
+      assert (Q : X * z <= big * z) by (apply Rmult_le_compat_r; assumption).
+      assert (Q1 : (1 + u) * (1 + u) * (X * z) <= (1 + u) * (1 + u) * (big * z))
+        by (apply Rmult_le_compat_l; [apply Rmult_le_pos; lra | exact Q]).
+      assert (Q2 : 0 <= (q + u) * eta) by (apply Rmult_le_pos; lra).
+      assert (Q3 : 0 <= u * ((q + u) * eta)) by (apply Rmult_le_pos; lra).
+      unfold g, f, T, V.
+      replace ((1 + u) * ((1 + u) * (X * (q * Y + z) + u * (X * Y)) + eta)) with
+        ((1 + u) * (1 + u) * (X * z) + ((1 + u) * (q + u)) * ((1 + u) * (X * Y)) + (1 + u) * eta) by ring.
+      replace ((1 + u) * (q + u) * ((1 + u) * (X * Y) + eta)) with
+        ((1 + u) * (q + u) * ((1 + u) * (X * Y)) + ((q + u) * eta + u * ((q + u) * eta))) by ring.
+      lra.
+  - unfold product, product_term; cbv zeta; simpl p; simpl e; simpl c. fold pp ee k1 k2 k.
+    change (Rabs ((x_hi t + x_lo t) * (y_hi t + y_lo t) - (pp + ee + k)) <= rest q z t).
+    replace ((x_hi t + x_lo t) * (y_hi t + y_lo t) - (pp + ee + k)) with
+      ((x_hi t * y_hi t - (pp + ee)) + ((x_hi t * y_lo t - k1) + ((x_lo t * y_hi t - k2) + ((k1 + k2 - k) + x_lo t * y_lo t))))
+      by ring.
+    apply Rle_trans with (7 / 2 * eta + ((u * T + / 2 * eta) + ((u * V + / 2 * eta) +
+      (u * ((1 + u) * (T + V) + eta) + u * T)))).
+    { apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; [exact D |].
+      apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; [exact E1 |].
+      apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; [exact E2 |].
+      apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; [exact E3 | exact B3]. }
+    unfold rest. fold X Y T V.
+    replace (u * (3 + u) * T) with (3 * (u * T) + u * (u * T)) by ring.
+    replace (u * (2 + u) * V) with (2 * (u * V) + u * (u * V)) by ring.
+    replace (u * ((1 + u) * (T + V) + eta)) with (u * T + u * V + u * (u * T) + u * (u * V) + u * eta) by ring.
+    lra.
+Qed.
+
+Definition total (f : factors -> R) (l : list factors) := fold_right (fun t rest => f t + rest) 0 l.
+
+(* A loop of `gain`: the sum of the products of n pairs in double-double, against the sum in real arithmetic. *)
+Theorem loop_error l G :
+  let terms := map product_term l in let n := INR (length l) in let S := weights terms in
+  Forall (sized q z big) l -> 0 <= big -> (1 + u) ^ (length l + 2) <= G ->
+  Rabs (total product l - (fst (summed terms) + snd (summed terms)))
+    <= error_bound S G (4 * eta) g f n S + total (rest q z) l /\
+  Rabs (fst (summed terms)) <= G * S /\
+  Rabs (snd (summed terms)) <= G * low_bound S G (4 * eta) g f n S.
+Proof.
+  intros terms n S HF Hbig HG.
+  pose proof u_positive as Hu. pose proof eta_positive as He.
+  assert (N : length terms = length l) by apply map_length.
+  assert (Hg : 0 <= g) by (apply Rmult_le_pos; lra).
+  assert (Hf : 0 <= f).
+  { assert (0 <= big * z) by (apply Rmult_le_pos; assumption).
+    assert (0 <= (1 + u) * (1 + u) * (big * z)) by (apply Rmult_le_pos; [apply Rmult_le_pos; lra | assumption]).
+    unfold f. lra. }
+  assert (FT : Forall (fits (4 * eta) g f) terms).
+  { apply Forall_map. apply Forall_impl with (2 := HF). intros t Ht. apply (product_fits t Ht). }
+  destruct (compensated terms G (4 * eta) g f) as (Hx & Hh & Hl); try assumption; try lra.
+  { rewrite N. exact HG. }
+  rewrite N in Hx, Hl. repeat split; try assumption.
+  assert (D : Rabs (total product l - exact terms) <= total (rest q z) l).
+  { unfold terms; clear - HF q_positive z_positive g f. induction l as [| t l IH]; simpl.
+    - rewrite Rminus_0_r, Rabs_R0. lra.
+    - inversion HF as [| t' l' Ht Hl]; subst. specialize (IH Hl).
+      pose proof (proj2 (product_fits t Ht)) as P. simpl p in P; simpl e in P; simpl c in P.
+      match goal with |- Rabs (_ + _ - (?s + _)) <= _ =>
+        replace (product t + total product l - (s + exact (map product_term l))) with
+          ((product t - s) + (total product l - exact (map product_term l))) by ring end.
+      apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; assumption. }
+  replace (total product l - (fst (summed terms) + snd (summed terms))) with
+    ((exact terms - (fst (summed terms) + snd (summed terms))) + (total product l - exact terms)) by ring.
+  apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; assumption.
+Qed.
+End Products.
+
+(* A sum of two numbers that is at most 0 as computed is at most 0. *)
+Theorem sign_kept x y : number x -> number y -> add x y <= 0 -> x + y <= 0.
+Proof.
+  intros Fx Fy H. apply Rnot_lt_le. intro L. pose proof (add_near x y Fx Fy) as N.
+  rewrite (Rabs_pos_eq (x + y)) in N by lra.
+  assert (u * (x + y) < 1 * (x + y)) by (apply Rmult_lt_compat_r; [exact L | rewrite u_value; lra]).
+  pose proof (Rle_abs (x + y - add x y)). lra.
+Qed.
+
+(* The acceptance of a candidate: high + (low + radius) <= 0 as computed. *)
+Theorem accepted_never_gains gamma high low radius :
+  number high -> number low -> number radius ->
+  Rabs (gamma - (high + low)) + u * Rabs (low + radius) <= radius ->
+  add high (add low radius) <= 0 -> gamma <= 0.
+Proof.
+  intros Fh Fl Fr B H.
+  apply sign_kept in H; [| assumption | apply number_round].
+  pose proof (add_near low radius Fl Fr) as N.
+  pose proof (Rle_abs (gamma - (high + low))). pose proof (Rle_abs (low + radius - add low radius)). lra.
+Qed.
+
+Print Assumptions loop_error.
+Print Assumptions sign_kept.
+Print Assumptions accepted_never_gains.
