@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-_KINDS = {"SoftLink": "a soft link", "ExternalLink": "a link to another file"}
+_KINDS = {1: "a soft link", 64: "a link to another file"}  # by HDF5's number of the kind
+_HARD = 0
 
 
 def leads_out(file: Any) -> str:
@@ -15,19 +16,17 @@ def leads_out(file: Any) -> str:
     """
     import h5py
 
-    links: list[tuple[str, str]] = []
-    file.visititems_links(lambda name, link: links.append((name, type(link).__name__)))
+    links: list[tuple[bytes, int]] = []
+    file.id.links.visit(lambda name, link: links.append((name, int(link.type))), info=True)
     for name, kind in links:
-        if kind != "HardLink":
-            return f"/{name} is {_KINDS.get(kind, f'a link of the kind {kind}')}"
-    found: list[str] = []
-
-    def look(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
-            if item.external:
-                found.append(f"/{name} is stored in another file")
-            elif item.is_virtual:
-                found.append(f"/{name} is put together from other datasets")
-
-    file.visititems(look)
-    return found[0] if found else ""
+        if kind != _HARD:
+            return f"/{name.decode()} is {_KINDS.get(kind, f'a link of the kind {kind}')}"
+    for name, _ in links:
+        item = h5py.h5o.open(file.id, name)
+        if isinstance(item, h5py.h5d.DatasetID):
+            made = item.get_create_plist()
+            if made.get_external_count():
+                return f"/{name.decode()} is stored in another file"
+            if made.get_layout() == h5py.h5d.VIRTUAL:
+                return f"/{name.decode()} is put together from other datasets"
+    return ""

@@ -417,10 +417,10 @@ def dataset_of(group: Any, name: str, path: str) -> Any:
     """Return a dataset of `group` as it is in its file; raises as `read_values`."""
     import h5py
 
-    within = isinstance(group, h5py.Group)  # "in" would read a dataset through, however long it says it is
-    if not within or name not in group or not isinstance(group[name], h5py.Dataset):
+    within = isinstance(group, h5py.Group)  # "get" would read a dataset through, however long it says it is
+    dataset = group.get(name) if within else None
+    if not isinstance(dataset, h5py.Dataset):
         raise RunFileError(f"{path}: {group.name}/{name} is missing")
-    dataset = group[name]
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():
         raise RunFileError(f"{path}: {group.name}/{name} states {dataset.size} values, more than its bytes can hold")
     return dataset
