@@ -14,6 +14,7 @@ from iapb.names import in_metres
 from iapb.run import Run
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 UNACCOUNTED = 0.02  # share of the energy at hand that a first-order step may make up
 DEEP = 0.5  # of the thinner shape: an overlap beyond is no contact of rigid bodies
@@ -159,28 +160,37 @@ def _crossed(height: Floats) -> int:
 
 
 def _squeezed(run: Run) -> str:
-    """Circles and balls that go on by their size between walls that leave them a tenth too little room."""
+    """Bodies that go on by their size between walls that leave them a tenth too little room."""
     bodies, table = run.scene_resolved.get("bodies", []), run.contacts
     if not len(table.gap) or len(bodies) != len(run.body_names):
         return ""
     for b, body in enumerate(bodies):
-        shapes = body.get("shapes", ())
         rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
-        if len(rows) < 2 or any("radius" not in shape for shape in shapes):
+        size = _size(body.get("shapes", ()))
+        if len(rows) < 2 or not math.isfinite(size):
             continue
         step = np.searchsorted(table.offsets, rows, "right") - 1
-        one, other = rows[:-1], rows[1:]
-        facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
-        narrow, size = -(table.gap[one] + table.gap[other]), _size(shapes)
-        caught = np.flatnonzero((step[:-1] == step[1:]) & facing & (narrow > NARROW * size))
+        caught, narrow = _pressed(step, table.normal[rows], table.gap[rows], NARROW * size)
         if not len(caught):
             continue
-        place = run.pose[step[caught], b, : 2 if run.pose.shape[-1] == 3 else 3]
+        place = run.pose[caught, b, : 2 if run.pose.shape[-1] == 3 else 3]
         far = float(np.linalg.norm(place - place[0], axis=1).max())
         if far > size:
-            wide = in_metres(float(narrow[caught].max()))
+            wide = in_metres(narrow)
             return f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is {wide} narrower than it"
     return ""
+
+
+def _pressed(step: Integers, normal: Floats, gap: Floats, least: float) -> tuple[Integers, float]:
+    """Steps (ascending) in which two contacts that face each other overlap by more than `least`, and by how much."""
+    found, widest = [], 0.0
+    for apart in range(1, int(np.bincount(step - step[0]).max())):  # contacts of a step stand together
+        facing = np.einsum("ij,ij->i", normal[:-apart], normal[apart:]) < -0.9
+        narrow = -(gap[:-apart] + gap[apart:])
+        caught = (step[:-apart] == step[apart:]) & facing & (narrow > least)
+        found.append(step[:-apart][caught])
+        widest = max(widest, float(narrow[caught].max(initial=0.0)))
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *found])), widest
 
 
 def _flew(run: Run) -> str:

@@ -246,3 +246,19 @@ def test_a_body_that_lands_sliding_needs_friction_in_its_impacts(values: dict[st
         assert "meet at 1.4 m/s and slide at 1 m/s" in said
         paper, rough = simulate(made).q[-1, 0], simulate(made, ImpulseAugmented(friction_in_impacts=True)).q[-1, 0]
         assert paper - rough > 0.05 * SIDE  # so much farther it goes without
+
+
+def in_gap(wide: float, **contact: Any) -> Scene:
+    """A box between two walls that stand apart by less or more than its side."""
+    walls = [{"name": name, "kind": "box", "size": [0.5, 1.0], "center": [side * (0.25 + 0.5 * wide), 0.0]}
+             for name, side in (("left", -1.0), ("right", 1.0))]
+    return scene(box(height=-0.5 * SIDE), walls=walls, duration=0.5, stiffness=1e4, damping=50.0, **contact)
+
+
+@pytest.mark.parametrize(("wide", "said"), [(0.06, True), (0.095, False), (0.11, False)])
+def test_a_box_that_falls_through_a_gap_too_narrow_for_it_is_not_trusted(wide: float, said: bool) -> None:
+    run = simulate(in_gap(wide))
+    assert run.q[-1, 1] < -SIDE
+    assert any("in a gap that is 40 mm narrower" in why for why in run.distrust) == said
+    held = simulate(in_gap(wide, friction=0.5))
+    assert not any("narrower" in why for why in held.distrust)  # friction holds it there, or it has room

@@ -129,3 +129,15 @@ def test_an_incomplete_run_is_handed_on_only_to_who_asks_for_it():
         require_complete(replace(run, stopped="too fast"))
     whole = replace(run, complete=True, stopped="")
     assert require_complete(whole) is whole
+
+
+@pytest.mark.parametrize("world", ["ideal", "ideal-friction"])
+def test_a_box_in_a_gap_too_narrow_for_it_is_not_trusted_in_the_rigid_worlds(world: str) -> None:
+    walls = [{"name": name, "kind": "box", "size": [0.5, 1.0], "center": [x, 0.0]} for name, x in
+             (("left", -0.28), ("right", 0.28))]
+    body = {"name": "box", "joint": "planar", "mass": 1.0, "inertia": 0.0017, "position": [0.0, 0.0, 0.0],
+            "shapes": [{"kind": "box", "size": [0.1, 0.1]}]}
+    scene = Scene.model_validate({"name": "gap", "rate": 1000.0, "duration": 0.3, "gravity": [0, -9.81],
+                                  "bodies": [body], "walls": walls, "contact": {"friction": 0.3}})
+    run = run_world(scene, world)
+    assert any("in a gap that is 40 mm narrower than it" in why for why in run.distrust)
