@@ -33,11 +33,13 @@ SAYS = {
     "two_product_underflow": "two_product(a, b) is within 7/2 of 2⁻¹⁰⁷⁴ of a b always",
     "compensated": "the running bound of a double-double sum of n terms, by induction on n",
     "loop_error": "either loop of `gain`, a double-double sum of n products of pairs: its error and its size",
+    "gain_error": "`gain` as a whole: |Γ − (high + low)| is at most the bounds of its rows and of the sum over them",
+    "entry_fits": "what the code puts in, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), is exact and meets the hypotheses of gain_error",
     "sign_kept": "a sum that is at most 0 as computed is at most 0",
     "accepted_never_gains": "high + (low + radius) ≤ 0 as computed, and a radius that bounds the error: Γ ≤ 0",
 }
 # What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
-ARGUED = ("Argued in prose only: that the bounds of both loops of `gain` together are below its radius, the bounds "
+ARGUED = ("Argued in prose only: that the bound of gain_error is below the radius that `gain` returns, the bounds "
           "of the other three evaluations, and that an overflow is never accepted.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 

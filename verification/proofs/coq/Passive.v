@@ -3,7 +3,8 @@
 
    Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
    always; [compensated], the running bound by induction on the number of terms; [loop_error], the error of either loop of
-   `gain`; [accepted_never_gains], what the comparison with 0 shows. That both loops' bounds are below the radius is not.
+   `gain`; [gain_error], the error of `gain` as a whole; [accepted_never_gains], what the comparison with 0 shows. That the
+   bound of [gain_error] is below the radius that `gain` returns is not proved here: the docstring of `gain` argues it.
 
    Numbers are real numbers of binary64's format whose exponent has no upper end: overflow is not modelled. *)
 
@@ -494,3 +495,111 @@ Qed.
 Print Assumptions loop_error.
 Print Assumptions sign_kept.
 Print Assumptions accepted_never_gains.
+
+(* `gain` itself: rows of factors, one for each coordinate, and the double-double d of its change of velocity. *)
+Record row := Row { d_hi : R; d_lo : R; entries : list factors }.
+Definition row_sum (r : row) := summed (map product_term (entries r)).
+Definition row_weight (r : row) := weights (map product_term (entries r)).
+Fixpoint gamma (rows : list row) :=
+  match rows with [] => 0 | r :: others => (d_hi r + d_lo r) * total product (entries r) + gamma others end.
+
+Lemma fold_numbers terms : forall state, number (fst state) -> number (snd state) ->
+  number (fst (fold_left step terms state)) /\ number (snd (fold_left step terms state)).
+Proof.
+  induction terms as [| y terms IH]; intros state Fh Fl; simpl; [split; assumption |].
+  apply IH; apply number_round.
+Qed.
+
+Lemma summed_numbers terms : number (fst (summed terms)) /\ number (snd (summed terms)).
+Proof. apply fold_numbers; apply generic_format_0. Qed.
+
+Section Gain.
+Variables (G A D : R) (d : nat).
+Hypotheses (G_large : (1 + u) ^ (d + 2) <= G) (A_positive : 0 <= A) (D_positive : 0 <= D).
+
+Definition row_fits (r : row) :=
+  length (entries r) = d /\ Forall (sized u 0 A) (entries r) /\
+  number (d_hi r) /\ number (d_lo r) /\ Rabs (d_hi r) <= D /\ Rabs (d_lo r) <= u * Rabs (d_hi r).
+Definition outer (r : row) := Factors (d_hi r) (d_lo r) (fst (row_sum r)) (snd (row_sum r)) (G * row_weight r).
+
+Let n := INR d.
+Let g1 := (1 + u) * (u + u).
+Let f1 := (1 + u) * (1 + u) * (A * 0) + 2 * eta.
+Let q2 := n * (u * G) + (u + g1).
+Let z2 := G * (n * (4 * eta + f1)).
+Let g2 := (1 + u) * (q2 + u).
+Let f2 := (1 + u) * (1 + u) * (D * z2) + 2 * eta.
+Definition row_error (r : row) :=
+  error_bound (row_weight r) G (4 * eta) g1 f1 n (row_weight r) + total (rest u 0) (entries r).
+Fixpoint rows_error (rows : list row) :=
+  match rows with [] => 0 | r :: others => Rabs (d_hi r + d_lo r) * row_error r + rows_error others end.
+
+Theorem gain_error rows :
+  let terms := map product_term (map outer rows) in let S := weights terms in
+  length rows = d -> Forall row_fits rows ->
+  Rabs (gamma rows - (fst (summed terms) + snd (summed terms)))
+    <= error_bound S G (4 * eta) g2 f2 n S + total (rest q2 z2) (map outer rows) + rows_error rows.
+Proof.
+  intros terms S Hd HF.
+  pose proof u_positive as Hu. pose proof eta_positive as He.
+  assert (n_positive : 0 <= n) by apply pos_INR.
+  assert (G1 : 1 <= G) by (apply Rle_trans with (2 := G_large); apply power_at_least_one).
+  assert (f1_positive : 0 <= f1) by (unfold f1; rewrite Rmult_0_r, Rmult_0_r; lra).
+  assert (g1_positive : 0 <= g1) by (apply Rmult_le_pos; lra).
+  assert (q2_positive : 0 <= q2).
+  { assert (0 <= u * G) by (apply Rmult_le_pos; lra).
+    assert (0 <= n * (u * G)) by (apply Rmult_le_pos; assumption). unfold q2. lra. }
+  assert (z2_positive : 0 <= z2).
+  { apply Rmult_le_pos; [lra |]. apply Rmult_le_pos; [assumption | lra]. }
+  assert (One : forall r, row_fits r ->
+    sized q2 z2 D (outer r) /\
+    Rabs (total product (entries r) - (fst (row_sum r) + snd (row_sum r))) <= row_error r).
+  { intros r (Hn & He' & Fd & Fdl & HD & Hdl).
+    destruct (loop_error u 0 A ltac:(lra) ltac:(lra) (entries r) G He' A_positive) as (Hx & Hh & Hl).
+    { rewrite Hn. exact G_large. }
+    rewrite Hn in Hx, Hl. fold n in Hx, Hl. split; [| exact Hx].
+    destruct (summed_numbers (map product_term (entries r))) as (Fh & Fl).
+    unfold sized, outer; simpl x_hi; simpl x_lo; simpl y_hi; simpl y_lo; simpl m.
+    repeat split; try assumption.
+    apply Rle_trans with (1 := Hl). right. unfold low_bound, q2, z2. fold g1 f1. fold (row_weight r). ring. }
+  assert (HO : Forall (sized q2 z2 D) (map outer rows)).
+  { apply Forall_map. apply Forall_impl with (2 := HF). intros r Hr. apply (One r Hr). }
+  destruct (loop_error q2 z2 D q2_positive z2_positive (map outer rows) G HO D_positive) as (Hx & _ & _).
+  { rewrite map_length, Hd. exact G_large. }
+  rewrite map_length, Hd in Hx. fold n g2 f2 terms S in Hx.
+  assert (Rest : Rabs (gamma rows - total product (map outer rows)) <= rows_error rows).
+  { clear - HF One. induction rows as [| r rows IH]; simpl.
+    - rewrite Rminus_0_r, Rabs_R0. lra.
+    - inversion HF as [| r' rows' Hr Hrows]; subst. specialize (IH Hrows). destruct (One r Hr) as (_ & E).
+      change (product (outer r)) with ((d_hi r + d_lo r) * (fst (row_sum r) + snd (row_sum r))).
+      replace ((d_hi r + d_lo r) * total product (entries r) + gamma rows -
+               ((d_hi r + d_lo r) * (fst (row_sum r) + snd (row_sum r)) + total product (map outer rows))) with
+        ((d_hi r + d_lo r) * (total product (entries r) - (fst (row_sum r) + snd (row_sum r))) +
+         (gamma rows - total product (map outer rows))) by ring.
+      apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; [| exact IH].
+      rewrite Rabs_mult. apply Rmult_le_compat_l; [apply Rabs_pos | exact E]. }
+  replace (gamma rows - (fst (summed terms) + snd (summed terms))) with
+    ((total product (map outer rows) - (fst (summed terms) + snd (summed terms))) +
+     (gamma rows - total product (map outer rows))) by ring.
+  apply Rle_trans with (1 := Rabs_triang _ _). apply Rplus_le_compat; assumption.
+Qed.
+End Gain.
+
+Print Assumptions gain_error.
+
+(* What the code puts in: (M_ij + M_ji) (w_j + v_j) of a row, and w_i - v_i, are exact and meet the hypotheses above. *)
+Definition entry (a b w v : R) :=
+  Factors (fst (two_sum a b)) (snd (two_sum a b)) (fst (two_sum w v)) (snd (two_sum w v)) (Rabs (fst (two_sum w v))).
+
+Theorem entry_fits a b w v A : number a -> number b -> number w -> number v -> Rabs (add a b) <= A ->
+  sized u 0 A (entry a b w v) /\ product (entry a b w v) = (a + b) * (w + v).
+Proof.
+  intros Fa Fb Fw Fv HA. split.
+  - unfold sized, entry; simpl x_hi; simpl x_lo; simpl y_hi; simpl y_lo; simpl m. rewrite Rplus_0_r.
+    repeat split; try apply number_round; try assumption; try apply two_sum_low; try assumption. right. reflexivity.
+  - change (product (entry a b w v)) with
+      ((fst (two_sum a b) + snd (two_sum a b)) * (fst (two_sum w v) + snd (two_sum w v))).
+    rewrite !two_sum_exact by assumption. reflexivity.
+Qed.
+
+Print Assumptions entry_fits.
