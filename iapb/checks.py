@@ -580,10 +580,18 @@ SPARE = 2.0  # contacts that come together later are up to so much lighter than 
 
 
 def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with what `contact.auto` chooses, and what is said of it; the scene itself without auto."""
-    if not scene.contact.auto:
-        return scene, ()
-    start = Start(scene) if start is None else start
+    """Return the scene with what `contact.auto` and `contact.resting_start` choose, and what is said of it.
+
+    The scene itself where it asks for neither.
+    """
+    said: tuple[str, ...] = ()
+    if scene.contact.auto:
+        scene, said = _chosen(scene, Start(scene) if start is None else start)
+    return _at_rest(scene, said) if scene.contact.resting_start else (scene, said)
+
+
+def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
+    """The numbers that `contact.auto` chooses."""
     mobility, rows = start.critical[0]
     mobility *= SPARE if len(start.blocks) > 1 else 1.0
     if mobility == 0.0:
@@ -613,3 +621,58 @@ def _top_speed(start: Start) -> float:
     push = np.abs(start.rows @ start.moved(start.applied[None])[:, 0]).max(initial=0.0)
     speed = np.abs(start.rows @ start.v).max(initial=0.0)
     return float(math.sqrt(speed**2 + 2.0 * push * length))
+
+
+# What `contact.resting_start` chooses
+
+SETTLING = 8  # Newton steps: the rows turn with the bodies, and the displacements are small
+BALANCED = 1e-6  # share of the load that equilibrium may leave
+DIGITS = 10  # of positions in m and rad, so that the last bits of linear algebra do not count
+
+
+def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...]]:
+    """Return the scene where springs and sticking friction hold what touches at the start, and what is said of it."""
+    scene = settling = scene.with_values({"contact.resting_start": False})
+    for _ in range(SETTLING):
+        found = _sunk(Start(settling))
+        if isinstance(found, str):
+            return scene, (*said, f"contact.resting_start: left as given, for {found}")
+        if not found:
+            moved = float(np.abs(start_of(settling)[0] - start_of(scene)[0]).max())
+            return settling, (*said, f"contact.resting_start moved what touches by up to {moved:.3g} m, rad")
+        settling = settling.with_values(found)
+    return scene, (*said, "contact.resting_start: left as given, for no equilibrium was found")
+
+
+def _sunk(start: Start) -> dict[str, Any] | str:
+    """One Newton step towards equilibrium: new positions by path, none where it is reached; or why there is none.
+
+    The load f is held by springs and friction λ: K JᵀJ δ + Tᵀλ = f − K Jᵀg, of which the least √K δ and λ/√K are taken,
+    so that nothing moves along its contacts. No contact may pull, and friction not exceed μ N in all.
+    """
+    if not start.touching or start.scene.contact.stiffness == 0.0:
+        return "nothing touches, or no spring holds it"
+    rows, K = np.concatenate(start.touching), start.scene.contact.stiffness
+    trees = list({tree for i in rows for tree in start.trees(i)})
+    ours = np.isin(start.mechanism.tree_of_body[start.mechanism.arrays.dof_body], trees)
+    if start.v[ours].any() or (start.found.shape_a[rows] == start.found.shape_b[rows]).any():
+        return "what touches moves, or is a joint at its limit"
+    J, g, f = start.rows[rows][:, ours], start.found.gap[rows], start.applied[ours]
+    tangents = [start._row(i, t) for i in rows if start.friction[i] > 0.0 for t in _tangents(start, i)]
+    T = np.array(tangents).reshape(-1, start.mechanism.nv)[:, ours]
+    scale = np.concatenate([np.full(J.shape[1], 1.0 / math.sqrt(K)), np.full(len(T), math.sqrt(K))])
+    held = np.hstack([K * J.T @ J, T.T])
+    solved = scale * np.linalg.lstsq(held * scale, f - K * J.T @ g, rcond=1e-9)[0]
+    delta, friction = solved[: J.shape[1]], solved[J.shape[1] :]
+    push, size = -K * (g + J @ delta), float(np.abs(f).max(initial=0.0))
+    open_load = float(np.abs(f + J.T @ push - T.T @ friction).max(initial=0.0))
+    most = float((start.friction[rows] * np.maximum(push, 0.0)).sum())
+    if open_load > BALANCED * size or push.min() < -BALANCED * size or np.abs(friction).sum() > most + BALANCED * size:
+        return "what touches would slide, tip or fall"
+    if float(np.abs(delta).max()) <= 10.0**-DIGITS:
+        return {}
+    moved = np.zeros(start.mechanism.nv)
+    moved[ours] = delta
+    q, first = start.mechanism.integrate(start.q, moved, 1.0), start.mechanism.arrays.q_start
+    return {f"bodies.{body.name}.position": q[first[b] : first[b] + len(body.position)].round(DIGITS).tolist()
+            for b, body in enumerate(start.scene.bodies) if start.mechanism.tree_of_body[b] in trees}

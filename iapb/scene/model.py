@@ -63,6 +63,10 @@ class Contact(Part):
         description="true: stiffness, damping and coherence_distance are chosen from masses, sizes, gravity and rate "
         "where they are not given; contact: auto is short for it; default false",
     )
+    resting_start: Annotated[bool, Field(strict=True)] = Field(
+        False,
+        description="true: what touches at the start begins where springs and friction hold it; default false",
+    )
     stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default 1000, the paper's walls")
     damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default 50, the paper's walls")
     penalty: Literal["clamped", "printed"] = Field(

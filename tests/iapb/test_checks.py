@@ -262,3 +262,69 @@ def test_a_box_that_falls_through_a_gap_too_narrow_for_it_is_not_trusted(wide: f
     assert any("in a gap that is 40 mm narrower" in why for why in run.distrust) == said
     held = simulate(in_gap(wide, friction=0.5))
     assert not any("narrower" in why for why in held.distrust)  # friction holds it there, or it has room
+
+
+# contact.resting_start
+
+
+def on_slope(**values: Any) -> Scene:
+    """A box of 1 kg on a slope of 20 degrees, its face on it; gravity turns instead of the floor."""
+    tilt = math.radians(20.0)
+    made = scene(box(), stiffness=1e4, damping=100.0, friction=0.5, duration=10.0,
+                 gravity=[9.81 * math.sin(tilt), -9.81 * math.cos(tilt)])
+    return made.with_values(values)
+
+
+def test_a_box_that_sticks_tilts_on_its_springs_and_no_more() -> None:
+    """The lower edge carries more: the springs' tilt moves the centre, by statics, while the edges stay."""
+    run = simulate(on_slope())
+    tilt = -9.81 * math.sin(math.radians(20.0)) * 0.5 * SIDE / (2.0 * 1e4 * (0.5 * SIDE) ** 2)
+    x, y, theta = (run.q[:, k] - run.q[0, k] for k in range(3))
+    assert theta[-1] == pytest.approx(tilt, rel=0.02)
+    edges = [x - 0.5 * SIDE * -np.sin(theta) + side * 0.5 * SIDE * (np.cos(theta) - 1.0) for side in (-1.0, 1.0)]
+    assert max(np.abs(edge).max() for edge in edges) < 1e-4 * 0.5  # sticking: below 0.1 mm in 10 s
+    assert abs(x[-1]) > 1e-4  # its centre is what moves so far
+
+
+def test_from_a_resting_start_it_moves_by_less_than_a_micrometre_in_ten_seconds() -> None:
+    run = simulate(on_slope(**{"contact.resting_start": True}))
+    assert np.abs(run.q - run.q[0]).max() < 1e-6
+    assert "contact.resting_start moved what touches by up to 0.003" in run.remarks[0]
+    assert run.scene_resolved["contact"]["resting_start"] is False  # the record has the start that was used
+    again = simulate(scene_from_text(run.scene_source))
+    assert np.array_equal(again.q, run.q)
+
+
+def test_a_stack_starts_with_the_sag_of_its_weights() -> None:
+    made = scene(*(box(i, SIDE * i) for i in range(3)), stiffness=1e4, damping=50.0, friction=0.3, duration=1.0)
+    run = simulate(made.with_values({"contact.resting_start": True}))
+    assert np.abs(run.q - run.q[0]).max() < 1e-8
+    weights = 9.81 / 2e4 * np.cumsum([3.0, 2.0, 1.0])
+    assert run.q[0, 1::3] - (np.arange(3) + 0.5) * SIDE == pytest.approx(-weights, rel=1e-6)
+    assert np.abs(simulate(made).q[-1] - run.q[-1]).max() < 1e-5
+
+
+def test_a_ball_in_space_and_a_box_on_four_corners_rest() -> None:
+    bodies = [{"name": "ball", "joint": "free_flyer", "mass": 2.0, "inertia": [1e-3] * 3,
+               "shapes": [{"kind": "sphere", "radius": 0.05}], "position": [1.0, 0, 0.05, 0, 0, 0, 1]},
+              {"name": "cube", "joint": "free_flyer", "mass": 1.0, "inertia": [1e-3] * 3,
+               "shapes": [{"kind": "box", "size": [0.1] * 3}], "position": [0, 0, 0.05, 0, 0, 0, 1]}]
+    floor = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
+    run = simulate(SpatialScene.model_validate({
+        "name": "made", "dimensions": 3, "rate": 1000.0, "duration": 0.5, "gravity": [0, 0, -9.81], "bodies": bodies,
+        "walls": [floor], "contact": {"stiffness": 1e4, "damping": 20.0, "friction": 0.4, "resting_start": True}}))
+    assert run.q[0, [2, 9]] - 0.05 == pytest.approx([-2.0 * 9.81 / 1e4, -9.81 / 4e4], rel=1e-6)
+    assert np.abs(run.q - run.q[0]).max() < 1e-8
+
+
+@pytest.mark.parametrize(("values", "why"), [
+    ({"contact.friction": 0.2}, "slide, tip or fall"), ({"bodies.box_0.velocity": [0.1, 0, 0]}, "moves"),
+    ({"bodies.box_0.position": [0, 0.5, 0]}, "nothing touches"), ({"contact.stiffness": 0.0}, "no spring"),
+    ({"gravity": [9.81, -9.81], "contact.friction": 2.0, "bodies.box_0.shapes": [{"kind": "box", "size": [0.02, 0.1]}]},
+     "slide, tip or fall"),
+])
+def test_what_no_spring_holds_starts_as_given_and_that_is_said(values: dict[str, Any], why: str) -> None:
+    given = on_slope(**values)
+    found, (said,) = settled(given.with_values({"contact.resting_start": True}))
+    assert why in said and "left as given" in said
+    assert found.resolved() == given.resolved()

@@ -101,6 +101,7 @@ REFUSED: list[tuple[str, list[Any]]] = [
     ("walls.post.radius", NOT_POSITIVE),
     ("walls.block.size", [[0.0, 1.0], 3]),
     ("contact.auto", [1, "true", None]),
+    ("contact.resting_start", [1, "true", None]),
     ("contact.stiffness", NEGATIVE),
     ("contact.damping", NEGATIVE),
     ("contact.penalty", ["soft", None, True]),
