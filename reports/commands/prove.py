@@ -9,12 +9,14 @@ import typer
 
 from reports.commands.as_json import Json, print_json
 from verification.proofs import all_proofs, check, load
+from verification.proofs.coq_development import NOT_RUN, SAYS, theorems
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 
 
 def prove(
     name: Annotated[str | None, typer.Argument(help="A statement; without it all are checked and listed.")] = None,
-    second_tool: Annotated[bool, typer.Option("--second-tool", help="Let Coq check the certificates, too.")] = False,
+    second_tool: Annotated[bool, typer.Option(
+        "--second-tool", help="Let Coq check the certificates and its own theorems, too.")] = False,
     json_: Json = False,
 ) -> None:
     """Check every machine-checked statement, or print the proof of one."""
@@ -35,6 +37,11 @@ def prove(
     print(f"{len(all_proofs()) - len(failed)} of {len(all_proofs())} statements proved in {seconds:.1f} s; each wrong "
           "twin is refuted by an exact counterexample.")
     if second_tool:
+        for theorem in theorems():
+            holds = {True: "accepted", False: "refused", None: NOT_RUN}[theorem.holds]
+            axioms = ", ".join(theorem.axioms) or "-"
+            print(f"Coq: {holds:<8} {theorem.name:<36} {SAYS[theorem.name]}; axioms: {axioms}")
+            failed += [theorem.name] * (theorem.holds is False)
         _ask_second_tool(CERTIFIED)
     if failed:
         raise typer.Exit(1)

@@ -15,6 +15,7 @@ from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene,
 from iapb.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
+from iapb.scene.reading import scene_from_text
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -114,6 +115,29 @@ def test_a_run_of_the_engine_is_certified_and_a_changed_one_is_not(name: str) ->
     impulse[0] *= 1.0 + 1e-6
     changed = certify(replace(run, impacts=replace(run.impacts, impulse=impulse)))
     assert changed.gains == 0 and not changed.passed and "do not fit" in changed.words()
+
+
+def cradle_between_walls(balls: int, radius: float = 2.0**-6, gap: float = 2.0**-10) -> str:
+    """Discs on a line between two walls, elastic; the first moves. No force acts between collisions."""
+    places = [k * (2.0 * radius + gap) for k in range(balls)]
+    bodies = [f"{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1, position: [{x}], velocity: [{int(k == 0)}], "
+              f"shapes: [{{kind: circle, radius: {radius}}}]}}" for k, x in enumerate(places)]
+    walls = [f"{{name: wall_{k}, kind: half_plane, point: [{x}, 0], normal: [{n}, 0]}}" for k, x, n in
+             ((0, -radius - gap, 1), (1, places[-1] + radius + gap, -1))]
+    contact = "{stiffness: 0, damping: 0, restitution: 1, coherence_distance: 2e-3}"
+    return (f"name: cradle\nrate: 1000\nduration: 1\nbodies: [{', '.join(bodies)}]\n"
+            f"walls: [{', '.join(walls)}]\ncontact: {contact}\n")
+
+
+def test_energy_of_a_cradle_never_rises_between_two_impacts_of_the_record() -> None:
+    """With 1,210,000 steps, 1,008,333 collisions, it loses 5.4e-10 of its energy: 2.4 ε each (run once, by hand)."""
+    run = simulate(scene_from_text(cradle_between_walls(5), "cradle"), steps=3000)
+    table = run.impacts
+    assert certify(run).passed and len(table.step) > 2000 and not run.distrust
+    np.testing.assert_array_equal(table.v_minus[1:], table.v_plus[:-1])  # free flight keeps every bit
+    first = exact_gain(np.eye(5), np.zeros(5), table.v_minus[0])
+    lost = -float(exact_gain(np.eye(5), table.v_minus[0], table.v_plus[-1]) / first)
+    assert 0.0 <= lost < 10 * 5 * 2.0**-52 * len(table.step)
 
 
 def test_a_run_without_impacts_has_nothing_to_certify() -> None:

@@ -58,7 +58,8 @@ class Theorem:
         return None if self.coq == NOT_RUN else self.coq == YES and AXIOMS_OF_THE_REALS.issuperset(self.axioms)
 
 
-def theorems(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[Theorem, ...]:
+def theorems(progress: Callable[[int, int], None] = lambda done, total: None,
+             failures: list[Failure] | None = None) -> tuple[Theorem, ...]:  # fmt: skip
     """Every theorem of the development: compiled where Coq is installed, else "not run here"."""
     files = sorted(path.stem for path in FOLDER.glob("*.v"))
     return tuple(of_each(counted(files, progress), _answered, failures))
