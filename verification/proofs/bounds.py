@@ -19,6 +19,8 @@ How `gain_bound` comes about (‖x‖² = xᵀMx, Δ the candidate change of vel
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from fractions import Fraction
 
 from iapb.errors import ArgumentError
 
@@ -62,6 +64,52 @@ def promised_bound(d: int, kappa: float) -> float:
 def double_double_error(d: int, kappa: float) -> float:
     """τ: what the double-double energies may err by, relative to ‖v‖‖Δ‖."""
     return 16.0 * (d + 1) * math.sqrt(d) * UNIT_ROUNDOFF**2 * kappa
+
+
+def radius_margins(d: int) -> tuple[Fraction | int, Fraction | int, Fraction | int]:
+    """How far the radius of `iapb.contact.kernels.passive.gain` is above what Coq's `accepted_never_gains` asks for.
+
+    `Passive.v` proves a bound of the error of `gain` (gain_error) and of its low part (loop_error) that is linear in
+    W = Σ|Δᵢ||Aᵢⱼ||sⱼ| of the high parts, η Σ|Δᵢ| and η = 2⁻¹⁰⁷⁴. Here are the three coefficients of (1 − u) r − error
+    − u|low|, exactly, where r is what `gain` returns, rounded down: S in it loses at most 2d + 1 roundings and η/2 in
+    each product, `underflow` d + 1 and η/2. G = 1 + 2 (d + 2) u is above (1 + u) to the power d + 2.
+    """
+    u, n = Fraction(1, 2**53), Fraction(d)
+    grown = 1 + 2 * (n + 2) * u  # G
+
+    def error(total: _Linear, b: _Linear, g: Fraction, f: _Linear) -> _Linear:  # error_bound of Passive.v, s = S
+        one = total * (u * grown) + b + f
+        inner = (total * (u * grown) + b) * (2 * n) + total * (2 * u + g + n * (u + g)) + f * n
+        return (inner + one * (n * (n + 1) / 2)) * (grown * u)
+
+    eta, each = _Linear(0, 0, 1), _Linear(0, 1, 0)  # η once, and η times |Δᵢ| of its row
+    row, g1, f1 = _Linear(1 + u, n, 0), 2 * u * (1 + u), Fraction(2)
+    row_error = error(row, each * 4, g1, each * f1) + _Linear(u * u * (5 + 2 * u), 5 * n, 0)
+    q, z, b = n * u * grown + u + g1, grown * n * (4 + f1), eta * 4
+    g, f = (1 + u) * (q + u), _Linear(0, (1 + u) ** 2 * z, 2)
+    total = row * ((1 + u) * grown) + eta * n
+    left = (row * (q * grown) + each * z) * (u * (3 + u)) + row * (u * (2 + u) * u * grown) + eta * (5 * n)
+    wanted = error(total, b, g, f) + left + row_error * (1 + u)
+    low = ((total * (u * grown) + b + f) * n + total * (u + g)) * grown
+    kept, share = 1 - (2 * n + 5) * u, 2 * (n + 6) ** 2 * u * u
+    returned = _Linear(kept * share, kept * 16 * n - share * n, kept * 16 * n - share * n - 2) * (1 - u)
+    margins = returned * (1 - u) + (wanted + low * u) * Fraction(-1)
+    return margins.w, margins.change, margins.one
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """w W + change η Σ|Δᵢ| + one η."""
+
+    w: Fraction | int
+    change: Fraction | int
+    one: Fraction | int
+
+    def __add__(self, other: _Linear) -> _Linear:
+        return _Linear(self.w + other.w, self.change + other.change, self.one + other.one)
+
+    def __mul__(self, factor: Fraction | int) -> _Linear:
+        return _Linear(self.w * factor, self.change * factor, self.one * factor)
 
 
 def gamma(n: int) -> float:

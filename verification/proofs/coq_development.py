@@ -39,8 +39,9 @@ SAYS = {
     "accepted_never_gains": "high + (low + radius) ≤ 0 as computed, and a radius that bounds the error: Γ ≤ 0",
 }
 # What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
-ARGUED = ("Argued in prose only: that the bound of gain_error is below the radius that `gain` returns, the bounds "
-          "of the other three evaluations, and that an overflow is never accepted.")
+ARGUED = ("Not in Coq: that the bound of gain_error is below the radius that `gain` returns (rational numbers show it "
+          "for each d; the rounding of the radius is argued), and, in prose only, the bounds of the other three "
+          "evaluations and that an overflow is never accepted.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 

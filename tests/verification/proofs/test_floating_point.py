@@ -15,6 +15,7 @@ from verification.proofs.bounds import (
     orthogonality_bound,
     projector_bound,
     promised_bound,
+    radius_margins,
     unclamped_bound,
 )
 from verification.proofs.statements.floating_point import energy_factor, energy_factor_above_cutoff
@@ -88,6 +89,13 @@ def test_projector_as_computed_stays_below_its_bound() -> None:
 
 def _square(x: np.ndarray) -> Fraction:
     return sum((Fraction(float(entry)) ** 2 for entry in x), Fraction(0))
+
+
+@pytest.mark.parametrize("sizes", [range(1, 130), (1000, 4096, 10_000, 2**15)])
+def test_radius_of_the_last_step_is_above_the_error_that_coq_proves(sizes: range) -> None:
+    """Each d up to 2¹⁵ was tried once, by hand; beyond some 2⁵² roundings would win."""
+    assert all(min(radius_margins(d)) > 0 for d in sizes)
+    assert min(radius_margins(2**40)) < 0, "the comparison can fail"
 
 
 def test_the_family_against_the_printed_formula_is_what_doubles_compute() -> None:

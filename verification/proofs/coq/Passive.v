@@ -4,7 +4,8 @@
    Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
    always; [compensated], the running bound by induction on the number of terms; [loop_error], the error of either loop of
    `gain`; [gain_error], the error of `gain` as a whole; [accepted_never_gains], what the comparison with 0 shows. That the
-   bound of [gain_error] is below the radius that `gain` returns is not proved here: the docstring of `gain` argues it.
+   bound of [gain_error] is below the radius that `gain` returns is not proved here: `radius_margins` in
+   verification/proofs/bounds.py compares them in rational numbers, for each d.
 
    Numbers are real numbers of binary64's format whose exponent has no upper end: overflow is not modelled. *)
 
