@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
 from functools import cache, partial
@@ -321,17 +322,21 @@ FAULTS: dict[str, Callable[[Path, int], tuple[int, int, int, str]]] = {
 
 
 def try_faults(
-    folder: Path, times: int, faults: Mapping[str, Callable[[Path, int], tuple[int, int, int, str]]] = FAULTS
+    folder: Path, times: int, faults: Mapping[str, Callable[[Path, int], tuple[int, int, int, str]]] = FAULTS,
+    jobs: int = 1,
 ) -> tuple[FaultRecord, ...]:
-    """Do every fault `times` times, each in a folder of its own below `folder`."""
-    records = []
-    for number, (name, fault) in enumerate(faults.items()):
-        place = folder / str(number)
-        place.mkdir(parents=True)
-        records.append(FaultRecord(name, *fault(place, times)))
-        one = records[-1]
-        print(f"{name:<34} {one.tried:>5} tried, {one.survived:>5} survived, {one.lost} lost: {one.said}", flush=True)
-    return tuple(records)
+    """Do every fault `times` times, each in a folder of its own below `folder`, `jobs` faults at once."""
+    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
+        tried = [pool.submit(_tried, name, fault, folder / str(number), times)
+                 for number, (name, fault) in enumerate(faults.items())]
+        return tuple(each.result() for each in tried)
+
+
+def _tried(name: str, fault: Callable[[Path, int], tuple[int, int, int, str]], folder: Path, times: int) -> FaultRecord:
+    folder.mkdir(parents=True)
+    one = FaultRecord(name, *fault(folder, times))
+    print(f"{name:<34} {one.tried:>5} tried, {one.survived:>5} survived, {one.lost} lost: {one.said}", flush=True)
+    return one
 
 
 def main() -> int:
@@ -339,12 +344,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.faults", description=__doc__.splitlines()[0])
     parser.add_argument("--times", type=int, default=120, help="how often each fault is done")
     parser.add_argument("--kills", type=int, default=102, help="how often a command is killed, in all")
+    parser.add_argument("--jobs", type=int, default=1, help="faults that are done at once")
     parser.add_argument("--seconds", type=float, default=inf, help="after which a command is killed no more")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        records = try_faults(Path(folder) / "store", given.times)
         kills = {name: partial(kill, seconds=given.seconds) for name, kill in KILLS.items()}
-        records += try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), kills)
+        records = try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), kills, given.jobs)
+        records = try_faults(Path(folder) / "store", given.times, jobs=given.jobs) + records
     limit = f" --seconds {given.seconds:g}" if given.seconds < inf else ""
     remember("faults", f"python -m tests.robustness.faults --times {given.times} --kills {given.kills}{limit}",
              ("fault", "tried", "survived", "lost", "what one reads"), [astuple(one) for one in records])
