@@ -6,6 +6,7 @@ Whoever has parts to do knows which are done (`do_missing`), and hands the other
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import time
@@ -20,6 +21,8 @@ from typing import Any
 
 from iapb.compiling import tell_from_worker
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+
+_LOUD = ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio")
 
 # Called as scheduler(compute, parts); yields (part, result) as results come.
 Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Generator[tuple[Any, Any]]]
@@ -113,6 +116,8 @@ def _client(address: str) -> Any:
         from distributed import Client
     except ImportError as error:
         raise MissingDependencyError("distributed", "A sweep on a cluster", "pip install 'iapb[cluster]'") from error
+    for name in _LOUD:  # a scheduler that dies is one sentence of ours, without their tracebacks
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout="10s")
     except (OSError, ValueError, TimeoutError) as error:
