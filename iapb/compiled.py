@@ -16,7 +16,7 @@ import struct
 import warnings
 from collections import namedtuple
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -97,8 +97,10 @@ class Entry:
         """Return the machine code's own Python function for arguments of these types."""
         if config.DISABLE_JIT:
             return self._function
-        code: Callable[..., Any] = self._function.compile(tuple(typeof(example) for example in examples))
-        return code
+        kinds = self._function, tuple(_kind(example) for example in examples)
+        if kinds not in _CODES:
+            _CODES[kinds] = self._function.compile(kinds[1])
+        return _CODES[kinds]
 
 
 @kernel
@@ -146,6 +148,41 @@ class Block:
         self._memory = np.array(words, dtype=np.int64)
         self.address = self._memory.ctypes.data
 
+    def twin(self, blank: bool = False) -> Block:
+        """Return a block of the same layout in memory of its own, a copy or all zeros: quicker than making one.
+
+        All its arrays lie in one piece of memory, so that one address gives all the others.
+        """
+        piece = np.zeros(self._size + _LINE, np.uint8)
+        base: int = piece.__array_interface__["data"][0]
+        return self._twin(piece, base, -base % _LINE, blank)[0]
+
+    @cached_property
+    def _size(self) -> int:
+        """Bytes of all arrays and layouts, each rounded up to whole lines."""
+        own = [_rounded(array.nbytes) for array in self._content if isinstance(array, np.ndarray)]
+        nested = [member._size for member in self._content if isinstance(member, Block)]
+        return sum(own) + sum(nested) + _rounded(self._memory.nbytes)
+
+    def _twin(self, piece: np.ndarray, base: int, at: int, blank: bool) -> tuple[Block, int]:
+        """The twin in `piece` from byte `at` on, and the byte after it."""
+        memory = np.ndarray(self._memory.shape, np.int64, piece, at)
+        memory[:] = self._memory
+        made, members = object.__new__(type(self)), list(self._content)
+        made.address, at = base + at, at + _rounded(memory.nbytes)
+        for index, (member, place) in enumerate(zip(self._content, self.block_type.places, strict=True)):
+            if isinstance(member, np.ndarray):
+                members[index] = array = np.ndarray(member.shape, member.dtype, piece, at, member.strides)
+                if not blank:
+                    array[...] = member
+                memory[place + 4], at = base + at, at + _rounded(member.nbytes)
+            elif isinstance(member, Block):
+                members[index], at = member._twin(piece, base, at, blank)
+                memory[place] = members[index].address
+        made.block_type, made._memory = self.block_type, memory
+        made._content = type(self._content)(*members)
+        return made, at
+
     def arrays(self) -> list[np.ndarray]:
         """All arrays, those of nested blocks too."""
         nested = [member.arrays() for member in self._content if isinstance(member, Block)]
@@ -155,6 +192,14 @@ class Block:
         if name.startswith("_"):  # not yet made, as when unpickling
             raise AttributeError(name)
         return getattr(self._content, name)
+
+
+_LINE = 64  # bytes of a cache line: every array of a twin begins at one
+_CODES: dict[Any, Callable[..., Any]] = {}  # kernel and types -> its machine code
+
+
+def _rounded(size: int) -> int:
+    return -(-size // _LINE) * _LINE
 
 
 def columns(name: str, arrays: Mapping[str, Any]) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,6 +59,13 @@ def bytes_per_step(simulation: Any) -> int:
 
 def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
     """Allocate one chunk; `coordinates` = (nq, d, nq_t, d_t)."""
+    made: Record = _first_record(steps, coordinates, contacts, trees).twin(blank=True)
+    return made
+
+
+@lru_cache(maxsize=8)
+def _first_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Any:
+    """A chunk of which blank twins are used; its zeros take no memory until somebody writes to them."""
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
     return block(Record(

@@ -16,6 +16,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -33,7 +34,7 @@ from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device,
 from iapb.recording import Record, Recorder, bytes_per_step, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.system import System, wrenches_of
+from iapb.system import System, system_of, wrenches_of
 from iapb.worlds import find_world
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
@@ -138,7 +139,7 @@ class Simulation:
 
     Parameters
     ----------
-    scene : Scene, the path of a scene file, or the name of a scene that comes with the project.
+    scene : Scene, its `iapb.system.System`, the path of a scene file, or the name of a scene of the project.
     law : contact law; default `ImpulseAugmented()`.
     coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
     device : one that moves by itself (`iapb.haptics.device.Device`); default: the compiled device.
@@ -149,13 +150,14 @@ class Simulation:
     >>> result = simulation.step(hand_force=[0.1, 0.0, 0.0])
     """
 
-    def __init__(self, scene: Scene | str | Path, law: ContactLaw | None = None,
+    def __init__(self, scene: Scene | System | str | Path, law: ContactLaw | None = None,
                  coupling: Coupling | None = None, device: Device | None = None) -> None:
         self.law: Any = ImpulseAugmented() if law is None else _checked_law(law)
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
             raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
-        self.system = System(scene if isinstance(scene, Scene) else load_scene(find_scene(scene)))
+        self.system = scene if isinstance(scene, System) else System(
+            scene if isinstance(scene, Scene) else load_scene(find_scene(scene)))
         self.scene = self.system.scene
         self.state = self.system.make_state()
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
@@ -340,15 +342,29 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         Stopped before the first step was done: there is nothing to return.
     """
     if not isinstance(scene, Scene):
-        scene = load_scene(find_scene(scene))
+        scene = _scene_at(find_scene(scene))
     if world and law is None:
         chosen = find_world(world)
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
-    simulation = Simulation(scene, law, coupling)
+    simulation = Simulation(system_of(scene), law, coupling)
     total = simulation.scene.steps if steps is None else _step_count(steps)
     _fits(simulation, total, _half_of_memory() if max_memory is None else max_memory)
     with compiling_told(to_stderr):
         return _simulated(simulation, world, total, progress, checkpoint)
+
+
+def _scene_at(path: Path) -> Scene:
+    """The scene of a file, read again where its text has changed; one with a robot always, for that is a file too."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return load_scene(path)  # which says what is wrong
+    return load_scene(path) if "urdf" in text else _scene_of(path, text)
+
+
+@lru_cache(maxsize=8)
+def _scene_of(path: Path, text: str) -> Scene:
+    return load_scene(path)
 
 
 def _simulated(simulation: Simulation, world: str, total: int, progress: Callable[[int, int], None] | None,

@@ -63,6 +63,7 @@ class System:
     """
 
     def __init__(self, scene: Scene) -> None:
+        self.given = scene
         self.scene, self.remarks = settled(scene)
         scene = self.scene
         self.mechanism: Mechanism = mechanism_of(scene)
@@ -78,6 +79,7 @@ class System:
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
         self._device: Mechanism | None = None
         self._worlds: dict[Any, World] = {}
+        self._first: dict[Any, Any] = {}  # states and ports at the start, of which copies are used
         self._advances: dict[Any, Entry] = {}
 
     def _held_body(self) -> int:
@@ -130,7 +132,10 @@ class System:
 
     def make_state(self) -> State:
         """A fresh state at the scene's start."""
-        return make_state(self)
+        if "state" not in self._first:
+            self._first["state"] = make_state(self)
+        state: State = self._first["state"].twin()
+        return state
 
     def advance_under(self, law: Any) -> Entry:
         """The compiled step of one of the engine's laws, to be called again and again (cached)."""
@@ -142,7 +147,12 @@ class System:
         `effects` is what `decide` gives for the law; default: of ImpulseAugmented().
         """
         decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
-        return _make_port(self, coupling, active_names(decided), external)
+        on = active_names(decided)
+        key = coupling.kind, *(tuple(gains) for gains in coupling.settings.values()), on, external
+        if key not in self._first:
+            self._first[key] = _make_port(self, coupling, on, external)
+        port: Port = self._first[key].twin()
+        return port
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """What is on under a law and a coupling: the world, the port and the record are made from it."""
@@ -151,7 +161,22 @@ class System:
 
 def _key(law: Any) -> tuple[Any, ...]:
     """What a world depends on besides the scene."""
-    return law.impulses, law.integrator, law.rendering, law.friction_in_impacts
+    return law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.impulses and law.pushing
+
+
+_KEPT = 8
+_SYSTEMS: dict[int, System] = {}  # by the identity of the scene, which the system keeps alive
+
+
+def system_of(scene: Scene) -> System:
+    """Return the system of a scene, the same for the same scene: a scene never changes, nor does its system."""
+    found = _SYSTEMS.pop(id(scene), None)
+    if found is None or found.given is not scene:
+        found = System(scene)
+    _SYSTEMS[id(scene)] = found  # the latest last
+    while len(_SYSTEMS) > _KEPT:
+        del _SYSTEMS[next(iter(_SYSTEMS))]
+    return found
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:

@@ -231,3 +231,46 @@ def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         assert module.scaled(x) == factor * 2.0
+
+
+class Leaf(NamedTuple):
+    """Nested."""
+
+    values: np.ndarray
+    flags: np.ndarray
+
+
+class Tree(NamedTuple):
+    """With numbers, an empty array and a nested tuple."""
+
+    inner: Leaf
+    size: float
+    matrix: np.ndarray
+    nothing: np.ndarray
+
+
+@kernel
+def fill(outer):
+    for k in range(outer.inner.values.shape[0]):
+        outer.inner.values[k] = outer.size + k
+        outer.inner.flags[k] = k
+    outer.matrix[1, 2] += outer.size
+    return outer.nothing.shape[1]
+
+
+def test_a_twin_is_a_block_of_its_own_in_aligned_memory() -> None:
+    first = block(Tree(Leaf(np.arange(3.0), np.arange(3, dtype=np.int8)), 7.0, np.ones((2, 3)), np.zeros((0, 4))))
+    copied, blank = first.twin(), first.twin(blank=True).twin()
+    assert copied.block_type is first.block_type is blank.block_type
+    for one, other in zip(first.arrays(), copied.arrays(), strict=True):
+        np.testing.assert_array_equal(one, other)
+        assert one.dtype == other.dtype and other.ctypes.data % 64 == 0 and not np.shares_memory(one, other)
+    assert not any(array.any() for array in blank.arrays()) and blank.size == 7.0
+    assert fill(copied) == 4
+    np.testing.assert_array_equal(copied.inner.values, [7.0, 8.0, 9.0])
+    np.testing.assert_array_equal(first.inner.values, [0.0, 1.0, 2.0])
+    assert (copied.matrix[1, 2], first.matrix[1, 2], blank.matrix[1, 2]) == (8.0, 1.0, 0.0)
+    before = copied.twin()
+    del copied
+    gc.collect()
+    assert before.inner.values[2] == 9.0 and fill(before) == 4

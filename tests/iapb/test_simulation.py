@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,3 +219,25 @@ def test_a_run_is_saved_by_what_an_installed_package_offers(monkeypatch):
 
     monkeypatch.setattr(lazy, "entry_points", lambda **asked: [Offered()])
     assert run.save("run.h5", replace=True) == ("run.h5", True, True)
+
+
+@pytest.mark.parametrize("name", ["peg_corner", "bernoulli_balls", "box_stack"])
+def test_a_scene_simulated_again_gives_the_same_bits_whatever_ran_between(name: str) -> None:
+    """`simulate` keeps the system of a scene: nothing of one run may reach the next."""
+    scene = load_scene(find_scene(name))
+    laws = [ImpulseAugmented(), ImpulseAugmented(pushing=True), Penalty(), ImpulseAugmented(integrator="midpoint")]
+    alone = [simulate(load_scene(find_scene(name)), law, steps=300) for law in laws]
+    for law, first in [*zip(laws, alone, strict=True), *zip(laws[::-1], alone[::-1], strict=True)]:
+        again = simulate(scene, law, steps=300)
+        for array in ("q", "v", "impulse", "penalty_force", "state"):
+            assert getattr(again, array).tobytes() == getattr(first, array).tobytes(), (law, array)
+
+
+def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "wall.yaml"
+    text = find_scene("wall_1d").read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    first = simulate(path, steps=5)
+    assert simulate(path, steps=5).q.tobytes() == first.q.tobytes()
+    path.write_text(text.replace("name: wall_1d", "name: another_wall"), encoding="utf-8")
+    assert simulate(path, steps=5).scene_name == "another_wall"
