@@ -24,6 +24,7 @@ FOLDERS: dict[str, tuple[str, ...]] = {
 PACKAGES: dict[str, tuple[str, ...]] = {
     "engines": ("mujoco", "pin", "pybullet", "drake", "siconos"),
     "mechanics": ("pin", "coal"),
+    "accuracy": ("daqp", "quantecon"),
     "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",
                         "pin", "siconos"),
     "haptic-rate": ("mujoco", "pybullet", "drake", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),

@@ -10,7 +10,7 @@ from reports.commands.bench import seconds_of
 from reports.figures.cost import budget_share, impact_accuracy
 from reports.figures.cost import which_method as drawn_choices
 from verification import which_method
-from verification.cost import impacts
+from verification.cost import calls, impacts
 from verification.cost.calls import KernelCall, LemkeCall, SweepsCall, engine_call
 from verification.cost.impacts import (
     COMPILED,
@@ -120,6 +120,16 @@ def test_a_failure_is_recorded_with_its_reason(monkeypatch: pytest.MonkeyPatch) 
     row = work_precision([(4, 3)], 3, ways).records()[0]
     assert row["outcome"] == "failed: no solution" and row["relative error"] is row["time"] is None
     assert row["failed after"] > 0.0
+
+
+def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise ImportError("no quantecon")
+
+    monkeypatch.setattr(calls, "import_lcp_lemke", missing)
+    found = work_precision([(1, 3)], 3, [way for way in WAYS if way.method == impacts.LEMKE])
+    assert all("quantecon" in outcome for outcome in found.column("outcome"))
+    assert impacts.LEMKE not in order_bias(1, 3, rounds=3).column("method")
 
 
 def test_order_bias_has_a_row_per_method() -> None:
