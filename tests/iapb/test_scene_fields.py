@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -125,6 +126,15 @@ def test_functions_of_python_become_a_table_that_the_run_records() -> None:
     assert scene_from_text(run.scene_source).hand == scene.hand
     with pytest.raises(ArgumentError, match="with a hand"):
         load_scene(find_scene("newton_cradle")).with_hand_force(lambda t: [0.0, 0.0, 0.0])
+
+
+def test_sines_and_cosines_hold_for_every_double() -> None:
+    """Against more digits than the digits they work with: also next to a zero, and where whole turns are most of x."""
+    nearest = 6381956970095103.0 * 2.0**797  # the double that comes nearest to a multiple of pi/2
+    with mpmath.workdps(700):
+        for x in (1e-300, 0.7, math.pi, 0.5 * math.pi, -355.0, 1e15, 1e22, 1e30, 1e39, 1e45, 1e308, nearest):
+            assert function_of("sin(t)")(x) == float(mpmath.sin(mpmath.mpf(x)))
+            assert function_of("cos(t)")(x) == float(mpmath.cos(mpmath.mpf(x)))
 
 
 def test_functions_are_arithmetic_alone() -> None:
