@@ -109,6 +109,8 @@ def _friction_pairs(
         for k, name in enumerate(between):
             if name not in names and None not in names:
                 yield located((*where, i, "between", k), name, "the name of a body or a wall of this scene")
+        if len(between) == 2 and between[0] == between[1]:
+            yield located((*where, i, "between"), list(between), "two different things")
         if frozenset(between) in seen:
             yield located((*where, i, "between"), list(between), "two things that no earlier pair names")
         seen.add(frozenset(between))

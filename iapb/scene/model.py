@@ -342,13 +342,18 @@ class Scene(Part):
         Raises
         ------
         ArgumentError
-            a scene without a hand, or of more than MAX_ROWS steps.
+            a scene without a hand, or of more than MAX_ROWS steps; a function that returns no list of numbers.
         SceneError
             values that are no forces.
         """
         if self.hand is None or self.steps > MAX_ROWS:
             raise ArgumentError("scene", self.name, f"a scene with a hand and at most {MAX_ROWS:,} steps")
-        rows = [[k * self.step, *_plain(function(k * self.step))] for k in range(self.steps)]
+        rows = []
+        for k in range(self.steps):
+            force = _plain(function(k * self.step))
+            if not isinstance(force, list | tuple):
+                raise ArgumentError("function", force, f"{len(self.hand.force)} numbers, not one thing, at each time")
+            rows.append([k * self.step, *force])
         none = [0.0] * len(self.hand.force)
         return self.with_values({"hand.force": none, "hand.force_table": rows, "hand.force_function": []})
 

@@ -84,11 +84,12 @@ def test_friction_of_a_body_acts_in_impacts_and_by_the_papers_law(law: Any) -> N
 
 def test_pairs_name_things_of_the_scene_once() -> None:
     pairs = [{"between": ["box", "flor"], "friction": 0.1}, {"between": ["box", "floor"], "friction": 0.1},
-             {"between": ["floor", "box"], "friction": 0.2}]
+             {"between": ["floor", "box"], "friction": 0.2}, {"between": ["box", "box"], "friction": 0.2}]
     with pytest.raises(SceneError) as caught:
         on_slope(**{"contact.friction_pairs": pairs})
     assert [mistake.path for mistake in caught.value.mistakes] == [
-        "contact.friction_pairs[0].between[1]", "contact.friction_pairs[2].between"]
+        "contact.friction_pairs[0].between[1]", "contact.friction_pairs[2].between",
+        "contact.friction_pairs[3].between"]
 
 
 # The hand's force over time
@@ -126,6 +127,12 @@ def test_functions_of_python_become_a_table_that_the_run_records() -> None:
     assert scene_from_text(run.scene_source).hand == scene.hand
     with pytest.raises(ArgumentError, match="with a hand"):
         load_scene(find_scene("newton_cradle")).with_hand_force(lambda t: [0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("nothing", [None, 1.0, "no"])
+def test_a_function_of_python_without_numbers_is_refused_by_name(nothing: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"function = .*: expected 3 numbers"):
+        pushed(duration=0.1).with_hand_force(lambda t: nothing)
 
 
 def test_sines_and_cosines_hold_for_every_double() -> None:
