@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
@@ -81,9 +82,9 @@ def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:
 
 def _archived(path: Path) -> dict[str, np.ndarray]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in (*_GIVEN, "impulse") if name in archive.files}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise RunFileError(f"{path}: no archive of arrays: {error}") from None
     missing = [name for name in _GIVEN if name not in arrays]
     if missing:

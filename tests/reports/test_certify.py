@@ -54,6 +54,12 @@ def test_a_gain_of_the_last_bit_is_shown_and_ends_with_1(tmp_path: Path, capsys:
 def test_what_holds_no_impacts_is_refused_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
     (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
-    for name, reason in (("half.npz", "mass_matrix, v_plus missing"), ("text.npz", "no archive")):
+    (tmp_path / "empty.npz").touch()
+    with (tmp_path / "array.npz").open("wb") as file:
+        np.save(file, np.ones(2))
+    whole = archive(tmp_path / "whole.npz", False).read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    for name, reason in (("half.npz", "mass_matrix, v_plus missing"), ("text.npz", "no archive"),
+                         ("empty.npz", "no archive"), ("array.npz", "no archive"), ("cut.npz", "no archive")):
         assert main(["certify", str(tmp_path / name)]) == 1
         assert reason in capsys.readouterr().err
