@@ -72,6 +72,25 @@ def test_what_is_no_file_of_impacts_is_refused(checker: Path, tmp_path: Path, te
     assert done.returncode == 2 and said in done.stderr
 
 
+@needs_ocaml
+@pytest.mark.parametrize("word", [
+    "0x7fffffffffffffff", "0u9223372036854775807", "0b1", "0o7", "1_0", "+1", "-", "--1", "1\r",
+    "4611686018427387904", "-4611686018427387904"])  # fmt: skip
+def test_a_number_is_decimal_and_has_62_bits(checker: Path, tmp_path: Path, word: str) -> None:
+    """A literal that OCaml wraps to −1 would hide a gain: M = 1, v = 1, w = 2⁶³ − 1."""
+    (tmp_path / "impacts.txt").write_bytes(f"{EXPORT_HEAD}\n1 1 0 1 0 {word} 0\n".encode())
+    done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
+    assert done.returncode == 2 and "line 2: no whole number" in done.stderr and "yes" not in done.stdout
+
+
+@needs_ocaml
+def test_the_largest_number_is_read(checker: Path, tmp_path: Path) -> None:
+    largest = 2**62 - 1
+    (tmp_path / "impacts.txt").write_text(f"{EXPORT_HEAD}\n1 1 0 {largest} 0 {-largest} 0\n", encoding="utf-8")
+    done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("yes\n")
+
+
 def test_exported_integers_are_the_doubles() -> None:
     mass, v, w = np.array([[2.0, 5e-324], [-0.0, 1e308]]), np.array([[1.5, -0.1]]), np.array([[0.0, 3.0]])
     (line,) = exported(mass, v, w)

@@ -8,8 +8,11 @@ let rec natural n = if n = 0 then O else S (natural (n - 1))
 
 exception Malformed of string
 
+(* Decimal digits after at most one minus sign. OCaml reads 0x and 0u literals modulo 2^63, so a large one turns negative. *)
 let number word =
-  match int_of_string_opt word with
+  let digits = if String.starts_with ~prefix:"-" word then String.sub word 1 (String.length word - 1) else word in
+  let decimal = digits <> "" && String.for_all (fun c -> '0' <= c && c <= '9') digits in
+  match if decimal then int_of_string_opt word else None with
   | Some n when n <> min_int -> n
   | _ -> raise (Malformed ("no whole number of at most 62 bits: " ^ word))
 
