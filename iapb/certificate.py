@@ -25,7 +25,7 @@ from iapb.scene.model import Scene, scene_kind
 
 Floats = NDArray[np.float64]
 
-EXPORT_HEAD = "iapb impacts 1"  # first line of a file of exported impacts
+EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # of so many impacts that a bound decides, one is judged by integers as well
 _BATCH = 4096  # impacts whose mass matrices are at hand at once
 # M (v⁺ − v⁻) and the recorded impulse, or Jᵀp of the recorded contacts, agree to rounding of a well-built record.
@@ -228,7 +228,8 @@ def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> I
     """Write each impact as a line of integers, for a judge that shares no code with this one.
 
     A line is d and then a mantissa and an exponent of two for each entry of M, row by row, of v⁻ and of v⁺. Nothing is
-    rounded. The file starts with `EXPORT_HEAD`. Arguments are those of `judge_gains`, for n impacts.
+    rounded. The file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. Arguments are those of
+    `judge_gains`, for n impacts.
     """
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
     masses = np.asarray(mass_matrix, np.float64)

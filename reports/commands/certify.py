@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, TextIO
@@ -17,8 +16,9 @@ from rich.table import Table
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.certificate import EXPORT_HEAD, exported, exported_run
-from iapb.errors import RunFileError
+from iapb.errors import ArgumentError, RunFileError
 from reports.commands.as_json import Json, print_json
+from reports.store.io import written_aside
 from reports.store.runs import read_run
 
 _GIVEN = ("mass_matrix", "v_minus", "v_plus")
@@ -32,11 +32,8 @@ def certify(
     json_: Json = False,
 ) -> None:
     """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
-    with ExitStack() as stack:
-        target = stack.enter_context(export.open("w", encoding="utf-8")) if export else None
-        if target:
-            target.write(f"{EXPORT_HEAD}\n")
-        found = {path: certificate_of(path, target) for given in files for path in _files(given)}
+    paths = list(dict.fromkeys(path for given in files for path in _files(given)))
+    found = _exported(paths, export) if export else {path: certificate_of(path) for path in paths}
     failed = [path for path, one in found.items() if not one.passed]
     if json_:
         judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
@@ -45,6 +42,17 @@ def certify(
         _print(found, failed)
     if failed:
         raise typer.Exit(1)
+
+
+def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
+    """Certify the files and write their impacts to `export`, which stays as it was where one cannot be read."""
+    if export.exists() and (not export.is_file() or any(path.exists() and path.samefile(export) for path in paths)):
+        raise ArgumentError("--export", str(export), "a file of its own, none of those that are certified")
+    with written_aside(export.resolve(), replace=True) as aside, aside.open("w", encoding="utf-8") as target:
+        target.write(f"{EXPORT_HEAD}\n")
+        found = {path: certificate_of(path, target) for path in paths}
+        target.write(f"end {sum(one.impacts for one in found.values())}\n")
+    return found
 
 
 def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:

@@ -35,13 +35,30 @@ def test_impacts_of_runs_and_archives_are_exported_as_integers(tmp_path: Path) -
     np.savez(tmp_path / "other.npz", mass_matrix=[[1.0]], v_minus=[[1.5]], v_plus=[[-1.5]])
     files = str(tmp_path / "run.h5"), str(tmp_path / "other.npz")
     assert main(["certify", *files, "--export", str(tmp_path / "impacts.txt")]) == 0
-    head, *impacts = (tmp_path / "impacts.txt").read_text(encoding="utf-8").splitlines()
-    assert head == "iapb impacts 1" and len(impacts) == len(run.impacts.step) + 1 > 1
+    head, *impacts, end = (tmp_path / "impacts.txt").read_text(encoding="utf-8").splitlines()
+    assert head == "iapb impacts 2" and len(impacts) == len(run.impacts.step) + 1 > 1 and end == f"end {len(impacts)}"
     size, *numbers = map(float, impacts[-1].split())
     assert size == 1.0 and [m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)] == [1.0, 1.5, -1.5]
     d, *numbers = map(int, impacts[0].split())
     after = [np.ldexp(float(m), e) for m, e in zip(numbers[-2 * d::2], numbers[-2 * d + 1::2], strict=True)]
     assert after == run.impacts.v_plus[0].tolist()
+
+
+def test_export_destroys_neither_its_input_nor_an_older_export(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, export = archive(tmp_path / "other.npz", False), tmp_path / "impacts.txt"
+    before = given.read_bytes()
+    (tmp_path / "link.txt").symlink_to(given)
+    (tmp_path / "hard.txt").hardlink_to(given)
+    for name in ("other.npz", "link.txt", "hard.txt", "."):
+        assert main(["certify", str(given), "--export", str(tmp_path / name)]) == 1
+        assert "--export" in capsys.readouterr().err and given.read_bytes() == before
+    assert main(["certify", str(given), str(given), "--export", str(export)]) == 0
+    whole = export.read_text(encoding="utf-8")
+    assert whole.splitlines()[3:] == ["end 2"]  # a file that is named twice is judged and exported once
+    assert main(["certify", str(given), str(tmp_path / "absent.npz"), "--export", str(export)]) == 1
+    assert export.read_text(encoding="utf-8") == whole
+    assert not list(tmp_path.glob(".*"))  # nothing is left aside
 
 
 def test_a_gain_of_the_last_bit_is_shown_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -54,6 +54,7 @@ def test_the_extracted_checker_judges_as_the_exact_judge_does(checker: Path, tmp
         impacts = near_the_border(IMPACTS // 4, d, rng, decades)
         lines += exported(*impacts)
         gained += judge_gains(*impacts).gained.tolist()
+    lines.append(f"end {len(gained)}")
     (tmp_path / "impacts.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
     *answers, total = done.stdout.splitlines()
@@ -63,7 +64,11 @@ def test_the_extracted_checker_judges_as_the_exact_judge_does(checker: Path, tmp
 
 @needs_ocaml
 @pytest.mark.parametrize(("text", "said"), [
-    ("", "empty"), ("1 1 0 1 0 1 0\n", "first line"), (f"{EXPORT_HEAD}\n1 1 0 1 0 1\n", "line 2: too few"),
+    ("", "line 1: the file is cut"), ("1 1 0 1 0 1 0\n", "first line"),
+    (f"{EXPORT_HEAD}\n1 1 0 1 0 1\n", "line 2: too few"),
+    (f"{EXPORT_HEAD}\n", "line 2: the file is cut"), (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0\n", "line 3: the file is cut"),
+    (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0\nend 2\n", '"end 2", but 1 impacts'), (f"{EXPORT_HEAD}\nend\n", '"end", but 0'),
+    (f"{EXPORT_HEAD}\nend 0\n1 1 0 1 0 2 0\n", "line 3: a line after the end"),
     (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0 5\n", "too many"), (f"{EXPORT_HEAD}\n1 0.5 0 1 0 1 0\n", "whole number"),
     (f"{EXPORT_HEAD}\n\n", "empty line"), (f"{EXPORT_HEAD}\n0\n", "below 1")])  # fmt: skip
 def test_what_is_no_file_of_impacts_is_refused(checker: Path, tmp_path: Path, text: str, said: str) -> None:
@@ -78,7 +83,7 @@ def test_what_is_no_file_of_impacts_is_refused(checker: Path, tmp_path: Path, te
     "4611686018427387904", "-4611686018427387904"])  # fmt: skip
 def test_a_number_is_decimal_and_has_62_bits(checker: Path, tmp_path: Path, word: str) -> None:
     """A literal that OCaml wraps to −1 would hide a gain: M = 1, v = 1, w = 2⁶³ − 1."""
-    (tmp_path / "impacts.txt").write_bytes(f"{EXPORT_HEAD}\n1 1 0 1 0 {word} 0\n".encode())
+    (tmp_path / "impacts.txt").write_bytes(f"{EXPORT_HEAD}\n1 1 0 1 0 {word} 0\nend 1\n".encode())
     done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
     assert done.returncode == 2 and "line 2: no whole number" in done.stderr and "yes" not in done.stdout
 
@@ -86,7 +91,7 @@ def test_a_number_is_decimal_and_has_62_bits(checker: Path, tmp_path: Path, word
 @needs_ocaml
 def test_the_largest_number_is_read(checker: Path, tmp_path: Path) -> None:
     largest = 2**62 - 1
-    (tmp_path / "impacts.txt").write_text(f"{EXPORT_HEAD}\n1 1 0 {largest} 0 {-largest} 0\n", encoding="utf-8")
+    (tmp_path / "impacts.txt").write_text(f"{EXPORT_HEAD}\n1 1 0 {largest} 0 {-largest} 0\nend 1\n", encoding="utf-8")
     done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.startswith("yes\n")
 

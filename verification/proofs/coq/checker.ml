@@ -46,22 +46,26 @@ let judged line =
       check (natural d) mass before after
 
 let () =
-  let file = open_in Sys.argv.(1) in
-  let impacts = ref 0 and gains = ref 0 and line = ref 1 in
+  let file = open_in_bin Sys.argv.(1) in
+  let impacts = ref 0 and gains = ref 0 and line = ref 0 in
+  let next () = incr line; input_line file in
+  let rec judge_lines text =
+    if not (String.starts_with ~prefix:"end" text) then begin
+      let holds = judged text in
+      incr impacts;
+      if not holds then incr gains;
+      print_endline (if holds then "yes" else "no");
+      judge_lines (next ())
+    end
+    else if text <> Printf.sprintf "end %d" !impacts then
+      raise (Malformed (Printf.sprintf "%S, but %d impacts stand before it" text !impacts))
+  in
   try
-    if input_line file <> "iapb impacts 1" then raise (Malformed "the first line is not: iapb impacts 1");
-    (try
-       while true do
-         let text = input_line file in
-         incr line;
-         let holds = judged text in
-         incr impacts;
-         if not holds then incr gains;
-         print_endline (if holds then "yes" else "no")
-       done
-     with End_of_file -> ());
+    if next () <> "iapb impacts 2" then raise (Malformed "the first line is not: iapb impacts 2");
+    judge_lines (next ());
+    (match next () with _ -> raise (Malformed "a line after the end") | exception End_of_file -> ());
     Printf.printf "%d impacts: %d gained energy\n" !impacts !gains;
     exit (if !gains = 0 then 0 else 1)
   with
   | Malformed reason -> Printf.eprintf "line %d: %s\n" !line reason; exit 2
-  | End_of_file -> prerr_endline "line 1: the file is empty"; exit 2
+  | End_of_file -> Printf.eprintf "line %d: the file is cut: \"end\" and the number of impacts are missing\n" !line; exit 2
