@@ -51,7 +51,7 @@ Floats = NDArray[np.float64]
 NEAR = 0.02  # of the smaller shape: contacts closer than this at the start are taken to touch together
 DEEP = 0.02  # of the smaller shape: an overlap at the start that is no resting depth
 SHIFTED = 0.05  # of the smaller shape: the way by which friction in an impact may change where a body goes
-SAG = 0.1  # of the smaller shape: more static sag is no rigid contact
+SAG = 0.1  # of the smaller shape, or of the range of a joint: more static sag is no rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact gives back no more than it took
 ROUNDED = 1e-9  # share by which rounding may move a limit
 MANY_PAIRS = 2000  # with more, only pairs closer than the largest body are looked at
@@ -127,7 +127,7 @@ class Start:
 
     def _add_stops(self) -> None:
         """Append the ends of the joints' ranges: rows and gaps; a stop has one number for both of its shapes."""
-        stops, arrays, first = stops_of(self.scene), self.mechanism.arrays, len(self.shapes.kind)
+        stops, arrays, first = stops_of(self.scene, self.mechanism), self.mechanism.arrays, len(self.shapes.kind)
         names, ranges = [body.name for body in self.scene.bodies], [body.joint_limits for body in self.scene.bodies]
         extra, rows = make_contact_buffer(len(stops)), np.zeros((len(stops), self.mechanism.nv))
         for i, stop in enumerate(stops):
@@ -170,16 +170,20 @@ class Start:
     @cached_property
     def applied(self) -> Floats:
         """Generalized force of gravity and of the hand at the start (d,)."""
-        force, hand = -self.mechanism.gravity(self.q, self.gravity), self.scene.hand
+        return self._applied_at(self.q)
+
+    def _applied_at(self, q: Floats) -> Floats:
+        """Generalized force (d,) at q of gravity and of what the hand gives at the start."""
+        force, hand = -self.mechanism.gravity(q, self.gravity), self.scene.hand
         pushes = hand.forces([0.0])[0] if hand is not None else []
         if hand is not None and any(pushes):
             body = self.mechanism.index(hand.body)
-            R, p = self.mechanism.placements(self.q)
+            R, p = self.mechanism.placements(q)
             flat = len(pushes) == 3
             wrench = np.array([*pushes[:2], 0.0, 0.0, 0.0, pushes[2]] if flat else pushes)
             point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
-            force += wrench[:3] @ self.mechanism.point_jacobian(self.q, body, point)
-            force += wrench[3:] @ self.mechanism.frame_jacobian(self.q, body)[3:]
+            force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
+            force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
         return force
 
     @cached_property
@@ -283,6 +287,22 @@ class Start:
                 break
             pushing &= force > 0.0  # what would pull carries nothing
         return np.clip(force, 0.0, self.total_load)  # more is what wedges and levers make of it, in other poses less
+
+    @cached_property
+    def at_stops(self) -> dict[int, float]:
+        """Forces [N] by which loads press on the limits, of those that do not touch: their joint there, the others not.
+
+        The force of a stop holds the load of its joint alone, as where the joints behind it are held too.
+        """
+        stops, touching = stops_of(self.scene, self.mechanism), {int(i) for rows in self.touching for i in rows}
+        arrays, held = self.mechanism.arrays, {}
+        for i, stop in enumerate(stops, len(self.found.gap) - len(stops)):
+            there = self.q.copy()
+            there[arrays.q_start[stop.body]] = stop.bound
+            load = float(self._applied_at(there)[arrays.v_start[stop.body]])
+            if i not in touching:
+                held[i] = max(-stop.sign * load / stop.arm, 0.0)
+        return held
 
     @cached_property
     def total_load(self) -> float:
@@ -515,18 +535,24 @@ def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
 
 
 def _sags(start: Start) -> Iterator[Caution]:
-    """Loads that press a contact in by more than a tenth of a shape."""
+    """Loads that press a contact in by more than a tenth of a shape, or a joint's limit by that of its range."""
     K = start.scene.contact.stiffness
+    if K == 0.0:
+        return
     worst: tuple[float, int] = (SAG, -1)
-    for rows in start.supports if K > 0.0 else ():
+    for rows in start.supports:
         shares = start.loads(rows) / (K * start.thickness[rows])
         worst = max(worst, (float(shares.max()), int(rows[shares.argmax()])))
-    share, i = worst
+    share, i = max([worst, *((force / (K * start.thickness[i]), i) for i, force in start.at_stops.items())])
     if i < 0:
         return
-    both = start.names([i])
-    yield Caution("sag", both, f"at rest {both} overlap by {in_metres(share * start.thickness[i])}, "
-                  f"{share:.0%} of the thinner: set contact.stiffness >= {_up(K * share / SAG)}")
+    both, remedy = start.names([i]), f"set contact.stiffness >= {_up(K * share / SAG)}"
+    if start.found.shape_a[i] == start.found.shape_b[i]:
+        yield Caution("sag", both, f"at rest the load on {both} holds its joint beyond it by {share:.3g} times its "
+                      f"range: {remedy}")
+    else:
+        yield Caution("sag", both, f"at rest {both} overlap by {in_metres(share * start.thickness[i])}, "
+                      f"{share:.0%} of the thinner: {remedy}")
 
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:

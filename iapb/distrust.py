@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
 from iapb.run import Run
@@ -19,6 +20,7 @@ Integers = NDArray[np.int64]
 UNACCOUNTED = 0.02  # share of the energy at hand that a first-order step may make up
 DEEP = 0.5  # of the thinner shape: an overlap beyond is no contact of rigid bodies
 NARROW = 0.1  # of the body: a gap that much too narrow lets no rigid body through
+OVERRUN = 0.1  # of a joint's range: an end that far beyond it is no limit
 ROUNDED = 1e-9  # share of a step by which rounding may move a crossing
 WILD = 10.0  # times the farthest that start, speed and acceleration can carry a body
 
@@ -28,7 +30,7 @@ def distrust_of(run: Run) -> tuple[str, ...]:
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
     return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _passed(run), _squeezed(run),
-                                   _flew(run)) if found)
+                                   _flew(run), _overran(run)) if found)
 
 
 def _at_hand(run: Run) -> tuple[float, float]:
@@ -210,3 +212,19 @@ def _flew(run: Run) -> str:
         return ""
     far = in_metres(float(moved[i]))
     return f"{run.coordinate_names[lengths[i]]} moves by {far}, where {in_metres(reach)} can be explained"
+
+
+def _overran(run: Run) -> str:
+    """Joints that go beyond their limits by more than half of their range, or end a tenth of it beyond."""
+    bodies = run.scene_resolved.get("bodies", [])
+    first = np.cumsum([0, *(KINDS[body["joint"]].nq for body in bodies)])
+    for i, body in zip(first, bodies, strict=False):
+        if not body.get("joint_limits") or first[-1] != run.q.shape[1]:
+            continue
+        low, high = body["joint_limits"]
+        beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
+        k = len(beyond) - 1 if beyond[-1] > OVERRUN else int(beyond.argmax())
+        if beyond[k] > (OVERRUN if k == len(beyond) - 1 else DEEP):
+            return (f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond its limits {low:g} "
+                    f"and {high:g} by {beyond[k]:.3g} times their range")
+    return ""

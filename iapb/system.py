@@ -236,7 +236,7 @@ def make_world(system: System, law: Any) -> World:
 
 def make_stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
     """The ends of the joints' ranges as arrays; they are numbered behind the `shapes`."""
-    found = stops_of(scene)
+    found = stops_of(scene, mechanism)
     body, parent = (np.array([getattr(stop, name) for stop in found], np.int64) for name in ("body", "parent"))
     sign, bound, arm = (np.array([getattr(stop, name) for stop in found]) for name in ("sign", "bound", "arm"))
     return Stops(body, parent, shapes + np.arange(len(found), dtype=np.int64), mechanism.arrays.q_start[body],

@@ -187,33 +187,36 @@ class Stop(NamedTuple):
     arm: float  # [m]; of a prismatic joint 1
 
 
-def stops_of(scene: Scene) -> tuple[Stop, ...]:
+def stops_of(scene: Scene, mechanism: Mechanism) -> tuple[Stop, ...]:
     """Return the ends of the joints' ranges, two for each joint with limits.
 
-    A revolute joint stops on the arm of its body's radius of gyration about the axis, so that the body meets
-    the stop with its whole mass, and the contact section's numbers mean what they mean at a contact.
+    A revolute joint stops on the radius of gyration about its axis of all that it carries, placed as at the start. So
+    what hangs on it meets the stop with its whole mass, and the contact section's numbers mean what they mean at a
+    contact.
     """
-    parents = _parents(scene)
-    return tuple(
-        Stop(i, parents[i], sign, bound, _stopping_arm(body))
-        for i, body in enumerate(scene.bodies) if body.joint_limits is not None
-        for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True)
-    )
+    if not _stop_count(scene):
+        return ()
+    parents, carried = _parents(scene), [body.mass for body in scene.bodies]
+    for i, parent in reversed(list(enumerate(parents))):
+        if parent >= 0:
+            carried[parent] += carried[i]
+    inertia, first = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])), mechanism.arrays.v_start
+    found = []
+    for i, body in enumerate(scene.bodies):
+        if body.joint_limits is not None:
+            arm = _stopping_arm(float(inertia[first[i]]), carried[i]) if body.joint == "revolute" else 1.0
+            found += [Stop(i, parents[i], sign, bound, arm)
+                      for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True)]
+    return tuple(found)
 
 
-def _stopping_arm(body: Any) -> float:
-    """Radius of gyration about the joint's axis [m]; 1 where there is no axis or no mass."""
-    if body.joint != "revolute" or body.mass <= 0.0:
-        return 1.0
-    if len(body.origin) == 2:
-        inertia = body.inertia + body.mass * sum(c * c for c in body.center_of_mass)
-    else:
-        axis = np.array(body.axis) / math.hypot(*body.axis)
-        lever = np.array([axis[(k + 1) % 3] * body.center_of_mass[(k + 2) % 3]
-                          - axis[(k + 2) % 3] * body.center_of_mass[(k + 1) % 3] for k in range(3)])
-        matrix = np.array(inertia_matrix(body.inertia))
-        inertia = float((axis[:, None] * matrix * axis).sum() + body.mass * (lever * lever).sum())
-    return math.sqrt(inertia / body.mass) if inertia > 0.0 else 1.0
+def _stop_count(scene: Scene) -> int:
+    return 2 * sum(body.joint_limits is not None for body in scene.bodies)
+
+
+def _stopping_arm(inertia: float, mass: float) -> float:
+    """Radius of gyration [m]; 1 where there is no mass."""
+    return math.sqrt(inertia / mass) if inertia > 0.0 and mass > 0.0 else 1.0
 
 
 def restitution_by_shape(scene: Scene) -> Floats:
@@ -223,7 +226,7 @@ def restitution_by_shape(scene: Scene) -> Floats:
     """
     given = [body.restitution for body in scene.bodies for _ in body.shapes]
     given += [wall.restitution for wall in scene.walls]
-    given += [None] * len(stops_of(scene))
+    given += [None] * _stop_count(scene)
     return np.array([UNSTATED if e is None else e for e in given], np.float64)
 
 
@@ -241,7 +244,7 @@ def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
 
 def restitutions_of(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
     """Return the different values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
-    stops = [scene.contact.restitution] if stops_of(scene) else []
+    stops = [scene.contact.restitution] if _stop_count(scene) else []
     return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
 
 
@@ -265,7 +268,7 @@ def frictions_of(scene: Scene) -> Frictions:
     paired = frozenset().union(*pairs)
     alike: dict[tuple[str, float | None], int] = {}
     classes = [alike.setdefault((name if name in paired else "", own), len(alike)) for name, own in owners]
-    stops = len(stops_of(scene))
+    stops = _stop_count(scene)
     table = np.zeros((len(alike) + (stops > 0),) * 2)
     for (a, first), i in alike.items():
         for (b, second), k in alike.items():

@@ -221,6 +221,45 @@ def test_a_joint_rests_at_its_limit_under_load_and_the_springs_hold_it() -> None
     assert any("limit of rod" in str(caution) for caution in check_scene(scene.with_values({"contact.stiffness": 1e9})))
 
 
+def loaded(joint: str, **values: Any) -> Scene:
+    """A motor of little inertia that carries a heavy arm, under gravity."""
+    limits = ", joint_limits: [-0.1, 0.1]" if joint == "revolute" else ""
+    return scene_from_text(f"""
+name: arm
+rate: 1000
+gravity: [0, -9.81]
+duration: 2
+bodies:
+  - {{name: motor, joint: revolute, mass: 1, inertia: 4.5e-4, center_of_mass: [0, 0], joint_limits: [-0.2, 0.2]}}
+  - {{name: arm, parent: motor, joint: {joint}, mass: 2, inertia: 0.05, center_of_mass: [0.5, 0]{limits}}}
+contact: {{stiffness: 1e4, damping: 100}}
+""").with_values(values)
+
+
+@pytest.mark.parametrize("law", [ImpulseAugmented(), Penalty()])
+def test_a_limit_holds_all_that_its_joint_carries(law: Any) -> None:
+    """The stop turns by the torque over K r², r the radius of gyration of motor and arm."""
+    run = simulate(loaded("fixed"), law)
+    assert not check_scene(loaded("fixed"), law) and not run.distrust
+    sag = 2.0 * 9.81 * 0.5 * math.cos(0.2) / (1e4 * (4.5e-4 + 0.05 + 2.0 * 0.5**2) / 3.0)
+    assert run.q[-1, 0] == pytest.approx(-0.2 - sag, abs=0.02 * sag)
+
+
+def test_a_limit_that_gives_way_is_said_before_and_after_the_run() -> None:
+    scene = loaded("revolute", contact={"auto": True})  # a stiffness that the motor alone allows
+    (caution,) = check_scene(scene)
+    assert caution.kind == "sag" and "limit of arm holds its joint beyond it" in caution.text
+    assert any("motor.angle is -0.4" in why and "times their range" in why for why in simulate(scene).distrust)
+
+
+def test_a_limit_that_is_passed_for_a_while_is_said() -> None:
+    soft = swinging(**{"bodies.rod.joint_limits": [-0.1, 0.1], "contact.stiffness": 100.0, "duration": 0.4})
+    run = simulate(soft, Penalty())
+    assert run.q.max() == pytest.approx(0.3, abs=0.01) and abs(run.q[-1, 0]) < 0.1  # 2 rad/s over 10 1/s
+    assert any("rod.angle is" in why and "beyond its limits -0.1 and 0.1" in why for why in run.distrust)
+    assert not simulate(soft.with_values({"contact.stiffness": 4e4}), Penalty()).distrust
+
+
 def test_limits_that_are_not_reached_change_no_bit() -> None:
     scene = load_scene(find_scene("arm_obstacles"))
     names = [body.name for body in scene.bodies if body.joint == "revolute"]
