@@ -170,9 +170,10 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
 def certify(run: Run) -> Certificate:
     """Judge every impact of a run exactly: energy, and whether impulses, velocities and contacts belong together.
 
-    M is made again at the recorded configuration by the engine's kernels, which give the same bits on every x86-64
-    processor. Its recorded digest shows that it is the same to the last bit; the recorded generalized impulses, which
-    must be M(v⁺ − v⁻), that it is the one of the impact.
+    M is made again from the recorded q by the engine's kernels, which give the same bits on every x86-64 processor. The
+    recorded digest is that of the M which the recorder made so after the run, not of the M inside the step: it shows
+    that q, scene and kernels are those of the recording. That M is the one of the impact is shown by the recorded
+    generalized impulse, which must be M(v⁺ − v⁻), to `MOMENTUM_TOLERANCE`.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
-            raise IapbError(f"impact {start + other[0]}: M, made again at its configuration, is not the recorded one; "
+            raise IapbError(f"impact {start + other[0]}: M, made again from the recorded q, is not as recorded; "
                             "the record was changed, or the engine that wrote it computes M otherwise")
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
 

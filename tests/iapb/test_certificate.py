@@ -6,12 +6,22 @@ import struct
 from dataclasses import fields, replace
 from fractions import Fraction
 from hashlib import blake2b
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import iapb.certificate
-from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene, load_scene, simulate
+from iapb import (
+    ArgumentError,
+    IapbError,
+    Simulation,
+    certify,
+    certify_impacts,
+    find_scene,
+    load_scene,
+    simulate,
+)
 from iapb.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
@@ -203,7 +213,7 @@ def test_impulses_of_steps_need_their_impacts(cradle: Run) -> None:
 
 
 def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) -> None:
-    """A configuration, a digest or the scene changed in the last bit: M is not the recorded one."""
+    """A configuration, a digest or the scene changed in the last bit: M is not the one whose digest is recorded."""
     table = cradle.impacts
     assert table.mass_digest.all() and len(set(table.mass_digest)) == 1  # M of balls does not depend on where they are
     changed = table.mass_digest.copy()
@@ -214,6 +224,21 @@ def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) ->
                           (replace(cradle, scene_resolved=heavier), 0)):
         with pytest.raises(IapbError, match=f"impact {first}: M"):
             certify(forged)
+
+
+def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step() -> None:
+    """On a moving arm the M inside the step of each impact, hashed there, has the digest recorded after the run."""
+    scene = load_scene(find_scene("three_link_arm_elastic"))
+    run, simulation, inside = simulate(scene, steps=1000), Simulation(scene), []
+    for step in range(run.steps):
+        simulation.step()
+        if step in run.impacts.step:
+            inside.append(digests(simulation.state.mass_matrix[None])[0])
+    assert inside == run.impacts.mass_digest.tolist() and len(set(inside)) > 1
+    notation = (Path(__file__).parents[2] / "docs/notation.md").read_text(encoding="utf-8")
+    (said,) = (line for line in notation.splitlines() if "`mass_digest`" in line)
+    assert "M made again from the recorded q after the run" in said
+    assert "not of the M inside the step" in str(certify.__doc__)
 
 
 def test_digests_are_those_of_little_endian_doubles_row_by_row() -> None:
