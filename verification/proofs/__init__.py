@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from verification.finding import (
+    NOT_COMPUTED,
     REFUTED,
     REPRODUCED,
     Column,
@@ -31,7 +32,7 @@ from verification.finding import (
     table_of,
 )
 from verification.proofs.checking import checked
-from verification.proofs.coq_development import ARGUED, NOT_RUN, SAYS, Theorem
+from verification.proofs.coq_development import ARGUED, NO_ANSWER, NOT_RUN, SAYS, Theorem
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 from verification.proofs.statement import NO, NOT_APPLICABLE, YES
 
@@ -116,11 +117,16 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
                      "SymPy": NOT_APPLICABLE, "Coq": one.coq, "assumes": ", ".join(one.axioms)} for one in development]
         tables["theorems about the code"] = table_of(tuple(map(Column, theorems[0])), theorems)
         asked = [one for one in development if one.holds is not None]
+        lost = [one for one in development if one.coq == NO_ANSWER]
         accepted = sum(one.holds is True for one in asked)
         told = (f"Coq proves {accepted} of {len(development)} theorems about the checker and the arithmetic of the "
-                f"last step, with no axioms but those of the real numbers. {ARGUED}" if asked else
+                "last step, with no axioms but those of the real numbers and, in Flocq, of classical logic. "
+                f"{ARGUED}" if asked or lost else
                 f"Coq is not installed: {len(development)} theorems about the code were not checked here.")  # fmt: skip
-        if asked:
-            parts.append(Part(told, REPRODUCED if accepted == len(development) else REFUTED))
+        if lost:
+            told = f"{told} Of {len(lost)} theorems Coq did not compile the file: {lost[0].error}"
+        if asked or lost:
+            whole = REPRODUCED if accepted == len(development) else NOT_COMPUTED
+            parts.append(Part(told, whole if accepted == len(asked) else REFUTED))
         sentence = f"{sentence} {told}"
     return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, tuple(parts), tables, failures)

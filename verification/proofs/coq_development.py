@@ -16,15 +16,16 @@ from tempfile import TemporaryDirectory
 
 from iapb.errors import IapbError, MissingDependencyError
 from verification.finding import Failure, counted, of_each
-from verification.proofs.statement import NO, YES
+from verification.proofs.statement import YES
 
 FOLDER = Path(__file__).with_name("coq")
 PATIENCE = 600.0  # seconds for one file
-# What `Print Assumptions` may name: the axioms from which Coq's library builds the real numbers.
-AXIOMS_OF_THE_REALS = frozenset({
+# What `Print Assumptions` may name: the axioms from which Coq's library builds the real numbers, and classical
+# logic (P or not P, for every P), which comes in with Flocq.
+KNOWN_AXIOMS = frozenset({
     "ClassicalDedekindReals.sig_forall_dec", "ClassicalDedekindReals.sig_not_dec",
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
-NOT_RUN = "not run here"
+NOT_RUN, NO_ANSWER = "not run here", "no answer"
 SAYS = {
     "check_sound": "where the exact checker says yes, wᵀMw ≤ vᵀMv over the real numbers",
     "check_complete": "where it says no of lists that fit, wᵀMw > vᵀMv",
@@ -47,16 +48,18 @@ _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 @dataclass(frozen=True)
 class Theorem:
-    """A theorem of the development, Coq's answer (yes, no, not run here), and the axioms that it leans on."""
+    """A theorem of the development, Coq's answer (yes, not run here, no answer), the axioms that it leans on, and why
+    Coq did not compile its file."""
 
     name: str
     coq: str
     axioms: tuple[str, ...] = ()
+    error: str = ""
 
     @property
     def holds(self) -> bool | None:
-        """Coq accepts it, and nothing is assumed beyond the real numbers; None where Coq was not asked."""
-        return None if self.coq == NOT_RUN else self.coq == YES and AXIOMS_OF_THE_REALS.issuperset(self.axioms)
+        """Coq accepts it with no axiom but those listed; None where Coq was not asked or did not compile the file."""
+        return None if self.coq in (NOT_RUN, NO_ANSWER) else self.coq == YES and KNOWN_AXIOMS.issuperset(self.axioms)
 
 
 def theorems(progress: Callable[[int, int], None] = lambda done, total: None,
@@ -72,8 +75,8 @@ def _answered(name: str) -> tuple[Theorem, ...]:
     with TemporaryDirectory() as folder:
         try:
             return compiled(name, Path(folder))
-        except IapbError:
-            return tuple(Theorem(one, NO) for one in _asked(name))
+        except IapbError as error:  # another version of Coq or Flocq, as likely as a wrong proof: it refutes nothing
+            return tuple(Theorem(one, NO_ANSWER, (), str(error)) for one in _asked(name))
 
 
 def version() -> str:
@@ -137,7 +140,10 @@ def build_checker(folder: Path) -> Path:
 
 
 def _run(command: list[str], folder: Path) -> str:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE)
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        raise IapbError(f"{' '.join(command)}: no end within {PATIENCE:g} s") from None
     if done.returncode:
         raise IapbError(f"{' '.join(command)}: {' '.join(done.stderr.split())}")
     return done.stdout

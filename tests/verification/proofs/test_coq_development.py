@@ -11,10 +11,11 @@ import pytest
 
 from iapb.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
-from verification.finding import REFUTED, REPRODUCED
+from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED
 from verification.proofs import coq_development, on_proofs
 from verification.proofs.coq_development import (
     FOLDER,
+    NO_ANSWER,
     NOT_RUN,
     Theorem,
     build_checker,
@@ -22,7 +23,7 @@ from verification.proofs.coq_development import (
     lacking,
     theorems,
 )
-from verification.proofs.statement import NO, YES
+from verification.proofs.statement import YES
 
 IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
 needs_ocaml = pytest.mark.skipif(
@@ -128,6 +129,17 @@ def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.Mon
         compiled("Open", folder)
 
 
+def test_coq_that_fails_refutes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A library that is not where this version of Coq looks for it, say: no answer, with Coq's own words."""
+    if reason := lacking("Checker"):
+        pytest.skip(reason)
+    (tmp_path / "Moved.v").write_text(
+        "From Coq Require Import NoSuchLibrary.\nTheorem all : 1 = 1.\nProof. trivial. Qed.\nPrint Assumptions all.\n")
+    monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
+    (theorem,) = theorems()
+    assert theorem.coq == NO_ANSWER and theorem.holds is None and "NoSuchLibrary" in theorem.error
+
+
 def test_without_coq_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
     found = theorems(lambda *done: None, [])
@@ -137,7 +149,8 @@ def test_without_coq_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize(("answer", "axioms", "verdict"), [
-    (YES, ("Classical_Prop.classic",), REPRODUCED), (YES, ("easy",), REFUTED), (NO, (), REFUTED)])  # fmt: skip
+    (YES, ("Classical_Prop.classic",), REPRODUCED), (YES, ("easy",), REFUTED),
+    (NO_ANSWER, (), NOT_COMPUTED), (NOT_RUN, (), NOT_COMPUTED)])  # fmt: skip
 def test_a_refused_theorem_or_a_strange_axiom_refutes(answer: str, axioms: tuple[str, ...], verdict: str) -> None:
     finding = on_proofs([], (), [Theorem("check_sound", YES), Theorem("compensated", answer, axioms)])
     assert finding.parts[1].verdict == verdict
