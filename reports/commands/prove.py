@@ -9,7 +9,7 @@ import typer
 
 from reports.commands.as_json import Json, print_json
 from verification.proofs import all_proofs, check, load
-from verification.proofs.coq_development import NO_ANSWER, SAYS, theorems
+from verification.proofs.coq_development import NO_ANSWER, says, theorems
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 
 
@@ -40,7 +40,7 @@ def prove(
         for theorem in theorems():
             holds = {True: "accepted", False: "refused", None: theorem.coq}[theorem.holds]
             axioms = theorem.error or ", ".join(theorem.axioms) or "-"
-            print(f"Coq: {holds:<8} {theorem.name:<36} {SAYS[theorem.name]}; axioms: {axioms}")
+            print(f"Coq: {holds:<8} {theorem.name:<36} {says(theorem.name)}; axioms: {axioms}")
             failed += [theorem.name] * (theorem.holds is False or theorem.coq == NO_ANSWER)
         _ask_second_tool(CERTIFIED)
     if failed:

@@ -32,7 +32,7 @@ from verification.finding import (
     table_of,
 )
 from verification.proofs.checking import checked
-from verification.proofs.coq_development import ARGUED, NO_ANSWER, NOT_RUN, SAYS, Theorem
+from verification.proofs.coq_development import ARGUED, NO_ANSWER, NOT_RUN, Theorem, says
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 from verification.proofs.statement import NO, NOT_APPLICABLE, YES
 
@@ -113,7 +113,7 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
     parts = [Part(sentence, REPRODUCED if proved == len(rows) else REFUTED)]
     tables = {"statements": table}
     if development:
-        theorems = [{"theorem": one.name, "says": SAYS[one.name], "holds": one.holds, "own kernel": NOT_APPLICABLE,
+        theorems = [{"theorem": one.name, "says": says(one.name), "holds": one.holds, "own kernel": NOT_APPLICABLE,
                      "SymPy": NOT_APPLICABLE, "Coq": one.coq, "assumes": ", ".join(one.axioms)} for one in development]
         tables["theorems about the code"] = table_of(tuple(map(Column, theorems[0])), theorems)
         asked = [one for one in development if one.holds is not None]

@@ -7,6 +7,8 @@ missing (coqc, Flocq, OCaml) is said by name; nothing is claimed then.
 
 from __future__ import annotations
 
+import hashlib
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -38,6 +40,20 @@ SAYS = {
     "entry_fits": "what the code puts in, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), is exact and meets the hypotheses of gain_error",
     "sign_kept": "a sum that is at most 0 as computed is at most 0",
     "accepted_never_gains": "high + (low + radius) ≤ 0 as computed, and a radius that bounds the error: Γ ≤ 0",
+}
+# Of each, the digest of what was described (`stated`): the English is not printed of another statement.
+STATED = {
+    "check_sound": "a1c099410aa9a793",
+    "check_complete": "307f807fb7ca5381",
+    "two_sum_exact": "da0982301a48a8d2",
+    "two_product_exact": "ab85118807940730",
+    "two_product_underflow": "4fa5b793024e5317",
+    "compensated": "537f5e2556a42bd2",
+    "loop_error": "330c43387117ff63",
+    "gain_error": "3e9e8314039b9603",
+    "entry_fits": "952bdee92e943e09",
+    "sign_kept": "d893e705bea3b779",
+    "accepted_never_gains": "ae6f139f59ee5a76",
 }
 # What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
 ARGUED = ("Not in Coq: that the bound of gain_error is below the radius that `gain` returns (rational numbers show it "
@@ -77,6 +93,25 @@ def _answered(name: str) -> tuple[Theorem, ...]:
             return compiled(name, Path(folder))
         except IapbError as error:  # another version of Coq or Flocq, as likely as a wrong proof: it refutes nothing
             return tuple(Theorem(one, NO_ANSWER, (), str(error)) for one in _asked(name))
+
+
+def says(name: str) -> str:
+    """What a theorem says, in English; in Coq where its statement or a definition before it has changed."""
+    digest, statement = stated(name)
+    return SAYS[name] if STATED.get(name) == digest else f"changed since it was described: {statement}"
+
+
+def stated(name: str) -> tuple[str, str]:
+    """Digest of a theorem's statement with all definitions before it, and the statement; no proof counts."""
+    for path in sorted(FOLDER.glob("*.v")):
+        source = re.sub(r"\(\*.*?\*\)|\bProof\..*?\bQed\.", " ", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        before: list[str] = []
+        for sentence in (" ".join(one.split()) for one in re.split(r"\.\s", source)):
+            if re.match(rf"Theorem {re.escape(name)}\b", sentence):
+                return hashlib.sha256("\n".join([*before, sentence]).encode()).hexdigest()[:16], sentence
+            if not sentence.startswith(("Lemma ", "Theorem ", "Print ")):
+                before.append(sentence)
+    return "", "no such theorem"
 
 
 def version() -> str:
