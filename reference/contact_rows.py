@@ -148,28 +148,29 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def write_contacts(
-    state: Any, found: ContactRows, impulse: Floats, friction: Floats, forced: NDArray[np.bool_], dt: float
+    state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float
 ) -> None:
-    """Record in `state` the contacts that touch or carry an impulse; `forced` marks p as a force, not a blow.
+    """Record in `state` the contacts that touch or carry an impulse.
 
-    friction : (c, 3) tangential impulses, world axes, recorded as forces where `forced`
+    blow, pushed : (c,) impulses [N s], those that are recorded as forces in `pushed`
+    friction : (c, 3) tangential impulses, world axes, recorded as forces
     """
     into = state.contacts
     _write(into.shape_a, into.shape_b, into.feature, into.body_a, into.body_b, into.point, into.normal, into.gap,
            into.is_new, into.normal_velocity, into.normal_force, into.friction_force, state.contact_impulse,
-           state.contact_count, *found.geometry, found.gamma, impulse, friction, forced, dt)  # fmt: skip
+           state.contact_count, *found.geometry, found.gamma, blow, pushed, friction, dt)  # fmt: skip
 
 
 @numba.njit(cache=True, fastmath=False)
 def _write(  # type: ignore[no-untyped-def]
     into_a, into_b, into_feature, into_body_a, into_body_b, into_point, into_normal, into_gap, is_new, normal_velocity,
-    normal_force, friction_force, blow, contact_count, shape_a, shape_b, body_a, body_b, feature, point, normal, gap,
-    gamma, impulse, friction, forced, dt,
+    normal_force, friction_force, into_blow, contact_count, shape_a, shape_b, body_a, body_b, feature, point, normal,
+    gap, gamma, blow, pushed, friction, dt,
 ):  # fmt: skip
     before, count = contact_count[0], 0
     old_a, old_b, old_feature = into_a[:before].copy(), into_b[:before].copy(), into_feature[:before].copy()
     for c in range(len(gap)):
-        if gap[c] > 0.0 and not impulse[c] > 0.0:
+        if gap[c] > 0.0 and not (blow[c] > 0.0 or pushed[c] > 0.0):
             continue
         new = True
         for k in range(before):
@@ -178,11 +179,11 @@ def _write(  # type: ignore[no-untyped-def]
         into_a[count], into_b[count], into_feature[count] = shape_a[c], shape_b[c], feature[c]
         into_body_a[count], into_body_b[count], into_gap[count] = body_a[c], body_b[c], gap[c]
         is_new[count], normal_velocity[count] = new, gamma[c]
-        normal_force[count] = impulse[c] / dt if forced[c] else 0.0
-        blow[count] = 0.0 if forced[c] else impulse[c]
+        normal_force[count] = pushed[c] / dt
+        into_blow[count] = blow[c]
         for i in range(3):
             into_point[count, i], into_normal[count, i] = point[c, i], normal[c, i]
-            friction_force[count, i] = friction[c, i] / dt if forced[c] else 0.0
+            friction_force[count, i] = friction[c, i] / dt
         count += 1
     contact_count[1], contact_count[0] = before, count
 

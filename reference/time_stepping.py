@@ -6,7 +6,7 @@ here it becomes a contact law that runs on every scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,6 +110,7 @@ class RigidConstraints:
         Impulses of contacts that approached faster than the scene's approach velocity, and of those that bodies pass
         the blow on to, are reported as collision impulses, the rest as forces p/dt: only their sum is determined by
         the step. The loads of a step with a blow are among its impulses: with e near 1 they may outweigh its loss.
+        Where joints have damping, a step with a blow is two: the blow, then forces and damping.
         """
         entries = len(system.pairs) * system.mechanism.nv
         if entries > MOST_ENTRIES // BOX_CORNERS and (cost := cost_of(system)).too_large:
@@ -125,13 +126,24 @@ class RigidConstraints:
         found = find_rows(system, q, v, self.margin)
         force = applied_force - mechanics.inner_forces(q, v, system.gravity)
         # Damping of joints, implicit: M + Δt D holds the damped velocities, as in the engine's step.
-        damping = system.joint_damping
-        step = self._solve(system, mass + dt * np.diag(damping), q, v, force - damping * v, dt, found)
-        blows = _blows(mass, found, step.normal, system.scene.contact.approach_velocity)
+        damping, approach = system.joint_damping, system.scene.contact.approach_velocity
+        damped = mass + dt * np.diag(damping)
+        struck = step = self._solve(system, damped, q, v, force - damping * v, dt, found)
+        blows = _blows(mass, found, step.normal, approach)
+        lasts = ~blows
+        if damping.any() and blows.any():
+            # The blow comes first, on M alone: with what damping takes behind it, p on M could gain.
+            struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found)
+            blows, lasts = _blows(mass, found, struck.normal, approach), np.ones(len(blows), np.bool_)
+            blow = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
+            thrown = v + np.linalg.solve(mass, blow)
+            moved = replace(found, gamma=found.jacobian @ thrown)
+            step = self._solve(system, damped, q, thrown, force - damping * thrown, dt, moved)
         normal = found.jacobian.T * step.normal
-        impulse = (normal + step.dragging)[:, blows].sum(axis=1)
-        pressing, dragging = (part[:, ~blows].sum(axis=1) / dt for part in (normal, step.dragging))
-        write_contacts(state, found, step.normal, step.tangential, ~blows, dt)
+        impulse = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
+        pressing, dragging = (part[:, lasts].sum(axis=1) / dt for part in (normal, step.dragging))
+        blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
+        write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
         write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus = mechanics.integrate(q, step.velocity, dt)
         contact_state = _contact_state(found, step.normal, blows)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from iapb.certificate import certify
 from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
@@ -46,6 +47,34 @@ def test_a_joint_of_the_rigid_world_returns_from_its_limit_as_fast_as_it_came() 
     run = run_world(arm(gravity=None, **{"contact.restitution": 1.0, "bodies.upper.joint_damping": 0.0}), "ideal")
     assert run.energy["kinetic"][-1] == pytest.approx(run.energy["kinetic"][0], rel=1e-2)
     assert (np.abs(np.diff(np.sign(run.v[:, 1]))) > 0).any()
+
+
+@pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
+def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
+    """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same step."""
+    run = run_world(scene_from_text(f"""
+name: slider
+rate: 1000
+duration: 0.005
+bodies:
+  - {{name: a, joint: prismatic, axis: [1, 0], mass: 1, inertia: 0.01, joint_damping: {damping},
+     joint_limits: [-9, 0.1], velocity: [1000]}}
+contact: {{restitution: 1}}
+"""), "ideal")
+    (step,), impacts = run.impacts.step, run.impacts
+    came = 1000.0 / (1.0 + 1e-3 * damping) ** step
+    assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)
+    assert impacts.v_plus[0] == pytest.approx([-came], rel=1e-12)
+    assert run.v[step + 1] == pytest.approx([-came / (1.0 + 1e-3 * damping)], rel=1e-12)
+    assert certify(run).gains == 0 and np.abs(run.energy["impact_loss"]).max() <= 1e-12 * came**2
+    assert (np.diff(run.energy["friction_work"]) < 0.0).all()
+
+
+def test_blows_of_damped_joints_gain_nothing() -> None:
+    damped = {"bodies.upper.joint_damping": 900.0, "bodies.lower.joint_damping": 5.0, "contact.restitution": 1.0}
+    run = run_world(arm(gravity=None, **damped, duration=0.05, **{"bodies.lower.velocity": [300.0]}), "ideal")
+    lost = np.diff(run.energy["impact_loss"], prepend=0.0)[run.impacts.step]
+    assert len(lost) and (lost >= -1e-9).all() and (np.diff(run.energy["kinetic"]) <= 1e-9).all()
 
 
 def test_a_huge_damping_is_no_more_than_a_held_joint() -> None:
