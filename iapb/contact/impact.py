@@ -140,8 +140,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
         given = given._replace(unequal=np.full(len(given.contact_jacobian), given.restitution))
     _check_options(method, budget, rank_tolerance, given.unequal is None)
     clamped = clamped_by_default if clamp is None else _checked_clamp(clamp)
-    limit = len(given.velocity) if budget is None else int(budget)
-    rows_used = None if budget is None else limit
+    limit = _limit(budget, len(given.velocity))
+    rows_used = None if budget is None else int(budget)
     law = "Newton, equality"
     if given.unequal is not None:
         solve, law, clamped = poisson, "Poisson, two LCPs", clamp is None or bool(clamp)
@@ -211,7 +211,7 @@ class Impacts:
 
 
 def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
-                    restitution: ArrayLike, *, budget: int | None = None, clamp: bool = True,
+                    restitution: ArrayLike, *, budget: int | None = None, clamp: bool | None = None,
                     rank_tolerance: float | None = None) -> Impacts:
     """Resolve n impacts of one size in one call: to the bit what `resolve_impact` with ``factored`` returns for each.
 
@@ -231,13 +231,13 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     """
     M, J, v, e = stacked(mass_matrices, contact_jacobians, velocities, restitution)
     _check_options("factored", budget, rank_tolerance, True)
-    clamped = _checked_clamp(clamp)
+    clamped = clamp is None or _checked_clamp(clamp)
     n, c, d = J.shape
     v_plus, momentum, impulses = np.empty((n, d)), np.empty((n, d)), np.empty((n, c))
     counts, numbers = np.empty((n, 2), np.int64), np.empty((n, 4))
     wrong, at = _entries()[1](
-        M, J, v, e, 0.0 if rank_tolerance is None else float(rank_tolerance), d if budget is None else int(budget),
-        clamped, _scratch(d, c), v_plus, momentum, impulses, counts, numbers)
+        M, J, v, e, 0.0 if rank_tolerance is None else float(rank_tolerance), _limit(budget, d), clamped,
+        _scratch(d, c), v_plus, momentum, impulses, counts, numbers)
     if wrong[0]:
         raise refusal(wrong, Given(M[at], J[at], v[at], float(e[at]), None), (at,))
     return Impacts(v_plus, momentum, impulses, counts[:, 0], numbers[:, 1], numbers[:, 2:], numbers[:, 0],
@@ -248,6 +248,11 @@ def _method(method: Any) -> tuple[Any, bool]:
     if not isinstance(method, str) or method not in METHODS:
         raise ArgumentError("method", method, one_of(method, METHODS))
     return METHODS[method]
+
+
+def _limit(budget: int | None, coordinates: int) -> int:
+    """Rows that may be used, as a number that a kernel takes."""
+    return coordinates if budget is None else min(int(budget), np.iinfo(np.int64).max)
 
 
 def _checked_clamp(clamp: Any) -> bool:

@@ -133,7 +133,7 @@ def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: 
     n, d = v.shape
     if d == 0 or M.shape != (n, d, d):
         raise ArgumentError("mass_matrices", M.shape, f"shape ({n}, {d}, {d}), one matrix per line of velocities")
-    J = _array("contact_jacobians", contact_jacobians, 3)
+    J = np.zeros((n, 0, d)) if _is_empty(contact_jacobians) else _array("contact_jacobians", contact_jacobians, 3)
     if J.shape[0] != n or J.shape[2] != d:
         raise ArgumentError("contact_jacobians", J.shape, f"shape ({n}, contacts, {d})")
     e = _real_numbers(restitution)
@@ -183,7 +183,7 @@ def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = 
 
 def _is_empty(rows: ArrayLike) -> bool:
     """[] and zeros(0) have no second dimension to check."""
-    if type(rows) is np.ndarray and rows.ndim == 2:
+    if type(rows) is np.ndarray and rows.ndim >= 2:
         return False
     given = _real_numbers(rows)
     return given is not None and given.shape == (0,)

@@ -262,7 +262,7 @@ STACKED = {"mass_matrices": np.array([np.eye(2)] * 3), "contact_jacobians": np.o
     ("restitution", np.nan, "restitution"),
     ("restitution", [0.5, 0.5], "restitution"),
     ("budget", -1, "budget"),
-    ("clamp", None, "clamp"),
+    ("clamp", 1, "clamp"),
     ("rank_tolerance", 2.0, "rank_tolerance"),
 ])
 def test_the_wrong_one_of_many_is_named(argument: str, value: object, named: str) -> None:
@@ -279,3 +279,14 @@ def test_an_overflow_among_many_is_named() -> None:
 
 def test_none_at_all_are_resolved_too() -> None:
     assert resolve_impacts(np.zeros((0, 2, 2)), np.zeros((0, 4, 2)), np.zeros((0, 2)), 0.5).velocity.shape == (0, 2)
+
+
+def test_many_impacts_take_what_one_takes() -> None:
+    """No rows as [], clamp=None and a budget beyond 64 bits: as in `resolve_impact`, which takes any budget."""
+    mass, rows, v = (np.asarray(GOOD[name]) for name in ("mass_matrix", "contact_jacobian", "velocity"))
+    free = resolve_impacts([mass], [], [v], 0.5)
+    assert free.velocity.tolist() == [v.tolist()] and free.impulses.shape == (1, 0)
+    one, plain = resolve_impact(mass, rows, v, 0.5, budget=10**30), resolve_impact(mass, rows, v, 0.5)
+    many = resolve_impacts([mass], [rows], [v], 0.5, budget=10**30, clamp=None)
+    assert one.rows_used == 10**30
+    assert one.velocity.tolist() == plain.velocity.tolist() == many.velocity[0].tolist()
