@@ -223,6 +223,12 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     restitution : one number in [−1, 1], or (n,), one per impact.
     budget, clamp, rank_tolerance : see `resolve_impact`; for all n.
 
+    Returns
+    -------
+    Impacts
+        Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts (n, c), and what
+        `Impact` has of one, for each.
+
     Raises
     ------
     ArgumentError, RangeError

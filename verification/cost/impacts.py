@@ -268,6 +268,11 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     budget : time for one impact [s].
     contacts, coordinates : the size of the impact.
 
+    Returns
+    -------
+    tuple of Choice
+        Compiled, and called from Python; the one is missing for which no method ends in time.
+
     Raises
     ------
     ArgumentError
