@@ -222,7 +222,7 @@ class Choice:
         stopped = self.work.split()[0].isdigit()
         how = f", stopped after {self.work}" if stopped else ""
         called = " (compiled)" if self.called == COMPILED else ""
-        return (f"With {short_time(self.budget)} for {self.contacts} contacts on {self.coordinates} coordinates take "
+        return (f"With {short_time(self.budget)} for {self.contacts} contacts on {self.coordinates} coordinates, use "
                 f"{self.method}{how}{called}: {short_time(self.time)} an impact, relative error of the "
                 f"velocity {self.error:.0e} (largest {self.largest:.0e}); {100 * self.share:.0f} % of the hard cases "
                 "end in time without a gain of energy.")
