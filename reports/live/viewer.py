@@ -85,7 +85,7 @@ def _effective_mass(simulation: Simulation) -> float:
     return 1.0 / float(np.linalg.eigvalsh(mobility)[-1])
 
 
-_START_SECONDS = 60.0  # that a browser's server may take to start, on a machine that is busy otherwise
+_START_SECONDS = 180.0  # that a browser's server may take to start, on a machine that is busy otherwise
 _END_SECONDS = 3.0
 
 
