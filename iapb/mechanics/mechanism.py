@@ -237,7 +237,7 @@ class Mechanism:
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
         out = np.empty((len(places), self.nv))
-        done = entries.rows_along(self._scratch.parts, places, fixed_to, spots, along, out)
+        done = entries.rows_along(self._block, self._scratch.workspace, places, fixed_to, spots, along, out)
         if done < len(places):
             self._refuse(f"qs[{done}]", places[done])
         return out

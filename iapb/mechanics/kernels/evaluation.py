@@ -97,12 +97,11 @@ def biases_at(at, q, v, out):
 
 
 @kernel
-def rows_along(at, q, body, point, direction, out):
+def rows_along(m, w, q, body, point, direction, out):
     """out (n, d) <- velocity of n world points, fixed to a body each, along directions; return the rows done.
 
     A body -1 does not move. q (n, nq) holds the configuration of each.
     """
-    m, w = at.mechanism, at.workspace
     for i in range(q.shape[0]):
         if not is_configuration(m, q[i]):
             return i

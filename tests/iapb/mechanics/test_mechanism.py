@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from iapb import find_scene, load_scene
 from iapb.compiled import block
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import KINDS
@@ -23,6 +24,7 @@ from iapb.mechanics.kernels.kinematics import (
     point_velocity,
 )
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.scene.mechanism import mechanism_of
 from reference.random_mechanisms import random_mechanism, random_state
 
 FIELD = np.array([0.3, -9.0, 2.0])  # a gravity field along no axis
@@ -368,3 +370,14 @@ def test_vectors_are_what_numpy_says() -> None:
         vectors.store(rows, 1, ta)
         vectors.accumulate(rows, 3, tb)
         assert np.array_equal(rows, [old[0], a, old[2], old[3] + b])
+
+
+@pytest.mark.parametrize("name", ["arm_obstacles", "peg_hole_space", "arm_pushing"])
+def test_rows_along_number_bodies_as_the_scene_does_where_some_do_not_move(name: str) -> None:
+    """The kernels that need M alone leave out what is fixed to the world; contacts name bodies of the whole scene."""
+    mechanism = mechanism_of(load_scene(find_scene(name)))
+    q, rng = mechanism.neutral(), np.random.default_rng(0)
+    for body in range(len(mechanism.names)):
+        point, along = rng.normal(size=3), rng.normal(size=3)
+        [row] = mechanism.rows_along([q], [body], [point], [along])
+        np.testing.assert_allclose(row, along @ mechanism.point_jacobian(q, body, point), atol=1e-13, rtol=1e-12)
