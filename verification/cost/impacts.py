@@ -267,6 +267,7 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     ----------
     budget : time for one impact [s].
     contacts, coordinates : the size of the impact.
+    rounds : times that each way is timed, in random order; the median counts.
 
     Returns
     -------
