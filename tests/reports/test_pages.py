@@ -272,6 +272,7 @@ def test_pages_are_written_whole_with_their_archive(tmp_path: Path) -> None:
     archive = target.parent / ARCHIVE_NAME
     with ZipFile(archive) as file:
         assert {name: file.read(name).decode() for name in file.namelist()} == pages
+        assert {info.date_time for info in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # or its bytes would not repeat
     first = archive.read_bytes()
     write_report(tmp_path / "out", pages)
     assert archive.read_bytes() == first
