@@ -25,7 +25,9 @@ ROWS = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0),
 FORCES = finding_of("C11", "C11", "", "", (Part("p.", REPRODUCED),),
                     {"C11": titled(("part", "coordinate", "IAPB", "PB"), ROWS)})
 NEAR_FLAT = Region((("tilt", "rad", None, 0.015),), share=0.05)
-PARTS = (Part("s.", WHERE, "x, on the full grid", 9, 40, region=NEAR_FLAT), Part("s.", REFUTED, "theta, there", 1, 40))
+WIDER = Region((("tilt", "rad", None, 0.03),), share=0.1)
+PARTS = (Part("s.", WHERE, "x, on the full grid", 9, 40, region=NEAR_FLAT), Part("s.", REFUTED, "theta, there", 1, 40),
+         Part("s.", WHERE, "y, on the full grid", 12, 40, region=WIDER))  # fmt: skip
 PATH = finding_of("C10", "C10", "", "", PARTS)
 
 
