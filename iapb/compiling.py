@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 _listening: list[bool] = []  # not empty: somebody tells already
-BEGIN = "Compiling kernels, the first time only; it takes half a minute or more ..."
+BEGIN = "Compiling kernels (seconds to a minute or two); they are cached for the next time ..."
 
 
 @contextmanager

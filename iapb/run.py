@@ -113,7 +113,7 @@ class ImpactTable:
     solved: Booleans = field(metadata=_along(
         "impact", "1", "0 where the law is not met (friction reduced); passive all the same"))
     mass_digest: Integers = field(metadata=_along(
-        "impact", "1", "first 8 bytes of BLAKE2b of M, little-endian doubles row by row, as a signed integer"))
+        "impact", "1", "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer"))
 
 
 def digests(matrices: Floats) -> Integers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -149,16 +150,29 @@ def _main(given: list[str]) -> int:
         _refuse_empty(given)
         status = _app(given)(args=given, prog_name="iapb", standalone_mode=False)
     except KeyboardInterrupt:
-        print("iapb: stopped; what was finished is kept.", file=sys.stderr)
-        status = 130
+        status = _failed(given, 130, STOPPED)
     except (IapbError, OSError) as error:
         if _Options.debug:
             raise
-        print(f"iapb: {harmless(_sentence(error))}", file=sys.stderr)
-        status = 1
+        status = _failed(given, 1, _sentence(error))
     except Exception as error:
-        status = _usage(error)
+        status = _usage(given, error)
     return status or 0
+
+
+STOPPED = "stopped; files that were complete stay"
+
+
+def _failed(given: list[str], status: int, sentence: str) -> int:
+    """Print an error, with --json also as an object on standard output; return the status."""
+    print(f"iapb: {harmless(sentence)}", file=sys.stderr)
+    _as_json(given, status, sentence)
+    return status
+
+
+def _as_json(given: list[str], status: int, sentence: str) -> None:
+    if "--json" in given:
+        print(json.dumps({"error": sentence, "status": status}, indent=1, ensure_ascii=False))
 
 
 def _end_politely(*_: object) -> None:
@@ -185,18 +199,18 @@ def _sentence(error: IapbError | OSError) -> str:
     return str(error)
 
 
-def _usage(error: Exception) -> int:
+def _usage(given: list[str], error: Exception) -> int:
     """Print a mistake in the command line and return its status; anything else is a fault of ours.
 
     Such a mistake is known by its `show` and `exit_code`: typer brings a click of its own, or uses the one installed.
     """
     if isinstance(error, typer.Abort):
-        print("iapb: stopped; what was finished is kept.", file=sys.stderr)
-        return 130
+        return _failed(given, 130, STOPPED)
     show, status = getattr(error, "show", None), getattr(error, "exit_code", None)
     if show is None or status is None:
         raise error
     show(file=sys.stderr)
+    _as_json(given, int(status), str(getattr(error, "format_message", error.__str__)()))
     return int(status)
 
 

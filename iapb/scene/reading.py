@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
-from iapb.names import one_of
+from iapb.names import nearest, one_of
 from iapb.scene.model import Scene, scene_kind, scene_text
 from iapb.scene.parts import mistakes_of, written
 from iapb.scene.robots import with_robots
@@ -58,7 +58,11 @@ def find_scene(name: str | Path) -> Path:
     ours = scene_folder() / f"{path.stem}.yaml"
     if str(name) in (path.stem, path.name) and ours.is_file():
         return ours
-    raise ArgumentError("scene", str(name), one_of(path.stem, scene_names(), "a file, or one of: "))
+    said, near = one_of(path.stem, scene_names(), "a file, or one of: "), ""
+    if path.suffix:  # a file was meant
+        near = nearest(path.name, (file.name for file in path.parent.glob(f"*{path.suffix}")))
+    raise ArgumentError("scene", str(name), f"{said.partition('; did')[0]}; did you mean {path.parent / near}?" if near
+                        else said)
 
 
 def load_scene(path: str | Path) -> Scene:

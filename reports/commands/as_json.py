@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -14,6 +16,22 @@ import numpy as np
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")]
+
+
+@contextmanager
+def facts_of(json_: bool) -> Iterator[dict[str, Any]]:
+    """Yield a record to fill. With --json it is printed at the end, and sentences go to standard error meanwhile."""
+    facts: dict[str, Any] = {}
+    if not json_:
+        yield facts
+        return
+    try:
+        with redirect_stdout(sys.stderr):
+            yield facts
+    except typer.Exit:
+        print_json(facts)
+        raise
+    print_json(facts)
 
 
 def print_json(value: Any) -> None:

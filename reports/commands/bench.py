@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from datetime import date
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table as Printed
 
 from iapb.errors import ArgumentError
+from reports.commands.as_json import Json, facts_of
 from reports.commands.progress import stage_progress
 from reports.figures.numbers import format_cell
 from reports.provenance import processor
@@ -24,17 +25,27 @@ LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that tak
 def bench(
     full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compiling: minutes.")] = False,
     tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
-    budget: Annotated[str, typer.Option("--budget", help="Which method for an impact in this time, as 50us?")] = "",
-    contacts: Annotated[int, typer.Option("--contacts", help="Size of that impact.")] = 20,
-    coordinates: Annotated[int, typer.Option("--coordinates", help="Size of that impact.")] = 6,
+    budget: Annotated[str, typer.Option("--budget", help="Name the method for an impact in this time, such as 50us.")]
+    = "",
+    contacts: Annotated[int, typer.Option("--contacts", help="Contacts of that impact.")] = 20,
+    coordinates: Annotated[int, typer.Option("--coordinates", help="Coordinates of that impact.")] = 6,
+    json_: Json = False,
 ) -> None:
     """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
-    if budget:
-        _answer(seconds_of(budget), contacts, coordinates)
-        return
+    with facts_of(json_) as facts:
+        if budget:
+            _answer(seconds_of(budget), contacts, coordinates, facts)
+        else:
+            _measure(full, tables, facts)
+
+
+def _measure(full: bool, tables: bool, facts: dict[str, Any]) -> None:
     with stage_progress() as progress:
         topic = haptic_study("full" if full else "quick", progress)
         methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
+    facts.update(processor=processor(), verdict=topic.verdict, parts=topic.parts, failures=topic.failures,
+                 tables={name: table.records() for name, table in topic.tables.items()} | {
+                     "methods on problems": methods.records()})
     console = Console(width=max(140, Console().width))
     for name, numbers in topic.tables.items():
         if tables or name not in LONG:
@@ -66,17 +77,18 @@ UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 def seconds_of(text: str) -> float:
-    """A time such as 50us, 0.5ms or 1e-4 (seconds)."""
-    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ns|us|µs|ms|s|)\s*", text)
+    """A time with its unit, such as 50us or 0.5ms."""
+    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ns|us|µs|ms|s)\s*", text)
     try:
-        return float(found[1]) * UNITS[found[2] or "s"]  # type: ignore[index]
+        return float(found[1]) * UNITS[found[2]]  # type: ignore[index]
     except (TypeError, ValueError):
-        raise ArgumentError("budget", text, "a time such as 50us, 0.5ms or 1e-4 (seconds)") from None
+        raise ArgumentError("budget", text, "a time with its unit, e.g. 50us") from None
 
 
-def _answer(budget: float, contacts: int, coordinates: int) -> None:
+def _answer(budget: float, contacts: int, coordinates: int, facts: dict[str, Any]) -> None:
     """The answer in one sentence per way of calling, and where it was measured."""
     found = which_method(budget, contacts, coordinates)
+    facts.update(processor=processor(), choices=found)
     for choice in found:
         print(choice)
     if not found:

@@ -10,14 +10,13 @@ from typing import Annotated, TextIO
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import ArgumentError, RunFileError
 from reports.commands.as_json import Json, print_json
+from reports.commands.run import counted
 from reports.store.io import written_aside
 from reports.store.runs import read_run
 
@@ -56,20 +55,20 @@ def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
 
 
 def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:
-    """A row for each file, what is certified of it, and the first gain."""
-    table = Table(title="Impacts, judged in real arithmetic")
-    for heading in ("file", "impacts", "gains", "by integers", "M Δv − impulse", "Jᵀp − impulse", "sum − impulse",
-                    "restitution"):
-        table.add_column(heading, justify="left" if heading == "file" else "right")
+    """What is certified of each file, with its residuals and how it was decided, and the first gain."""
     for path, one in found.items():
-        residuals = one.momentum, one.span, one.total, one.restitution
-        sizes = ("not judged" if np.isnan(x) else f"{x:.1e}" for x in residuals)
-        table.add_row(path.name, str(one.impacts), str(one.gains), str(one.by_integers + one.checked), *sizes)
-    Console().print(table)
+        print(f"{path}: {one.words()}")
+        residuals = {"M(v⁺ − v⁻) − impulse": one.momentum, "impulse − Jᵀp": one.span,
+                     "sum of impulses": one.total, "restitution": one.restitution}
+        sizes = [f"{name} {x:.1e}" for name, x in residuals.items() if not np.isnan(x)]
+        if sizes:
+            print(f"  largest relative residuals: {', '.join(sizes)}")
+        if one.impacts:
+            decided = one.impacts - one.by_integers
+            print(f"  decided by a double-double error bound: {decided} (of these {one.checked} confirmed in exact "
+                  f"integer arithmetic); decided in exact integer arithmetic: {one.by_integers}")
     impacts, gains = sum(one.impacts for one in found.values()), sum(one.gains for one in found.values())
-    print(f"{impacts} impacts of {len(found)} files: {gains} gained energy (exact).")
-    for path in found:
-        print(f"{path}: {found[path].words()}")
+    print(f"{counted(impacts, 'impact')} of {counted(len(found), 'file')}: {gains} gained energy (exact).")
     for path in failed[:1]:
         if found[path].counterexample:
             print(f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}")

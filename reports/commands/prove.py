@@ -9,7 +9,7 @@ import typer
 
 from reports.commands.as_json import Json, print_json
 from verification.proofs import all_proofs, check, load
-from verification.proofs.coq_development import NO_ANSWER, says, theorems
+from verification.proofs.coq_development import NO_ANSWER, Theorem, says, theorems
 from verification.proofs.second_tool import CERTIFIED, second_opinion
 
 
@@ -21,7 +21,8 @@ def prove(
 ) -> None:
     """Check every machine-checked statement, or print the proof of one."""
     if json_:
-        _print_json(all_proofs() if name is None else (name,), second_tool)
+        asked = theorems() if second_tool and name is None else ()
+        _print_json(all_proofs() if name is None else (name,), second_tool, asked)
         return
     if name is not None:
         print(check(name).as_text())
@@ -38,22 +39,32 @@ def prove(
           "twin is refuted by an exact counterexample.")
     if second_tool:
         for theorem in theorems():
-            holds = {True: "accepted", False: "refused", None: theorem.coq}[theorem.holds]
             axioms = theorem.error or ", ".join(theorem.axioms) or "-"
-            print(f"Coq: {holds:<8} {theorem.name:<36} {says(theorem.name)}; axioms: {axioms}")
-            failed += [theorem.name] * (theorem.holds is False or theorem.coq == NO_ANSWER)
+            print(f"Coq: {_verdict(theorem):<8} {theorem.name:<36} {says(theorem.name)}; axioms: {axioms}")
+            failed += [theorem.name] * _failed(theorem)
         _ask_second_tool(CERTIFIED)
     if failed:
         raise typer.Exit(1)
 
 
-def _print_json(names: Sequence[str], second_tool: bool) -> None:
+def _verdict(theorem: Theorem) -> str:
+    return {True: "accepted", False: "refused", None: theorem.coq}[theorem.holds]
+
+
+def _failed(theorem: Theorem) -> bool:
+    return theorem.holds is False or theorem.coq == NO_ANSWER
+
+
+def _print_json(names: Sequence[str], second_tool: bool, asked: Sequence[Theorem]) -> None:
     """Print verdicts, and what Coq says; end with 1 where one is not proved or refused."""
     records = [check(name) for name in names]
     opinions = [second_opinion(load(name)) for name in names if second_tool and name in CERTIFIED]
     print_json({"statements": [{"name": one.name, "title": one.title, "verdict": one.verdict, "seconds": one.seconds}
-                               for one in records], "coq": opinions})
-    if any(one.verdict != "proved" for one in records) or any(one.verdict == "refused" for one in opinions):
+                               for one in records], "coq": opinions,
+                "theorems": [{"name": one.name, "says": says(one.name), "verdict": _verdict(one), "axioms": one.axioms,
+                              "error": one.error} for one in asked]})
+    if (any(one.verdict != "proved" for one in records) or any(one.verdict == "refused" for one in opinions)
+            or any(_failed(one) for one in asked)):
         raise typer.Exit(1)
 
 

@@ -13,6 +13,7 @@ import typer
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from reports.commands.as_json import Json, facts_of
 from reports.commands.progress import stage_progress
 from reports.commands.report import print_difference
 from reports.companions import remembering, write_companions
@@ -41,18 +42,20 @@ def reproduce(
     figure: Annotated[str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")] = None,
     check: Annotated[Path | None, typer.Option(
         help="A report to check: compute everything again, and say which numbers agree with it.")] = None,
+    json_: Json = False,
 ) -> None:
     """Regenerate the report; what was computed before is read from its files."""
     depth, folder = "full" if full else "quick", out or Path("out")
-    if check is not None:
-        check_report(check, out)
-    elif figure is not None:
-        _write_figure(figure, folder, depth)
-    else:
-        make_report(folder, depth)
+    with facts_of(json_) as facts:
+        if check is not None:
+            check_report(check, out, facts)
+        elif figure is not None:
+            _write_figure(figure, folder, depth, facts)
+        else:
+            make_report(folder, depth, facts)
 
 
-def make_report(out: Path, depth: str) -> None:
+def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
     """Compute all evidence, or read what is there; write the report and what goes beside it; say the verdicts."""
     started = time.perf_counter()
     took: dict[str, float] = {}
@@ -70,11 +73,14 @@ def make_report(out: Path, depth: str) -> None:
     print(f"Beside it: {', '.join(file.name for file in beside)}.")
     took["figures and page"] = time.perf_counter() - started - sum(took.values())
     print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
-    _end_where_something_failed(failed)
+    facts.update(page=path, beside=beside, files=files, seconds=took,
+                 answers={topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics})
+    _end_where_something_failed(failed, facts)
 
 
-def _end_where_something_failed(failed: Sequence[FailedCases]) -> None:
+def _end_where_something_failed(failed: Sequence[FailedCases], facts: dict[str, Any]) -> None:
     """The last lines: what was not computed, why, and where the tracebacks are; then the command ends with 1."""
+    facts["failed"] = failed
     if not failed:
         return
     count = sum(len(one.failures) for one in failed)
@@ -101,7 +107,7 @@ def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) ->
     return timed
 
 
-def check_report(report: Path, out: Path | None) -> None:
+def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     """Compute everything again, at the report's depth, into `out` or a temporary folder, and compare.
 
     Runs must be the same to the last bit where code, packages and processor are; elsewhere numbers must agree within
@@ -111,7 +117,7 @@ def check_report(report: Path, out: Path | None) -> None:
     if out is not None and out.exists() and any(out.iterdir()):
         raise ArgumentError("--out", str(out), "an empty folder: what is there would be read, not computed again")
     with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as folder:
-        make_report(Path(folder), given.depth)
+        make_report(Path(folder), given.depth, facts)
         made = read_numbers(folder)
     found = compare_reports(given, made)
     reasons = unlike(given.provenance, made.provenance)
@@ -121,12 +127,14 @@ def check_report(report: Path, out: Path | None) -> None:
     print_difference(found, TOLERANCE)
     lost = found.count(ONLY_OLD) + len(found.tables_old)
     failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
+    facts.update(differs_in=reasons, tolerance=TOLERANCE, differing=found.of(DIFFERS), not_made_again=lost,
+                 runs_other=found.runs_other, made_again=not failed)
     print(f"{report}: " + ("every number was made again." if not failed else "not every number was made again."))
     if failed:
         raise typer.Exit(1)
 
 
-def _write_figure(key: str, out: Path, depth: str) -> None:
+def _write_figure(key: str, out: Path, depth: str, facts: dict[str, Any]) -> None:
     """Write a figure's panels, and all of them with their legend in one file; compute only what it needs."""
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
@@ -140,7 +148,8 @@ def _write_figure(key: str, out: Path, depth: str) -> None:
     for name, (svg, label) in {**pictures, f"{key}.svg": (standalone(drawn), "all of it")}.items():
         (out / name).write_text(svg, encoding="utf-8")
         print(f"{out / name}: {label or drawn.title}")
-    _end_where_something_failed(failed)
+    facts["drawings"] = [out / name for name in pictures]
+    _end_where_something_failed(failed, facts)
 
 
 def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,7 +12,7 @@ from iapb.compiling import compiling_told, to_stderr
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
-from reports.commands.as_json import Json, print_json
+from reports.commands.as_json import Json, facts_of, print_json
 from reports.commands.progress import stage_progress
 from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
@@ -59,15 +59,14 @@ def verify(
         raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
     if (contract != "equality" or laws) and (full or simulator or recheck is not None):
         raise typer.BadParameter("not with --full, --simulator or --recheck", param_hint="--contract, --laws")
-    if json_ and (full or recheck is not None):
-        raise typer.BadParameter("not with --full or --recheck, which say where their files are", param_hint="--json")
     if simulator:
         verify_simulators(simulator, scene or (), json_)
         return
-    if recheck is not None:
-        passed = print_recheck(recheck, allow_code)
-    elif full:
-        passed = verify_full(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
+    if recheck is not None or full:
+        with facts_of(json_) as facts:
+            passed = print_recheck(recheck, allow_code, facts) if recheck is not None else verify_full(
+                resolver, impacts or 1_000_000, trajectories, seed, workers, out, facts)
+            facts["passed"] = passed
     else:
         named = [name for given in laws or () for name in given.split(",") if name]
         passed = _kit(resolver, contract, named if laws else None, impacts, seed, unequal, json_)
@@ -92,7 +91,8 @@ def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | No
     return report.passed
 
 
-def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path) -> bool:
+def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path,
+                facts: dict[str, Any]) -> bool:
     """Do what is missing, print a line per law; return whether all are kept. Another's resolver: impacts only."""
     ours = resolver == ENGINE
     bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
@@ -111,6 +111,9 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
     kept = _print_counts(campaign, batches)
     print(f"{campaign.seconds(batches) / 60.0:.1f} minutes of work in all.")
     found = campaign.counterexamples()
+    facts.update(resolver=resolver, folder=campaign.folder, batches=len(batches), found=there,
+                 seconds=campaign.seconds(batches), counterexamples=found,
+                 laws={part: list(laws.values()) for part, laws in campaign.counts(batches).items()})
     if found:
         print(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law. Impacts and "
               "trajectories are runs, for iapb inspect FILE. Judged again by:")
@@ -137,11 +140,13 @@ def count_in_words(count: LawCount) -> str:
     return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
 
 
-def print_recheck(path: Path, allow_code: bool) -> bool:
+def print_recheck(path: Path, allow_code: bool, facts: dict[str, Any]) -> bool:
     """Print every residual of a stored counterexample; return whether all laws are kept now."""
     kept = True
     with compiling_told(to_stderr):
         judged = tuple(recheck(path, allow_code))
+    facts["laws"] = [{"law": law, "passed": residual.passed, "value": residual.value, "tolerance": residual.tolerance}
+                     for law, residual in judged]
     for law, residual in judged:
         print(f"  {'kept  ' if residual.passed else 'BROKEN'} {law}: {residual.value:.2e} of {residual.tolerance:.2e}")
         kept = kept and residual.passed

@@ -13,7 +13,10 @@ import pytest
 
 from reports import cli
 from reports.commands.as_json import print_json
+from verification.cost.impacts import Choice
+from verification.finding import REPRODUCED, Column, Finding, Part, Table
 from verification.proofs import all_proofs
+from verification.proofs.coq_development import Theorem
 
 ROOT = Path(__file__).parents[2]
 SHORT = ("--set", "duration=0.4")
@@ -84,13 +87,48 @@ def test_certify_and_store(answer, folder):
     assert status == 1 and found["count"]["damaged"] == 1
 
 
-def test_verify_and_prove(answer):
+def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
+    """A resolver that breaks the law of restitution."""
+    return 0.0 * velocity
+
+
+def test_bench_and_figures(answer, tmp_path, monkeypatch):
+    choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0)
+    monkeypatch.setattr("reports.commands.bench.which_method", lambda *_: (choice,))
+    status, found = answer("bench", "--budget", "50us")
+    assert status == 0 and found["choices"][0]["method"] == "factored"
+    part, tables = Part("s", REPRODUCED), {"one": Table((Column("x"),), ((1,),))}
+    finding = Finding("cost", "t", "q", "a", REPRODUCED, (part,), tables)
+    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: finding)
+    monkeypatch.setattr("reports.commands.bench.work_precision", lambda **_: Table((Column("y"),), ((2,),)))
+    monkeypatch.setattr("reports.commands.bench.choices", lambda _: Table(()))
+    status, found = answer("bench")
+    assert status == 0 and set(found) == listed("bench")
+    assert found["tables"] == {"one": [{"x": 1}], "methods on problems": [{"y": 2}]}
+    status, found = answer("reproduce", "--figure", "fig02", "--out", tmp_path)
+    assert status == 0 and found["drawings"] and all(Path(each).is_file() for each in found["drawings"])
+
+
+def test_verify_and_prove(answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
     status, found = answer("verify", "--impacts", 20, "--laws", "kinetic_energy")
     assert status == 0 and set(found) == listed("verify") and found["passed"]
     assert [one["law"] for one in found["laws"]] == ["kinetic_energy"]
+    recorded, again = tmp_path / "found", ("verify", "--full", "--impacts", 20, "--trajectories", 0)
+    status, found = answer(*again, "--resolver", "tests.reports.test_as_json:standing_still", "--out", recorded)
+    assert status == 1 and not found["passed"] and set(found) == listed("verify --full")
+    assert {one["law"]: one["failures"] > 0 for one in found["laws"]["impacts"]}["restitution"]
+    status, found = answer("verify", "--recheck", found["counterexamples"][0], "--allow-code")
+    assert status == 1 and not found["passed"] and not found["laws"][0]["passed"]
     status, found = answer("prove", next(iter(all_proofs())))
     assert status == 0 and set(found) == listed("prove")
     assert [one["verdict"] for one in found["statements"]] == ["proved"]
+    refused = Theorem("sign_kept", "yes", ("an_axiom_of_its_own",))
+    monkeypatch.setattr("reports.commands.prove.theorems", lambda: (refused,))
+    monkeypatch.setattr("reports.commands.prove.all_proofs", lambda: ())
+    status, found = answer("prove", "--second-tool")
+    assert status == 1 and found["theorems"][0]["verdict"] == "refused"
+    assert found["theorems"][0]["axioms"] == ["an_axiom_of_its_own"]
 
 
 def test_sweep(answer, tmp_path):

@@ -64,7 +64,7 @@ def test_export_destroys_neither_its_input_nor_an_older_export(
 def test_a_gain_of_the_last_bit_is_shown_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["certify", str(archive(tmp_path / "other.npz", True))]) == 1
     said = capsys.readouterr().out
-    assert "2 impacts of 1 files: 1 gained energy (exact)" in said
+    assert "2 impacts of 1 file: 1 gained energy (exact)" in said
     assert "Impact 1 of" in said and "Fraction" in said
 
 

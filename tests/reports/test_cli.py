@@ -165,6 +165,9 @@ def test_debug_shows_the_traceback(tmp_path):
         (["reproduce", "--figure", "fig99"], "fig99"),
         (["verify", "--resolver", "nothing"], "package.module:function"),
         (["verify", "--resolver", "no_such_module:f"], "can be imported"),
+        (["verify", "--resolver", "json:dumps"], "resolver = 'dumps': expected a function called as (mass_matrix, con"),
+        (["verify", "--resolver", "os.path:basename"], "velocity, restitution): too many positional arguments"),
+        (["bench", "--budget", "50"], "budget = '50': expected a time with its unit, e.g. 50us"),
         (["verify", "--resolver", "iapb:resolve_impct"], "which has no resolve_impct; did you mean resolve_impact?"),
         (["verify", "--simulator", "mujocco"], "did you mean mujoco?"),
         (["verify", "--simulator", "iapb", "--scene", "elastic_cradel"], "did you mean elastic_cradle?"),
@@ -183,6 +186,22 @@ def test_an_error_is_one_sentence_with_value_and_expectation(arguments, said, ia
     assert status == 1
     assert err.startswith("iapb: ") and said in err and "Traceback" not in out + err
     assert not list(tmp_path.rglob("*.h5*"))
+
+
+def test_a_local_file_is_guessed_before_a_scene_of_ours(iapb, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ball.yaml").touch()
+    for given, near in (("bal.yaml", "ball.yaml"), (str(tmp_path / "bell.yaml"), str(tmp_path / "ball.yaml"))):
+        assert iapb("run", given)[2].endswith(f"; did you mean {near}?\n")
+
+
+@pytest.mark.parametrize(("arguments", "status", "said"), [
+    (("run", "no_such_scene"), 1, "no_such_scene"), (("bench", "--budget", "50"), 1, "with its unit"),
+    (("run", "peg_corner", "--speed", "3"), 2, "No such option"), (("run",), 2, "scene")])
+def test_with_json_an_error_is_an_object_too(arguments, status, said, iapb):
+    ended, out, err = iapb(*arguments, "--json")
+    found = json.loads(out)
+    assert ended == found["status"] == status and said in found["error"] and found["error"] and err
 
 
 def test_a_file_that_is_no_run_is_refused(iapb, tmp_path):
@@ -229,7 +248,7 @@ def test_ctrl_c_outside_a_run_is_told_and_ends_with_130(iapb, monkeypatch):
 
     monkeypatch.setattr("reports.commands.schema.scene_schema", stopped)
     status, _, err = iapb("schema")
-    assert status == 130 and err == "iapb: stopped; what was finished is kept.\n"
+    assert status == 130 and err == "iapb: stopped; files that were complete stay\n"
 
 
 def test_a_fault_of_ours_is_not_hidden(monkeypatch):

@@ -258,8 +258,10 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(
     path = str(tmp_path / "tables" / "claims-failed.txt")
     failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
     monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
+    facts: dict[str, object] = {}
     with pytest.raises(typer.Exit) as ended:
-        reproduce.make_report(tmp_path, "quick")
+        reproduce.make_report(tmp_path, "quick", facts)
+    assert facts["failed"] == (FailedCases("claims", failures, path),)
     lines = capsys.readouterr().out.splitlines()
     assert ended.value.exit_code == 1
     assert "Not computed: 22 cases." in lines[-23] and lines[-22] == "  claims: C01: ValueError: planted"
@@ -281,7 +283,7 @@ def test_a_figure_that_raises_costs_that_figure_only(
     monkeypatch.setattr(reproduce, "RECIPES", recipes)
     monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence())
     with pytest.raises(typer.Exit) as ended:
-        reproduce.make_report(tmp_path, "quick")
+        reproduce.make_report(tmp_path, "quick", {})
     assert ended.value.exit_code == 1
     path = tmp_path / "tables" / "figures-failed.txt"
     last = capsys.readouterr().out.splitlines()[-2:]

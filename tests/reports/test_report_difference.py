@@ -212,7 +212,8 @@ def remade(monkeypatch):
     """Stand in for the hours of computing: `reproduce --check` makes the report that is put here."""
     made, folders = [REPORT], []
 
-    def make_report(out, depth):
+    def make_report(out, depth, facts):
+        facts["page"] = out / "report.html"
         folders.append(out)
         out.mkdir(exist_ok=True)
         write_numbers(out / NUMBERS_NAME, replace(made[-1], depth=depth))
@@ -241,6 +242,16 @@ def test_a_report_is_checked_by_making_it_again(other, status, said, remade, tmp
     assert cli.main(["reproduce", "--check", str(tmp_path / "report.html")]) == status
     assert said in capsys.readouterr().out
     assert not remade[1][0].exists()  # the temporary folder is gone
+
+
+def test_a_check_says_as_json_what_was_not_made_again(remade, tmp_path, capsys):
+    write_numbers(tmp_path / NUMBERS_NAME, REPORT)
+    remade[0].append(changed(0, "gain", 1.6))
+    assert cli.main(["reproduce", "--check", str(tmp_path), "--json"]) == 1
+    said = capsys.readouterr()
+    found = json.loads(said.out)
+    assert not found["made_again"] and len(found["differing"]) == 1 and found["page"].endswith("report.html")
+    assert "not every number" in said.err
 
 
 def test_a_check_never_reads_what_is_there(remade, tmp_path, capsys):

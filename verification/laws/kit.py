@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class LawVerdict:
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
     largest_case : the impact that breaks the law with the largest residual; None if none does.
+    smallest_case : the impact with the fewest coordinates and contacts that breaks it, by 1e-6 or more if one does.
     fault : first complaint where the resolver raised or returned nothing usable.
     error : what the law itself raised; it was not tried any further.
     """
@@ -54,6 +56,7 @@ class LawVerdict:
     fault: str = ""
     error: Exception | None = None
     severe: int = 0
+    smallest_case: ImpactCase | None = None
 
     @property
     def passed(self) -> bool:
@@ -188,6 +191,8 @@ class Tally:
     worst_case: ImpactCase | None = field(default=None, repr=False)
     largest_failure: float = -np.inf
     largest_case: ImpactCase | None = field(default=None, repr=False)
+    smallest: tuple[bool, int] = (True, 0)  # of the smallest case: whether it breaks the law by little, its size
+    smallest_case: ImpactCase | None = field(default=None, repr=False)
 
     def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
         """Try one impact; a law that raises is not tried again."""
@@ -209,11 +214,18 @@ class Tally:
             self.worst, self.worst_case = residual, case
         if not residual.passed and (self.largest_case is None or residual.value > self.largest_failure):
             self.largest_failure, self.largest_case = residual.value, case
+        size = residual.value < NOTABLE, _size(case)
+        if not residual.passed and (self.smallest_case is None or size < self.smallest):
+            self.smallest, self.smallest_case = size, case
 
     def verdict(self) -> LawVerdict:
         """What became of it."""
         return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.largest_case, self.fault, self.error, self.severe)
+                          self.largest, self.largest_case, self.fault, self.error, self.severe, self.smallest_case)
+
+
+def _size(case: ImpactCase) -> int:
+    return case.coordinates + case.contacts
 
 
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
@@ -324,7 +336,8 @@ def check_passivity(
     Raises
     ------
     ArgumentError
-        No impacts, an unknown contract or law, or unequal restitution with friction.
+        No impacts, an unknown contract or law, unequal restitution with friction, or a resolver that cannot be called
+        with these arguments.
 
     Notes
     -----
@@ -342,6 +355,7 @@ def check_passivity(
     chosen = choose_laws(contract, laws, unequal_restitution)
     if isinstance(impacts, bool) or not isinstance(impacts, int | np.integer) or impacts < 1:
         raise ArgumentError("impacts", impacts, "a whole number, 1 or more")
+    _refuse_signature(resolver, contract)
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
     tallies = {name: Tally(name, law) for name, law in chosen.items()}
@@ -364,6 +378,20 @@ def _contract(name: str, unequal_restitution: bool) -> Contract:
     if unequal_restitution and name == "frictional":
         raise ArgumentError("unequal_restitution", True, "False with contract 'frictional'")
     return CONTRACTS[name]
+
+
+def _refuse_signature(resolver: Resolver, contract: str) -> None:
+    """Refuse a function that cannot be called as the contract calls it: no law would say more than that."""
+    friction = contract == "frictional"
+    wanted = ("mass_matrix", "contact_jacobian", *["tangents"] * friction, "velocity", "restitution",
+              *["friction"] * friction)
+    try:
+        signature(resolver).bind(*wanted)
+    except TypeError as error:
+        raise ArgumentError("resolver", name_of(resolver), f"a function called as ({', '.join(wanted)}): {error}"
+                            ) from None
+    except ValueError:  # a compiled function need not say what it takes
+        return
 
 
 def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: bool = False) -> dict[str, Law]:
@@ -456,15 +484,14 @@ def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, Impact
 def _counterexample(
     law: Law, broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float, contract: str
 ) -> ImpactCase | None:
-    """The smallest one found: by hypothesis, else the largest failure drawn, shrunk as far as there is time."""
+    """The smallest one found, by hypothesis or among the impacts drawn, shrunk as far as there is time."""
     kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
     for least in (NOTABLE, 0.0):
         fails = partial(_fails, law, resolver, bounds, least, ends)
         found = search_counterexample(fails, search, seed, kind) if search and time.monotonic() < ends else None
-        if found is None and broken.largest_case is not None and fails(broken.largest_case):
-            found = broken.largest_case
-        if found is not None:
-            return shrink(found, fails)
+        drawn = [case for case in (broken.smallest_case, broken.largest_case) if case is not None and fails(case)]
+        if found is not None or drawn:
+            return shrink(min([found] * (found is not None) + drawn, key=_size), fails)
     return None
 
 

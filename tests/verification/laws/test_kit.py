@@ -115,6 +115,17 @@ def test_shrinking_ends_follows_from_the_answers_alone_and_leaves_nothing_to_tak
     assert repr(again) == repr(first) and len(asked) == 2 * count
 
 
+def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_not_reach_it() -> None:
+    def resolver(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: float) -> Floats:
+        """It gains energy with two coordinates, and more with seven; with the sizes between it does not."""
+        return velocity * {2: 2.0, 7: 9.0}.get(len(velocity), 0.0)
+
+    report = check_passivity(resolver, laws=["kinetic_energy"], impacts=100, search=0)
+    assert report.counterexample is not None and report.counterexample.coordinates == 2
+    largest = report.verdict("kinetic_energy").largest_case
+    assert largest is not None and largest.coordinates == 7
+
+
 def test_the_counterexample_can_be_pasted() -> None:
     resolver = PLANTED_BUGS["wrong_sign"].make()
     report = check_passivity(resolver, impacts=50, search=50)
