@@ -1,10 +1,12 @@
-"""What every test shares: the hypothesis profiles."""
+"""What every test shares: the hypothesis profiles, and how interpreted kernels overflow."""
 
 from __future__ import annotations
 
 import os
 
+import numpy as np
 from hypothesis import HealthCheck, settings
+from numba.core import config
 
 # No deadline in any profile: the first call of a compiled kernel takes seconds, the next one microseconds.
 settings.register_profile(
@@ -14,3 +16,5 @@ settings.register_profile(
     "deep", deadline=None, max_examples=3000, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile(os.environ.get("IAPB_HYPOTHESIS_PROFILE", "quick"))
+if config.DISABLE_JIT:
+    np.seterr(all="ignore")  # interpreted kernels over- and underflow as silently as compiled ones

@@ -95,14 +95,14 @@ def scale_impact(mass_matrix, jacobian, velocity, work):
         size = _exponent(velocity[i]) - s[i]
         if _LOWEST_EXPONENT // 2 < size < k - _EXACT:
             work.underflows[0] = True
-        work.velocity[i] = math.ldexp(velocity[i], -(s[i] + k))
+        work.velocity[i] = np.ldexp(velocity[i], -(s[i] + k))
     for i in range(c):
         largest = _LOWEST_EXPONENT
         for j in range(d):
             largest = max(largest, _exponent(jacobian[i, j]) + s[j])
         row[i] = 0 if abs(largest) > -_LOWEST_EXPONENT // 2 else -largest  # a row of zeros
         for j in range(d):
-            work.rows[j, i] = math.ldexp(jacobian[i, j], row[i] + s[j])
+            work.rows[j, i] = np.ldexp(jacobian[i, j], row[i] + s[j])
     return FINE, 0, 0
 
 
@@ -137,7 +137,7 @@ def _scale_mass(mass_matrix, work):
     row, column, largest = 0, 0, -1.0
     for i in range(d):
         for j in range(d):
-            entry = math.ldexp(mass_matrix[i, j], s[i] + s[j])
+            entry = np.ldexp(mass_matrix[i, j], s[i] + s[j])
             work.mass[i, j] = entry
             if abs(entry) > largest:
                 row, column, largest = i, j, abs(entry)
@@ -228,7 +228,7 @@ def row_sizes(work):
         if work.size[i] > 0.0:
             least = min(least, row[i])
     for i in range(c):
-        work.size[i] = math.ldexp(1.0, max(least - row[i], -1000)) if work.size[i] > 0.0 else 1.0
+        work.size[i] = np.ldexp(1.0, max(least - row[i], -1000)) if work.size[i] > 0.0 else 1.0
         even = even and work.size[i] == 1.0
     return even
 
@@ -241,10 +241,10 @@ def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impul
     """
     d, s, k = velocity.shape[0], work.coordinate_exponent, work.velocity_exponent[0]
     for i in range(d):
-        v_plus[i] = math.ldexp(work.v_plus[i], s[i] + k)
-        momentum[i] = math.ldexp(work.momentum[i], k - s[i])
+        v_plus[i] = np.ldexp(work.v_plus[i], s[i] + k)
+        momentum[i] = np.ldexp(work.momentum[i], k - s[i])
     for i in range(impulses.shape[0]):
-        impulses[i] = math.ldexp(work.impulses[i], work.row_exponent[i] + k)
+        impulses[i] = np.ldexp(work.impulses[i], work.row_exponent[i] + k)
     for i in range(d):
         if not math.isfinite(v_plus[i]):
             return 1.0, (math.nan, math.nan, math.nan)
@@ -255,14 +255,14 @@ def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impul
             work.candidate[i] = v_plus[i] - velocity[i]
         factor = passive_step(mass_matrix, velocity, work.candidate, 1.0, v_plus)
         for i in range(d):
-            work.v_plus[i] = math.ldexp(v_plus[i], -(s[i] + k))
+            work.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
         lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
         if factor != 1.0:
             for i in range(d):
                 momentum[i] *= factor
             for i in range(impulses.shape[0]):
                 impulses[i] *= factor
-    change = math.ldexp(kinetic_energies(work.mass, work.velocity, work.v_plus)[1], 2 * k)
+    change = np.ldexp(kinetic_energies(work.mass, work.velocity, work.v_plus)[1], 2 * k)
     low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
     change = low if low > change else change
     return factor, (high if high < change else change, low, high)
@@ -271,7 +271,7 @@ def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impul
 @kernel
 def _outward(value, exponent, towards):
     """value · 2^exponent, one step outwards for what rounding took; a bound of no gain or no loss stays one."""
-    bound = np.nextafter(math.ldexp(value, exponent), towards)
+    bound = np.nextafter(np.ldexp(value, exponent), towards)
     if towards > 0.0 and value <= 0.0:
         return min(bound, 0.0)
     if towards < 0.0 and value >= 0.0:

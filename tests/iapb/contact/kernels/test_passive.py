@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -15,6 +16,7 @@ from iapb.contact.kernels.passive import (
     clamped_step,
     gain,
     gain_enclosure,
+    gain_signs,
     passive_step,
     plainly_loses,
     wide_gain,
@@ -88,9 +90,108 @@ def test_enclosures_hold_what_they_enclose(decades: float) -> None:
             assert Fraction(lower) * unit - slack <= exact <= Fraction(upper) * unit + slack
             assert not (upper <= 0.0 < exact) and not (lower >= 0.0 > exact)
             assert not (plainly_loses(mass, v, w) and exact > 0)
-            narrow += upper - lower <= 2.0**-30 * abs(upper)
-            signs += (upper < 0.0) - (lower > 0.0) != 0
+            narrow += bool(upper - lower <= 2.0**-30 * abs(upper))
+            signs += bool(upper < 0.0 or lower > 0.0)
     assert narrow > 100 and signs > 200
+
+
+def pairs_of(v: np.ndarray, w: np.ndarray) -> tuple[list[list[Fraction]], list[list[Fraction]]]:
+    """w − v and w + v, each as its rounded value and the rest."""
+    both = []
+    for sign in (-1, 1):
+        high = [Fraction(float(b + sign * a)) for a, b in zip(v, w, strict=True)]
+        exact = [Fraction(float(b)) + sign * Fraction(float(a)) for a, b in zip(v, w, strict=True)]
+        both.append([[h, x - h] for h, x in zip(high, exact, strict=True)])
+    return both[0], both[1]
+
+
+def exponent_of(value: Fraction) -> int:
+    return math.frexp(float(value))[1]
+
+
+@pytest.mark.parametrize("decades", [0.0, 8.0])
+def test_the_bounds_are_those_that_are_proved(decades: float) -> None:
+    """A wider bound would shorten impacts, a narrower one has no proof: both radii by their formulas, in rationals."""
+    rng, unit, eta = np.random.default_rng(7), Fraction(2) ** -53, Fraction(2) ** -1074
+    for _ in range(12):
+        d = int(rng.integers(1, 5))
+        mass = rng.normal(size=(d, d))
+        mass += mass.T
+        mass[0, -1] = mass[-1, 0] = mass[0, -1] * float(rng.random() < 0.7)
+        v, w = rng.normal(size=(2, d)) * 10.0 ** rng.uniform(-decades, decades, (2, d))
+        if rng.random() < 0.3:
+            w[0] = v[0]  # an entry that does not change
+        delta, total = pairs_of(v, w)
+        M = [[Fraction(float(x)) for x in row] for row in mass]
+        places = [(i, j) for i in range(d) for j in range(d)]
+        size = sum(abs(delta[i][0]) * abs(Fraction(float(mass[i, j] + mass[j, i])) * total[j][0]) for i, j in places)
+        moved = sum(abs(pair[0]) for pair in delta)
+        _, _, radius, underflow = gain(mass, v, w)
+        assert radius == pytest.approx(float(2 * (d + 6) ** 2 * unit**2 * size), rel=1e-12)
+        assert underflow == pytest.approx(float(d * 16 * eta * (1 + moved)) if moved else 0.0, rel=1e-12)
+        terms = [x * M[i][j] * y for i, j in places for left, right in ((delta, total), (total, delta))
+                 for x in left[i] for y in right[j] if x * M[i][j] * y]
+        tops = [exponent_of(x) + exponent_of(M[i][j]) + exponent_of(y) for i, j in places
+                for left, right in ((delta, total), (total, delta)) for x in left[i] for y in right[j]
+                if x * M[i][j] * y]
+        _, _, radius, exponent = wide_gain(mass, v, w)
+        assert exponent == (max(tops) if tops else 0)
+        n, size = len(terms) + 5, sum(abs(term) for term in terms) / Fraction(2) ** exponent
+        assert radius == pytest.approx(float(n**2 * unit**2 * size + n * Fraction(2) ** -800) if terms else 0.0,
+                                       rel=1e-12)
+
+
+@pytest.mark.parametrize("d", [1, 2, 5])
+@pytest.mark.parametrize("mass_unit", [1.0, 2.0**-990])
+def test_a_loss_is_plain_from_its_margin_on(d: int, mass_unit: float) -> None:
+    """Γ ≤ −(2⁻⁴⁰ + 4 (d + 4) u) T − d² (1 + Σt) 2⁻¹⁰⁰⁰: nine tenths of that are not enough, eleven tenths are."""
+    rng = np.random.default_rng(d)
+    for _ in range(10):
+        root = rng.normal(size=(d, d))
+        mass = (root @ root.T + np.eye(d)) * mass_unit
+        mass, v = 0.5 * (mass + mass.T), rng.normal(size=d)
+        size = 2.0 * 4.0 * float(np.abs(v) @ np.abs(mass) @ np.abs(v))  # T of w = −v
+        margin = (2.0**-40 + 4.0 * (d + 4) * 2.0**-53) * size
+        margin += d * d * (1.0 + 2.0 * np.abs(v).sum()) * 2.0**-1000
+        energy = 4.0 * float(v @ mass @ v)
+        for share, plain in ((0.9, False), (1.1, True)):
+            w = -v * (1.0 - share * margin / energy)  # Γ = −share · margin, but for the square of a small number
+            assert bool(plainly_loses(mass, v, w)) is plain
+            assert float(gamma(mass, v, w)) == pytest.approx(-share * margin, rel=1e-2)
+
+
+def test_a_clamped_step_shortens_by_roundings_only_and_writes_its_products() -> None:
+    """On return: Hv, Hδ and |H|(|v| + |δ|); the step is the longest that gains nothing, to a few dozen roundings."""
+    rng = np.random.default_rng(8)
+    for _ in range(150):
+        d = int(rng.integers(1, 8))
+        mass, v, change = mass_of(rng, d, 2.0), rng.normal(size=d), rng.normal(size=d)
+        if v @ mass @ change > 0.0:
+            change = -change
+        change *= rng.choice([0.3, 1.0, 3.0])
+        w, on_v, on_change, size = np.empty((4, d))
+        factor = clamped_step(mass, v, change, w, on_v, on_change, size)
+        half = 0.5 * (mass + mass.T)
+        np.testing.assert_allclose(on_v, half @ v, atol=1e-14)
+        np.testing.assert_allclose(on_change, half @ change, atol=1e-14 * np.abs(change).max())
+        np.testing.assert_allclose(size, np.abs(half) @ (np.abs(v) + np.abs(change)), rtol=1e-14)
+        longest = min(1.0, float(-2.0 * (v @ half @ change) / (change @ half @ change)))
+        assert longest * (1.0 - 1e-11) <= factor <= longest * (1.0 + 1e-13)
+        np.testing.assert_allclose(w, v + factor * change, rtol=0.0, atol=1e-15 * (np.abs(v) + np.abs(change)).max())
+        assert gamma(mass, v, w) <= 0
+
+
+def test_signs_of_many_gains() -> None:
+    """−1: certainly none; 1: certainly one; with one mass matrix for all or one for each."""
+    v = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]])
+    w = np.array([[1.0, -1.0], [1.0, 3.0], [-1.0, -2.0]])
+    masses, signs = np.array([np.eye(2), 2.0 * np.eye(2), np.diag([1.0, 4.0])]), np.zeros(3, np.int64)
+    for given in (masses, masses[:1]):
+        gain_signs(given, v, w, signs)
+        assert signs.tolist() == [-1, 1, -1]
+    turned = np.array([np.eye(2), np.diag([1.0, 1e-3]), np.diag([1e-3, 1.0])])
+    gain_signs(turned, v, np.array([[2.0, 0.0], [2.0, 0.0], [2.0, 0.0]]), signs)
+    assert signs.tolist() == [-1, 1, -1]
 
 
 def test_a_clear_loss_leaves_the_change_as_it_is() -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
-from iapb.contact.kernels.unilateral import make_push_work, push_only
+from iapb.compiled import block
+from iapb.contact.kernels.impact import make_impact_work
+from iapb.contact.kernels.unilateral import make_push_work, poisson_impact, poisson_impulses, push_only
 
 
 def unit_columns_of(seed: int, d: int, c: int) -> np.ndarray:
@@ -87,3 +91,43 @@ def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
         speeds, size = columns.T @ residual, np.linalg.norm(b)
         assert p.min() >= 0.0 and speeds.min() >= -1e-11 * size
         assert np.abs(p * speeds).max() <= 1e-10 * size * (1.0 + p.max())
+
+
+@given(seed=st.integers(0, 100_000), d=st.integers(1, 6), c=st.integers(1, 8))
+def test_poissons_law_is_two_least_squares_without_negative_parts(seed: int, d: int, c: int) -> None:
+    """Aᵀp minimizes ½|b + Aᵀp|² over p ≥ 0: Lawson and Hanson's method gives the same Δu, rank by rank."""
+    columns, rng = unit_columns_of(seed, d, c), np.random.default_rng(seed + 2)
+    u, e = rng.normal(size=d), rng.uniform(0.0, 1.0, c)
+    p, change = np.full(c, 9.0), np.zeros(d)
+    assert poisson_impulses(columns, c, u, e, p, change, make_push_work(d, c))
+    np.testing.assert_allclose(change, columns @ p, rtol=0.0, atol=1e-12 * (1.0 + np.abs(p).sum()))
+    assert p.min() >= 0.0 and (columns.T @ (u + change)).min() >= -1e-12 * max(1, d) * np.linalg.norm(u)
+    if np.linalg.matrix_rank(columns) == c:  # else compression's impulses are not unique, nor what they return
+        compressed = nnls(columns, -u)[0]
+        returned = compressed * (1.0 + e)
+        expected = returned + nnls(columns, -(u + columns @ returned))[0]
+        np.testing.assert_allclose(p, expected, rtol=0.0, atol=1e-9 * (1.0 + expected.sum()))
+
+
+def test_a_poisson_impact_in_the_units_of_its_rows() -> None:
+    """Impulses belong to the rows as given, whose lengths differ; a row of zeros takes none; the mass is any."""
+    rng = np.random.default_rng(0)
+    for d, c in ((3, 3), (4, 3), (5, 4)):
+        root = rng.normal(size=(d, d))
+        mass, rows, v, e = root @ root.T + np.eye(d), rng.normal(size=(c, d)), rng.normal(size=d), rng.uniform(size=c)
+        rows *= 10.0 ** rng.uniform(-3.0, 3.0, (c, 1))
+        rows[c - 1] = 0.0
+        work: Any = block(make_impact_work(d, c))
+        work.columns[:] = rows.T
+        impulses, v_plus, momentum = np.full(c, 9.0), np.empty(d), np.empty(d)
+        pushing, clamp = poisson_impact(mass, np.linalg.cholesky(mass), v, e, c, True, work, make_push_work(d, c),
+                                        impulses, v_plus, momentum)
+        whitened = np.linalg.solve(np.linalg.cholesky(mass), rows[:-1].T)
+        u = np.linalg.cholesky(mass).T @ v
+        first = nnls(whitened, -u)[0] * (1.0 + e[:-1])
+        expected = first + nnls(whitened, -(u + whitened @ first))[0]
+        np.testing.assert_allclose(impulses[:-1], expected, rtol=1e-9, atol=1e-12 * expected.max())
+        assert impulses[-1] == 0.0 and pushing == np.count_nonzero(expected > 1e-12 * expected.max())
+        assert clamp == 1.0
+        np.testing.assert_allclose(momentum, rows.T @ impulses, atol=1e-12 * np.abs(momentum).max())
+        np.testing.assert_allclose(v_plus, v + np.linalg.solve(mass, momentum), atol=1e-12 * (1 + np.abs(v).max()))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import iapb.system
-from iapb.contact.kernels.step import OK, advance, locate, touching
+from iapb.compiled import block
+from iapb.contact.kernels.step import OK, advance, contact_state, locate, touching
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene import find_scene, load_scene, scene_from_text
@@ -240,3 +242,17 @@ def test_the_broad_phase_leaves_out_no_touching_pair(monkeypatch: pytest.MonkeyP
         count = touching(world, state, state.contacts)
         touched.append(list(zip(state.contacts.shape_a[:count], state.contacts.shape_b[:count], strict=True)))
     assert touched[0] == touched[1] and len(touched[0]) > 5
+
+class Trees(NamedTuple):
+    """What `contact_state` reads of a state."""
+
+    state_of_tree: np.ndarray
+
+
+@pytest.mark.parametrize("states", list(product([FREE, RESTING, COLLIDING], repeat=3)))
+def test_the_state_is_the_tools_or_the_hardest_of_all(states: tuple[int, ...]) -> None:
+    trees: Any = block(Trees(np.array(states, np.int8)))
+    for tool in range(3):
+        assert contact_state(trees, tool) == states[tool]
+    hardest = next(state for state in (COLLIDING, RESTING, FREE) if state in states)
+    assert contact_state(trees, -1) == hardest
