@@ -54,6 +54,7 @@ SHIFTED = 0.05  # of the smaller shape: the way by which friction in an impact m
 SAG = 0.1  # of the smaller shape, or of the range of a joint: more static sag is no rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact gives back no more than it took
 ROUNDED = 1e-9  # share by which rounding may move a limit
+MANY_TURNS = 45  # of a joint that may turn often, only multiples of this many radians are taken for degrees
 MANY_PAIRS = 2000  # with more, only pairs closer than the largest body are looked at
 
 
@@ -391,7 +392,7 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
     chosen: Any = ImpulseAugmented() if law is None else law
     start = Start(settled(scene)[0])
     uses: frozenset[str] = getattr(chosen, "uses", frozenset())
-    found = [*_overlaps(start), *_fast(start)]
+    found = [*_degrees(scene), *_overlaps(start), *_fast(start)]
     if PENALTY in uses:
         found += [*_too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler")), *_sags(start)]
     if FRICTION in uses and PENALTY in uses:
@@ -399,6 +400,37 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
     if IMPULSES in uses and IMPACT_FRICTION not in uses and start.scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
     return tuple(found)
+
+
+def _degrees(scene: Scene) -> Iterator[Caution]:
+    """Angles that look like degrees: whole numbers beyond a turn.
+
+    In radians they are not plausible: a placement needs no more than a turn, and where another run ended is no whole
+    number. A joint may turn often, so of its start and its limits only multiples of 45 count (45 rad are seven turns).
+    """
+    for path, angle, unit in _angles(scene):
+        if abs(angle) > math.tau and angle % unit == 0.0:
+            name = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)[1:]
+            yield Caution("degrees", name, f"{scene.place_of(*path)}{name} = {angle:g} rad looks like degrees: set "
+                          f"{math.radians(angle):.6g}, for angles are in radians")
+
+
+def _angles(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], float, int]]:
+    """Angles of a scene [rad] with their paths and the unit in which degrees are whole."""
+    plain = scene.resolved()
+    for part in ("bodies", "walls"):
+        for i, one in enumerate(plain[part]):
+            shapes = [((part, i, "shapes", k), shape) for k, shape in enumerate(one.get("shapes", ()))]
+            for path, placed in [((part, i), one), *shapes]:
+                yield from (((*path, "angle"), placed["angle"], 1),) if "angle" in placed else ()
+                yield from (((*path, "rpy", k), x, 1) for k, x in enumerate(placed.get("rpy", ())))
+    for i, body in enumerate(scene.bodies):
+        if body.joint == "planar" and len(body.position) == 3:
+            yield ("bodies", i, "position", 2), body.position[2], 1
+        if body.joint == "revolute":
+            yield from ((("bodies", i, "position", k), x, MANY_TURNS) for k, x in enumerate(body.position))
+            limits = body.joint_limits or ()
+            yield from ((("bodies", i, "joint_limits", k), x, MANY_TURNS) for k, x in enumerate(limits))
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:

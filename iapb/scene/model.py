@@ -258,6 +258,7 @@ class Scene(Part):
     )
 
     _source_text: str = PrivateAttr("")
+    _file: str = PrivateAttr("")  # whose text that is, where it was read from one
 
     @field_validator("contact", mode="before")
     @classmethod
@@ -290,6 +291,15 @@ class Scene(Part):
     def source_text(self) -> str:
         """The YAML text that gives this scene."""
         return self._source_text
+
+    def place_of(self, *path: str | int) -> str:
+        """Return where a field stands: "file:line:column: " if the scene was read from a file, else empty."""
+        if not self._file:
+            return ""
+        from iapb.scene.reading import read_document
+
+        line, column = read_document(self._source_text)[0].stands_at(path)
+        return f"{self._file}:{line}:{column}: "
 
     def resolved(self) -> dict[str, Any]:
         """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings.

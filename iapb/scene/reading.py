@@ -116,6 +116,7 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     mistakes += wrong
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
+    scene._file = file if given is root.value else ""
     scene._source_text = text if given is root.value else scene_text(scene, f"{scene.name} with its robots as bodies")
     return scene
 

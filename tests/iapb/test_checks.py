@@ -46,6 +46,35 @@ def test_the_step_holds_k_plus_2b_up_to_4_at_the_lightest_mode_of_a_box_on_two_c
     assert limits.damping == pytest.approx((4.0 - 1e4 * mobility * dt**2) / (2.0 * mobility * dt), rel=1e-6)
 
 
+def test_angles_in_degrees_are_named_with_their_place_and_radians_are_not(tmp_path) -> None:
+    path = tmp_path / "turned.yaml"
+    path.write_text("""name: turned
+rate: 1000
+duration: 0.1
+bodies:
+  - {name: box, joint: planar, mass: 1, inertia: 0.01, position: [0, 0.3, 45],
+     shapes: [{kind: box, size: [0.1, 0.1], angle: -30}]}
+  - {name: arm, joint: revolute, mass: 1, inertia: 0.01, position: [10], joint_limits: [-90, 20]}
+walls:
+  - {name: block, kind: box, size: [1, 0.1], center: [0, -1], angle: 7}
+""", encoding="utf-8")
+    found = [one for one in check_scene(load_scene(path)) if one.kind == "degrees"]
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert {one.where: one.text.partition(": ")[0] for one in found} == {
+        name: f"{path}:{line}:{lines[line - 1].index(value) + 1}" for name, line, value in (
+            ("bodies[0].position[2]", 5, "45"), ("bodies[0].shapes[0].angle", 6, "-30"),
+            ("bodies[1].joint_limits[0]", 7, "-90"), ("walls[0].angle", 9, "7}"))}
+    assert any("45 rad looks like degrees: set 0.785398" in one.text for one in found)
+    for angle in (1.0, 6.0, -math.tau, math.pi, 7.25, 12.3):  # the last two: a body that has turned before
+        assert "degrees" not in kinds(scene(box(position=[0, 1, angle])))
+    assert "degrees" in kinds(scene(box(position=[0, 1, 90])))
+    solid = box(joint="free_flyer", inertia=[0.1, 0.1, 0.1, 0, 0, 0], rpy=[0, 90, 0], position=[])
+    spatial = {"name": "made", "dimensions": 3, "rate": 1000, "duration": 0.1, "bodies": [
+        solid | {"shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}]}]}
+    named = {one.where for one in check_scene(SpatialScene.model_validate(spatial))}
+    assert named == {"bodies[0].rpy[1]"}
+
+
 def test_in_a_stack_all_contacts_swing_together() -> None:
     """Heaving of n boxes on springs 2K: the largest eigenvalue of 2/m tridiag(−1, 2, −1), free end."""
     n = 5

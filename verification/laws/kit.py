@@ -68,7 +68,7 @@ class LawVerdict:
         worst = f"worst {self.worst.value:.2e} of {self.worst.tolerance:.2e}" if self.worst else "-"
         within = self.failures - self.severe
         grades = f" ({self.severe} by more than rounding, {within} within it)" if within else ""
-        line = f"  {mark} {self.statement}: {self.failures} of {self.checked}{grades}, {worst}"
+        line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it{grades}, {worst}"
         return f"{line}\n         {self.fault}" if self.fault else line
 
 
