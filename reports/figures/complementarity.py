@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot, plain_powers
 from reports.figures.style import (
-    AMBER,
     BLUE,
-    CYCLE,
-    GREEN,
+    BOUND,
     INK,
     MUTED,
+    OUTCOMES,
     PAPER,
-    SKY,
     STYLES,
     VERMILION,
     LineStyle,
     line_arguments,
-    numbered,
-    series_legend,
+    looks_of,
 )
 from verification.finding import Table, titled
 
@@ -55,7 +53,7 @@ def agreement_map(numbers: Table, border: Table) -> Drawn:
         Panel(_border(border), f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} "
               "points.", "two contacts"),
     )  # fmt: skip
-    legend = (("agree", STYLES["holds"]), ("differ", STYLES["fails"]), ("r = c", STYLES["bound"]))
+    legend = (("agree", OUTCOMES["holds"]), ("differ", OUTCOMES["fails"]), ("r = c", BOUND))
     return Drawn(panels, numbers, legend)
 
 
@@ -97,7 +95,7 @@ def _kinds(plot: Plot, kinds: Mapping[str, Rows]) -> None:
 def _border(numbers: Table) -> str:
     with Plot("agreement-map-border", (4.1, 3.4)) as plot:
         axes = plot.axes
-        plot.curve([(0.0, 0.0), (1.0, 1.0)], STYLES["bound"], marked=False)
+        plot.curve([(0.0, 0.0), (1.0, 1.0)], BOUND, marked=False)
         for cosine, ratio, predicted, found in numbers.select(_BORDER).rows:
             axes.plot(cosine, ratio, "o" if found else "x", color=BLUE if found else VERMILION, markersize=6,
                       markeredgewidth=1.4)  # fmt: skip
@@ -131,34 +129,27 @@ def where_to_stop(numbers: Table) -> Drawn:
         "IAPB-push (method “poisson”) only pushes, agrees with complementarity to rounding, and takes "
         f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
     )
-    kinds = dict.fromkeys(numbers.column("rows"))
-    legend = series_legend([f"contacts that are {given}" for given in kinds], line=False)
-    return Drawn(panels, numbers, (*legend, ("stop here", STYLES["bound"])), caption)
+    looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
+    return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)
 
 
 def _distance_over(rows: Rows, name: str, limit: float | None = None) -> str:
-    kinds = list(dict.fromkeys(row["rows"] for row in rows))
     with Plot(f"where-to-stop-{name.replace(' ', '-')}") as plot:
-        for number, given in enumerate(kinds):
-            plot.marks([(row[name], row["median distance from the LCP"]) for row in rows if row["rows"] == given],
-                       numbered(number))  # fmt: skip
+        _by_rows(plot, rows, [(row[name], row["median distance from the LCP"]) for row in rows])
         plot.axes.set(xlabel=name, ylabel="distance of the motions, of |v⁻|", ylim=(-0.02, None))
         if limit is not None:
             plot.axes.set_xscale("log")
             counts = (5, 10, 20, 50, 100, 200)
             plot.axes.set_xticks(counts, [str(count) for count in counts], minor=False)
             plot.axes.minorticks_off()
-            plot.axes.axvline(limit, **line_arguments(STYLES["bound"], marked=False))
+            plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
     return plot.svg
 
 
 def _price(rows: Rows, price: Sequence[float]) -> str:
-    kinds = list(dict.fromkeys(row["rows"] for row in rows))
     with Plot("where-to-stop-price") as plot:
-        for number, given in enumerate(kinds):
-            plot.marks([(row["contacts"], ratio) for row, ratio in zip(rows, price, strict=True)
-                        if row["rows"] == given], numbered(number))  # fmt: skip
-        plot.axes.axhline(1.0, **line_arguments(STYLES["bound"], marked=False))
+        _by_rows(plot, rows, [(row["contacts"], ratio) for row, ratio in zip(rows, price, strict=True)])
+        plot.axes.axhline(1.0, **line_arguments(BOUND, marked=False))
         plot.axes.set(xscale="log", xlabel="contacts", ylabel="time, pushing over (21)", ylim=(0.0, None))
         counts = (5, 10, 20, 50, 100, 200)
         plot.axes.set_xticks(counts, [str(count) for count in counts])
@@ -166,38 +157,39 @@ def _price(rows: Rows, price: Sequence[float]) -> str:
     return plot.svg
 
 
-# What is compiled is dashed; IAPB is blue, the rest keeps the numbered styles.
-SOLVERS = {
-    "IAPB kernel": LineStyle(BLUE, "o", (4, 1.6), 1.6, False),
-    "Lemke kernel": LineStyle(VERMILION, "s", (4, 1.6), 1.6, False),
-    "IAPB": LineStyle(BLUE, "o", (), 2.2), "IAPB printed formula": LineStyle(SKY, "D", (), 1.2),
-    "lemke": LineStyle(VERMILION, "s", (), 1.4), "daqp": LineStyle(GREEN, "^", (), 1.4),
-    "quadprog": LineStyle(AMBER, "v", (), 1.2), "gauss_seidel": LineStyle(MUTED, "P", (), 1.2),
-    "proxqp": LineStyle(INK, "*", (), 1.0),
-}  # fmt: skip
+def _by_rows(plot: Plot, rows: Rows, places: Sequence[tuple[float, float]]) -> None:
+    """Mark each place in the look of the rows that were taken."""
+    looks = looks_of(f"contacts that are {row['rows']}" for row in rows)
+    for name, look in looks.items():
+        plot.marks([place for row, place in zip(rows, places, strict=True) if name.endswith(f" {row['rows']}")], look)
+
+
+# At most six curves; the numbers have all. The table calls "IAPB" what Python calls.
+TIMED = {
+    "IAPB kernel": STYLES["IAPB kernel"], "Lemke kernel": STYLES["Lemke kernel"], "IAPB": STYLES["IAPB, Python"],
+    "IAPB printed formula": STYLES["IAPB printed formula"], "gauss_seidel": STYLES["gauss_seidel"],
+    "daqp": STYLES["daqp"],
+}
 
 
 @recipe(
     "cost-of-contacts", "What an impact costs", "complementarity/time per impact", "complementarity/time per step",
     section="complementarity",
     caption="Median time of one impact over its number of contacts; the band reaches from the least to the largest "
-    "sample. Full lines are called from Python, dashed ones from compiled code: compare like with like. A cross: "
+    "sample. Full lines are compiled, dashed ones are called from Python: compare like with like. A cross: "
     "the solver answered wrongly. A triangle at the top: it was left out, too slow for fewer contacts. On a patch "
     "all contacts beyond three are redundant, and IAPB drops them; in a pile none is, and a dense factor costs "
     "what it costs. Last picture: one step of each world.",
 )  # fmt: skip
 def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     """Draw a panel for each family, and the steps."""
-    names = list(dict.fromkeys(numbers.column("solver")))
-    others = [name for name in names if name not in SOLVERS]
-    styles = {name: SOLVERS[name] if name in SOLVERS else CYCLE[(3 + others.index(name)) % len(CYCLE)]
-              for name in names}  # fmt: skip
+    styles = {name: TIMED[name] for name in dict.fromkeys(numbers.column("solver")) if name in TIMED}
     most = max(numbers.column("contacts"))
     panels = [_family(numbers.where(impacts=family).records(), styles, family, most)
               for family in dict.fromkeys(numbers.column("impacts"))]  # fmt: skip
     words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
     panels.append(Panel(_steps(steps), f"Median times of one step in microseconds: {words}.", "one step of a world"))
-    return Drawn(tuple(panels), numbers, tuple(styles.items()))
+    return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in styles.values()))
 
 
 def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int) -> Panel:
@@ -236,12 +228,11 @@ def _steps(numbers: Table) -> str:
     ways, scenes = (list(dict.fromkeys(numbers.column(name))) for name in ("world", "scene"))
     with Plot("cost-of-contacts-steps", (4.6, 2.4)) as plot:
         axes = plot.axes
-        for number, scene in enumerate(scenes):
-            style = CYCLE[number % len(CYCLE)]
+        for number, (scene, style) in enumerate(looks_of(scenes).items()):
             for row in numbers.where(scene=scene).records():
                 y = ways.index(row["world"]) + 0.24 * (number - (len(scenes) - 1) / 2)
                 axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
-                axes.plot(row["median"], y, style.marker, color=style.color, markersize=5)
+                plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
             axes.plot([], [], style.marker, color=style.color, label=scene)
         axes.set(xscale="log", xlabel="time of one step [µs]", ylim=(len(ways) - 0.4, -0.6))
         plain_powers(axes)
@@ -256,29 +247,29 @@ def _steps(numbers: Table) -> str:
     caption="How high a curve starts: the share of problems on which the solver is the fastest. How high it ends: the "
     "share that it solves at all, by residuals recomputed from the problem; refusals, wrong answers and what was "
     "left out for time count as unsolved. Times are of the solve alone, each solver warmed before: for Siconos "
-    "its compiled solve, for the others their call from Python.",
+    "its compiled solve, for the others their call from Python. At most six curves; the numbers have all solvers.",
 )  # fmt: skip
 def performance_profile(numbers: Table) -> Drawn:
     """Draw a panel for each collection and kind of problem; the solvers of the two kinds are numbered apart."""
     panels: list[Panel] = []
-    legend: tuple[tuple[str, LineStyle], ...] = ()
+    legend: dict[str, LineStyle] = {}
     for kind in ("frictionless", "friction"):
         own = numbers.where(kind=kind)
-        looks = series_legend(tuple(dict.fromkeys(own.column("solver"))))
-        legend += looks
+        looks = {name: STYLES[name] for name in dict.fromkeys(own.column("solver")) if name in STYLES}
+        legend |= looks
         for collection in dict.fromkeys(own.column("collection")):
             here = own.where(collection=collection)
             last = {row["solver"]: row["share solved"] for row in here.records()}
             words = ", ".join(f"{solver} {share:.0%}" for solver, share in last.items())
             panels.append(Panel(_profile(here, looks, f"{collection}-{kind}"), f"Shares solved at all: {words}.",
                                 f"{collection}, {kind}"))  # fmt: skip
-    return Drawn(tuple(panels), _ends(numbers), legend)
+    return Drawn(tuple(panels), _ends(numbers), tuple(legend.items()))
 
 
-def _profile(numbers: Table, looks: tuple[tuple[str, LineStyle], ...], key: str) -> str:
+def _profile(numbers: Table, looks: Mapping[str, LineStyle], key: str) -> str:
     with Plot(f"performance-profile-{key.replace(' ', '-')}", (4.4, 3.2)) as plot:
         axes = plot.axes
-        for number, (solver, look) in enumerate(looks):
+        for number, (solver, look) in enumerate(looks.items()):
             curve = numbers.where(solver=solver).select(("factor", "share solved")).rows
             if curve:
                 how = line_arguments(look) | {"markevery": (number % 5, 9)}
@@ -300,6 +291,7 @@ def _ends(numbers: Table) -> Table:
 
 
 _ROUNDING = 1e-12  # errors below are none
+_SCENES = 6  # shown, those with the largest errors
 _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
 
 
@@ -307,15 +299,17 @@ _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over ti
     "rigid-convergence", "The rigid world converges to event-driven truth", "complementarity/convergence",
     section="complementarity",
     caption="The largest error of three steps near each mark, before impacts accumulate. Parallel to the dashed line: "
-    "errors in proportion to the step, which is all that a scheme can do that does not locate impacts. A scene "
-    "whose error is rounding alone has no curve.",
+    "errors in proportion to the step, which is all that a scheme can do that does not locate impacts. The six scenes "
+    "with the largest errors are drawn; the numbers have all.",
 )  # fmt: skip
 def rigid_convergence(numbers: Table) -> Drawn:
     """Draw positions and velocities."""
-    looks = {scene: numbered(number) for number, scene in enumerate(dict.fromkeys(numbers.column("scene")))}
+    errors = {row["scene"]: max(row[column] for column in _ERRORS.values()) for row in numbers.records()}
+    shown = sorted(errors, key=errors.__getitem__)[-_SCENES:]
+    looks = looks_of(scene for scene, error in errors.items() if scene in shown and error > _ROUNDING)
     panels = tuple(Panel(_errors(numbers, looks, column), f"Errors of {label} against the step.", label)
                    for label, column in _ERRORS.items())  # fmt: skip
-    return Drawn(panels, numbers, (*looks.items(), ("first order", STYLES["bound"])))
+    return Drawn(panels, numbers, (*looks.items(), ("first order", BOUND)))
 
 
 def _errors(numbers: Table, looks: Mapping[str, LineStyle], column: str) -> str:
@@ -329,7 +323,7 @@ def _errors(numbers: Table, looks: Mapping[str, LineStyle], column: str) -> str:
         if drawn:  # a line of slope one below all curves
             lowest = min(error / step for step, error in drawn)
             ends = (min(step for step, _ in drawn), max(step for step, _ in drawn))
-            plot.curve([(step, 0.5 * lowest * step) for step in ends], STYLES["bound"], marked=False)
+            plot.curve([(step, 0.5 * lowest * step) for step in ends], BOUND, marked=False)
         plot.log("step [ms]", "error")
         steps = sorted(set(numbers.column("step")))
         plot.axes.set_xticks(steps, [f"{step:.2g}" for step in steps])

@@ -13,10 +13,10 @@ import numpy as np
 
 from reports.figures.figure import Figure, Panel
 from reports.figures.plot import Plot
-from reports.figures.style import BLUE, MUTED, PAPER, VERMILION
+from reports.figures.style import OUTCOMES
 
 _SIZE = (4.1, 2.4)  # inches
-_DOT = 46.0  # area of a full dot [points²]
+_DOT = 6.8  # diameter of a full dot [points]
 
 Outcomes = Sequence[bool | None]
 
@@ -40,7 +40,7 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
         kept = [k for k, value in enumerate(split) if value == name]
         places = _places([across[k] for k in kept], [y[1][k] for k in kept], [holds[k] for k in kept])
         drawn.append(Panel(_map(f"{key}-{number}", x[0], y[0], places, values), _words(x[0], y[0], places), name))
-    legend = (("holds", "holds"), ("fails", "fails"), ("cannot tell", "cannot tell"))
+    legend = tuple(OUTCOMES.items())
     return Figure(key, "", title, caption, tuple(drawn), None, legend if None in holds else legend[:2])
 
 
@@ -62,11 +62,11 @@ def _map(key: str, x_label: str, y_label: str, places: Places, ticks: Sequence[f
             decided = [held for held in trials if held is not None]
             share = float(np.mean(decided)) if decided else 0.0
             if not decided:
-                axes.plot(x, y, "o", markersize=5, markerfacecolor=PAPER, markeredgecolor=MUTED, zorder=3)
+                plot.marks([(x, y)], OUTCOMES["cannot tell"], markersize=5, zorder=3)
             elif share < 1.0:
-                axes.plot(x, y, "x", color=VERMILION, markersize=6, markeredgewidth=1.4, zorder=4)
+                plot.marks([(x, y)], OUTCOMES["fails"], markersize=6, zorder=4)
             if share > 0.0:
-                axes.scatter(x, y, s=_DOT * share, color=BLUE, edgecolor=PAPER, linewidth=0.5, zorder=3)
+                plot.marks([(x, y)], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
         axes.margins(0.08)
         axes.set(xlabel=x_label, ylabel=y_label)
         if ticks:

@@ -19,8 +19,8 @@ from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, inver
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import body_outlines
 from reports.figures.plot import Plot
-from reports.figures.style import FORCE, MUTED, STYLES, line_arguments
-from reports.figures.svg import PATH, TIME, curve_id
+from reports.figures.style import FORCE, MUTED, STYLES, LineStyle, line_arguments
+from reports.figures.svg import PATH, TIME
 from verification.finding import Table, titled
 
 Floats = NDArray[np.float64]
@@ -107,9 +107,9 @@ FIGURES = (
 )  # fmt: skip
 
 
-def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, LineStyle], ...]:
     """Return the legend: each curve under its own style."""
-    return tuple((curve, curve) for curve in names)
+    return tuple((curve, STYLES[curve]) for curve in names)
 
 
 def marks(count: int, number: int) -> tuple[int, int]:
@@ -151,7 +151,7 @@ def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
     with Plot(f"{key}-path", kind=PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             x, y = MILLI * run.device_q[first:, :2].T
-            plot.axes.plot(x, y, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+            plot.axes.plot(x, y, **line_arguments(STYLES[curve]),
                            markevery=marks(len(x), number), zorder=3 + number / 10)  # fmt: skip
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
         invert(plot.axes)
@@ -168,7 +168,7 @@ def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Flo
         for number, (curve, run) in enumerate(runs.items()):
             values = values_of(run)
             plot.axes.plot(run.time[: len(values)], values, **line_arguments(STYLES[curve]), **how,
-                           gid=curve_id(curve), markevery=marks(len(values), number), zorder=3 + number / 10)
+                           markevery=marks(len(values), number), zorder=3 + number / 10)
         plot.axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
         if shown is not None:
             plot.axes.set_ylim(-shown, shown)
@@ -187,7 +187,7 @@ def _printed_panel(key: str, runs: Mapping[str, Run]) -> Panel:
     with Plot(f"{key}-printed", kind=TIME) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             depth = MILLI * (stop - run.device_q[:, 1])
-            plot.axes.plot(run.time, depth, **line_arguments(STYLES[curve]), gid=curve_id(curve),
+            plot.axes.plot(run.time, depth, **line_arguments(STYLES[curve]),
                            markevery=marks(len(depth), number), zorder=3 + number / 10)  # fmt: skip
         plot.axes.set(xlabel="t [s]", ylabel="past the rigid place [mm]", xlim=(0, runs["ideal"].time[-1]),
                       ylim=_PRINTED_RANGE)

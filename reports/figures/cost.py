@@ -12,17 +12,14 @@ from reports.figures.labels import SIZE, label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot
 from reports.figures.style import (
-    AMBER,
     BLUE,
     FORCE,
-    GREEN,
     MUTED,
-    PURPLE,
+    OUTCOMES,
     STYLES,
-    VERMILION,
     LineStyle,
     line_arguments,
-    series_legend,
+    looks_of,
 )
 from verification.cost.impacts import (
     CALLED,
@@ -42,13 +39,9 @@ from verification.finding import Table
 
 Row = Mapping[str, Any]
 
-_LOOKS: dict[str, tuple[str, LineStyle]] = {  # method -> its name at the curve, and its look
-    IAPB: ("IAPB", LineStyle(BLUE, "o", (), 1.8)),
-    SWEEPS: ("Gauss-Seidel", LineStyle(VERMILION, "s", (), 1.4)),
-    LEMKE: ("Lemke", LineStyle(GREEN, "^", (), 1.4)),
-    CALLED: ("IAPB, Python", LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
-    PRINTED: ("printed, numpy", LineStyle(PURPLE, "D", (4, 2), 1.2, filled=False)),
-    QP: ("DAQP, Python", LineStyle(AMBER, "v", (4, 2), 1.2, filled=False)),
+_LOOKS: dict[str, LineStyle] = {  # method -> its look, which has its name at the curve
+    IAPB: STYLES["IAPB"], SWEEPS: STYLES["Gauss-Seidel"], LEMKE: STYLES["Lemke"],
+    CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], QP: STYLES["DAQP, Python"],
 }
 _SHADES = ((1e-9, 0.30), (1e-6, 0.20), (1e-3, 0.10))  # largest error -> shade of the cell
 
@@ -127,14 +120,14 @@ def impact_accuracy(numbers: Table) -> Drawn:
         said += (f"At {c} contact{'s' * (c > 1)} {best['solver']} is up to {best['ratio']:.2g} times as fast as IAPB "
                  f"(compiled, {cases} of 9 impacts): it neither orders rows nor proves that no energy is made. ")
     said = said or "No compiled complementarity solver is as exact as IAPB in less time at any of these sizes."
-    return Drawn(panels, numbers, tuple((name, look) for name, look in _LOOKS.values()),
+    return Drawn(panels, numbers, tuple((look.name, look) for look in _LOOKS.values()),
                  _MARKS + said)
 
 
 def _impacts(numbers: Table, key: str) -> str:
     with Plot(key, (4.1, 3.2)) as plot:
         names, ends, front = [], [], []
-        for method, (name, look) in _LOOKS.items():
+        for method, look in _LOOKS.items():
             points = []
             for rows in by_way(numbers.where(method=method)).values():
                 good = [row for row in rows if row["outcome"] == "ok"]
@@ -154,7 +147,7 @@ def _impacts(numbers: Table, key: str) -> str:
             points.sort()
             plot.curve(points, look)
             if points:
-                names.append(name)
+                names.append(look.name)
                 ends.append(points[-1])
         steps, least = [], np.inf
         for time, error in sorted(front):
@@ -182,14 +175,14 @@ def budget_share(numbers: Table) -> Drawn:
     panels = tuple(Panel(_share(numbers, error), f"Share of impacts solved to {error:g} against time for "
                          f"{', '.join(_LOOKS)}.", f"error below {power_of_error(error)}")
                    for error in _TOLERANCES)  # fmt: skip
-    return Drawn(panels, None, tuple((name, look) for name, look in _LOOKS.values()))
+    return Drawn(panels, None, tuple((look.name, look) for look in _LOOKS.values()))
 
 
 def _share(numbers: Table, tolerance: float) -> str:
     cases = len(set(numbers.select(("contacts", "problem")).rows))
     with Plot(f"budget-share-{power_of_error(tolerance)}", (4.1, 3.0)) as plot:
         ends: list[tuple[float, str, LineStyle]] = []
-        for method, (name, look) in _LOOKS.items():
+        for method, look in _LOOKS.items():
             first: dict[tuple[int, str], float] = {}
             for row in numbers.where(method=method, outcome="ok").records():
                 if row["relative error"] <= tolerance and row["relative energy gain"] <= NO_GAIN:
@@ -199,7 +192,7 @@ def _share(numbers: Table, tolerance: float) -> str:
             heights = [100.0 * k / cases for k in range(len(times) + 1)]
             plot.axes.step([0.05, *times, 1e6 * LONGEST], [*heights, heights[-1]], where="post",
                            **line_arguments(look, marked=False))
-            ends.append((heights[-1], f"{name} {heights[-1]:.0f} %", look))
+            ends.append((heights[-1], f"{look.name} {heights[-1]:.0f} %", look))
         plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * LONGEST), ylim=(0, 104))
         plot.axes.set_yticks(range(0, 101, 20), [str(height) for height in range(0, 101, 20)])
         plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
@@ -211,8 +204,11 @@ def _share(numbers: Table, tolerance: float) -> str:
 
 
 _MOTION_ERRORS = {"position": "error of position [lengths]", "energy made": "energy made [kinetic]"}
-_MOTIONS = ("IAPB, semi-implicit Euler", "IAPB, Runge-Kutta 4", "PB, semi-implicit Euler", "rigid (QP per step)",
-            "MuJoCo", "Drake")  # at most six curves; the numbers have all
+_MOTIONS = {  # at most six curves; the numbers have all
+    "IAPB, semi-implicit Euler": STYLES["IAPB, Euler"], "IAPB, Runge-Kutta 4": STYLES["IAPB, RK4"],
+    "PB, semi-implicit Euler": STYLES["PB, Euler"], "rigid (QP per step)": STYLES["rigid, QP per step"],
+    "MuJoCo": STYLES["MuJoCo"], "Drake": STYLES["Drake"],
+}
 
 
 @recipe(
@@ -225,30 +221,24 @@ _MOTIONS = ("IAPB, semi-implicit Euler", "IAPB, Runge-Kutta 4", "PB, semi-implic
 )  # fmt: skip
 def trajectory_precision(numbers: Table, worth: Table) -> Drawn:
     """Two panels per scene: error, and energy made."""
-    looks = dict(series_legend([name for name in dict.fromkeys(numbers.column("method")) if name in _MOTIONS]))
+    looks = {name: _MOTIONS[name] for name in dict.fromkeys(numbers.column("method")) if name in _MOTIONS}
     panels = tuple(
         Panel(_motions(numbers.where(scene=scene).records(), looks, column, f"{number}-{column.split()[-1]}"),
               f"{scene}: {label} against computing time for {', '.join(looks)}.", f"{scene}: {label}")
         for number, scene in enumerate(dict.fromkeys(numbers.column("scene")))
         for column, label in _MOTION_ERRORS.items()
     )  # fmt: skip
-    return Drawn(panels, worth, tuple(looks.items()))
+    return Drawn(panels, worth, tuple((look.name, look) for look in looks.values()))
 
 
 def _motions(rows: list[dict[str, Any]], looks: Mapping[str, LineStyle], column: str, key: str) -> str:
     with Plot(f"trajectory-precision-{key}", (4.1, 2.9)) as plot:
-        names, ends = [], []
         for method, look in looks.items():
             here = [row for row in rows if row["method"] == method]
             points = [(row["time"], max(row[column], 1e-9)) for row in here if row[column] is not None and row["time"]]
             plot.curve(points, look)
             plot.lost([row["time"] for row in here if row["outcome"] != "ok" and row["time"]], look, 0.98)
-            if points:
-                names.append(method.replace("semi-implicit Euler", "Euler").replace("Runge-Kutta 4", "RK4")
-                             .replace(" (QP per step)", ""))
-                ends.append(points[-1])
         plot.log("computing time [ms per simulated second]", _MOTION_ERRORS[column], ylim=(5e-10, 10.0))
-        label_marks(plot.axes, names, ends)
     return plot.svg
 
 
@@ -269,12 +259,12 @@ def anytime(numbers: Table) -> Drawn:
         Panel(_budgets(sizes, "share of the loss", "linear"), "Energy taken against the share of rows done.",
               "energy taken, of what the whole impact takes"),
     )  # fmt: skip
-    return Drawn(panels, numbers, series_legend(tuple(sizes)))
+    return Drawn(panels, numbers, tuple(looks_of(sizes).items()))
 
 
 def _budgets(sizes: Mapping[str, list[Row]], column: str, scale: str) -> str:
     with Plot(f"anytime-{column.split()[-1]}") as plot:
-        for (_, look), rows in zip(series_legend(tuple(sizes)), sizes.values(), strict=True):
+        for look, rows in zip(looks_of(sizes).values(), sizes.values(), strict=True):
             plot.curve([(row["budget"] / row["rank"], max(row[column], 1e-17)) for row in rows], look)
         plot.axes.set(yscale=scale, xlabel="rows done, of the rank", ylabel=column)
         plot.axes.set_xlim(-0.02, 1.02)
@@ -282,7 +272,7 @@ def _budgets(sizes: Mapping[str, list[Row]], column: str, scale: str) -> str:
 
 
 _HELD = {"contacts": ("coordinates", 12), "coordinates": ("contacts", 60)}  # varied -> what is held, and at what
-_FORMS = {"factored": STYLES["IAPB"], "gram_pinv": STYLES["PB"]}
+_FORMS = {"factored": STYLES["factored"], "gram_pinv": STYLES["gram_pinv"]}
 
 
 @recipe(
@@ -344,7 +334,7 @@ def _effects(scene: str, rows: list[dict[str, Any]]) -> Panel:
 
     with Plot(f"effect-costs-{scene}", (4.6, 3.6)) as plot:
         plot.curve(sorted(places(True)), STYLES["IAPB"], linewidth=0.8)
-        plot.marks(places(False), STYLES["cannot tell"])
+        plot.marks(places(False), OUTCOMES["cannot tell"])
         plot.axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel="error [mm]")
         plot.axes.margins(x=0.35, y=0.12)
         plot.axes.yaxis.set_major_locator(LogLocator(numticks=8))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import STYLES, LineStyle, line_arguments, series_legend
+from reports.figures.style import BOUND, LineStyle, line_arguments, looks_of
 from verification.finding import Table
 
 _SMALLEST = 1e-18  # no gain at all is drawn here: a tenth of what double precision can show
@@ -21,13 +21,13 @@ METHOD, CONDITION, GAIN, SHARE = "method", "condition of M from", "largest relat
 )  # fmt: skip
 def energy_gains(numbers: Table) -> Drawn:
     """Draw both panels from the table of the bulk study."""
-    legend = series_legend(tuple(dict.fromkeys(numbers.column(METHOD))))
+    looks = looks_of(numbers.column(METHOD))
     worst = ", ".join(f"{row[METHOD]} {row[GAIN]:.1e}" for row in numbers.where(**{CONDITION: "all"}).records())
-    panels = (Panel(_curves(numbers, GAIN, dict(legend), "relative gain", None),
+    panels = (Panel(_curves(numbers, GAIN, looks, "relative gain", None),
                     f"Largest relative energy gain of all impacts: {worst}.", "largest gain"),
-              Panel(_curves(numbers, SHARE, dict(legend), "gain / bound", 1.0), "The same as a share of the bound.",
+              Panel(_curves(numbers, SHARE, looks, "gain / bound", 1.0), "The same as a share of the bound.",
                     "as a share of 10 d ε √κ"))
-    return Drawn(panels, numbers, legend)
+    return Drawn(panels, numbers, tuple(looks.items()))
 
 
 def series(numbers: Table, method: str, column: str) -> tuple[list[float], list[float]]:
@@ -42,6 +42,6 @@ def _curves(numbers: Table, column: str, looks: Mapping[str, LineStyle], label: 
             condition, value = series(numbers, method, column)
             plot.curve(zip(condition, [max(v, _SMALLEST) for v in value], strict=True), look)
         if bound is not None:
-            plot.axes.axhline(bound, **line_arguments(STYLES["bound"]))
+            plot.axes.axhline(bound, **line_arguments(BOUND))
         plot.log("condition κ(M), from", label)
     return plot.svg

@@ -13,7 +13,7 @@ from typing import Any
 from reports.figures.style import LineStyle
 from verification.finding import Table
 
-Legend = tuple[tuple[str, str | LineStyle], ...]  # (text, a style or the name of one)
+Legend = tuple[tuple[str, LineStyle], ...]
 
 
 @dataclass(frozen=True)

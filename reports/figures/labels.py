@@ -1,9 +1,12 @@
-"""Names beside marks, moved apart: no name on another one, nor on a mark."""
+"""Names beside marks and at curves, moved apart: not on one another, not on a mark, on a curve only if it must be."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from reports.figures.style import INK, MUTED
 
@@ -21,9 +24,8 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
     Call it last, when the limits of the axes stand. Returns the boxes of the names [points].
     """
     axes.figure.draw_without_rendering()  # the layout decides where marks are
-    scale = 72.0 / axes.figure.dpi
-    marks = [tuple(scale * pixel for pixel in axes.transData.transform(place)) for place in places]
-    frame = tuple(scale * side for side in axes.get_window_extent().extents)
+    marks = [tuple(place) for place in _on_paper(axes, places)]
+    frame = _frame(axes)
     taken: list[Box] = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in marks]
     boxes = []
     for name, place, (x, y) in zip(names, places, marks, strict=True):
@@ -34,6 +36,98 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
         axes.annotate(name, place, (box[0] - x, box[1] - y), textcoords="offset points", fontsize=SIZE, color=INK,
                       va="bottom", arrowprops=None if near else {"arrowstyle": "-", "color": MUTED, "lw": 0.4})
     return boxes
+
+
+def name_curves(axes: Any) -> None:
+    """Write the name of each curve at it, in its colour, where it covers least; what is named already is left alone.
+
+    A curve has a name where its `gid` is "curve=name", as `line_arguments` gives it. A single one needs none.
+    """
+    lines = {str(line.get_gid())[6:]: line for line in axes.lines if str(line.get_gid()).startswith("curve=")}
+    named = [text.get_text() for text in axes.texts]
+    if len(lines) < 2:
+        return
+    axes.figure.draw_without_rendering()  # the layout decides where curves are
+    paths = {name: _on_paper(axes, line.get_xydata()) for name, line in lines.items()}
+    left, bottom, right, top = frame = _frame(axes)
+    taken: list[Box] = [_box_of(text) for text in axes.texts]
+    for name, line in lines.items():
+        if any(text.startswith(name) for text in named):
+            continue
+        own = _dense(paths[name], frame)
+        others = np.vstack([np.zeros((0, 2)), *(_dense(path, frame) for other, path in paths.items() if other != name)])
+        if not len(own):
+            continue
+        size = np.array([_LETTER * NAME_SIZE * len(name) + 2.0, NAME_SIZE + 2.0])
+        best: tuple[float, Box, Any] = (np.inf, (0.0, 0.0, 0.0, 0.0), own[0])
+        for at in own[:: max(len(own) // _PLACES, 1)]:
+            for x, y, away in _AROUND:
+                low = at + np.array([x, y]) * (away + 0.5 * size) - 0.5 * size
+                box = (*low, *(low + size))
+                if box[0] < left or box[1] < bottom or box[2] > right or box[3] > top:
+                    continue
+                cost = _covered(box, others) + 0.5 * _covered(box, own) + away / 4.0 + 40.0 * any(
+                    _overlap(box, other) for other in taken) + 10.0 * _near(at, others)  # fmt: skip
+                if cost < best[0]:
+                    best = (cost, box, at)
+        _, box, at = best
+        taken.append(box)
+        middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+        far = np.hypot(*(np.clip(at, box[:2], box[2:]) - at)) > _GAP + 2.0
+        place = axes.transData.inverted().transform(at * axes.figure.dpi / 72.0)
+        note = axes.annotate(name, place, (middle[0] - at[0], middle[1] - at[1]), textcoords="offset points",
+                             ha="center", va="center", fontsize=NAME_SIZE, color=line.get_color(), zorder=9,
+                             gid=f"name={name}",
+                             arrowprops={"arrowstyle": "-", "color": line.get_color(), "lw": 0.5} if far else None,
+                             annotation_clip=False)
+        if far:
+            note.arrow_patch.set_gid(f"name={name}")
+
+
+NAME_SIZE = 8.0  # points
+_PLACES = 40  # along a curve that are tried
+# directions and distances [points] of a name from its place on the curve
+_AROUND = tuple((x, y, away) for away in (3.0, 10.0, 20.0, 32.0)
+                for x, y in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)))  # fmt: skip
+_STEP = 2.0  # points between the places of a curve that a name must not cover
+
+Points = NDArray[np.float64]
+
+
+def _on_paper(axes: Any, places: Any) -> Points:
+    """Return places of the axes in points of the drawing, once it has its layout."""
+    return np.asarray(axes.transData.transform(np.asarray(places, dtype=float)) * 72.0 / axes.figure.dpi)
+
+
+def _frame(axes: Any) -> Box:
+    left, bottom, right, top = (72.0 / axes.figure.dpi * side for side in axes.get_window_extent().extents)
+    return (left, bottom, right, top)
+
+
+def _box_of(text: Any) -> Box:
+    left, bottom, right, top = (72.0 / text.figure.dpi * side for side in text.get_window_extent().extents)
+    return (left, bottom, right, top)
+
+
+def _dense(path: Points, frame: Box) -> Points:
+    """Return places along a path, evenly spaced, those inside the frame."""
+    path = path[np.isfinite(path).all(axis=1)]
+    if len(path) > 1:
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        at = np.linspace(0.0, way[-1], min(int(way[-1] / _STEP) + 2, 3000))
+        path = np.column_stack([np.interp(at, way, path[:, 0]), np.interp(at, way, path[:, 1])])
+    inside = (path >= np.array(frame[:2]) - 0.5) & (path <= np.array(frame[2:]) + 0.5)
+    return np.asarray(path[inside.all(axis=1)])
+
+
+def _covered(box: Box, points: Points) -> float:
+    return float(np.sum((points[:, 0] > box[0]) & (points[:, 0] < box[2]) & (points[:, 1] > box[1])
+                        & (points[:, 1] < box[3])))  # fmt: skip
+
+
+def _near(place: Points, others: Points) -> bool:
+    """Whether another curve is so near that a name could belong to either."""
+    return bool(len(others)) and float(np.min(np.hypot(*(others - place).T))) < _GAP
 
 
 def _free(x: float, y: float, width: float, taken: Sequence[Box], frame: Sequence[float]) -> Box:

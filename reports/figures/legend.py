@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from reports.figures.style import PAPER, STYLES, VARIABLES, LineStyle
+from reports.figures.style import PAPER, VARIABLES, LineStyle
 
 _MARKERS = {
     "o": '<circle cx="18" cy="7" r="3.6"/>',
@@ -25,9 +25,8 @@ def _color(value: str) -> str:
     return f"var(--{VARIABLES[value]}, {value})"
 
 
-def swatch(style: LineStyle | str) -> Markup:
-    """Return the swatch of a style, given by itself or by its name."""
-    look = STYLES[style] if isinstance(style, str) else style
+def swatch(look: LineStyle) -> Markup:
+    """Return the swatch of a style."""
     line = _line(look) if look.width else ""
     marker = _MARKERS.get(look.marker, "")
     if marker:

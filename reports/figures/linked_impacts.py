@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 from reports.figures.canvas import arrow, note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import BLUE, GREEN, INK, MUTED, PAPER, VERMILION, LineStyle, line_arguments, styled
+from reports.figures.style import FORCE, INK, MUTED, PAPER, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
 from verification.finding import Table
 
 # start of a treatment's name -> its look
-LOOKS = {
-    "simultaneous, relative": LineStyle(BLUE, "o"),
-    "simultaneous, per-body": LineStyle(VERMILION, "s", (5, 1.6)),
-    "event-driven": LineStyle(GREEN, "^", (1.4, 1.4)),
+TREATMENTS = {
+    "simultaneous, relative": STYLES["relative rows (12)"],
+    "simultaneous, per-body": STYLES["per-body rows (13)-(14)"],
+    "event-driven": STYLES["event by event"],
 }
-LEGEND = tuple(zip(("relative rows (12)", "per-body rows (13)-(14)", "event by event"), LOOKS.values(), strict=True))
+LEGEND = tuple((look.name, look) for look in TREATMENTS.values())
 CRADLE, BERNOULLI = "cradle of 5", "Bernoulli"
 ROUNDING = 1e-12  # changes below this are none
 _RADIUS = 0.5
@@ -41,7 +41,7 @@ class Outcome(NamedTuple):
     @property
     def look(self) -> LineStyle:
         """Colour and marker of its treatment."""
-        return next(look for start, look in LOOKS.items() if self.treatment.startswith(start))
+        return next(look for start, look in TREATMENTS.items() if self.treatment.startswith(start))
 
 
 def outcomes(numbers: Table, problem: str) -> list[Outcome]:
@@ -122,7 +122,7 @@ def _kept(axes: Any, place: tuple[float, float], change: float) -> None:
     if abs(change) < ROUNDING:
         note(axes, place, "kept", color=INK)
     else:
-        note(axes, place, f"changed ×{change:.2g}", color=VERMILION, fontweight="bold")
+        note(axes, place, f"changed ×{change:.2g}", color=FORCE, fontweight="bold")
 
 
 def _bernoulli(found: Sequence[Outcome]) -> str:
@@ -140,7 +140,7 @@ def _bernoulli(found: Sequence[Outcome]) -> str:
             note(axes, (0.6, 1.65), _label(outcome).replace(": ", ":\n"), color=outcome.look.color, fontsize=8.5)
             kept = abs(outcome.momentum) < ROUNDING
             note(axes, (0.6, -1.6), "all kept" if kept else f"momentum changed ×{outcome.momentum:.2g}",
-                 color=INK if kept else VERMILION, fontweight="normal" if kept else "bold", fontsize=8.5)  # fmt: skip
+                 color=INK if kept else FORCE, fontweight="normal" if kept else "bold", fontsize=8.5)  # fmt: skip
         return to_svg(drawing, "linked-impacts-bernoulli")
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from reports.figures.canvas import note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import CYCLE, MUTED, STYLES, LineStyle, line_arguments
+from reports.figures.style import BOUND, MUTED, STYLES, LineStyle, line_arguments, looks_of
 from verification.finding import Table
 
 Rows = Sequence[Mapping[str, Any]]
 
-_LOOKS = {"absolute angles": CYCLE[0], "place of the hand": CYCLE[1]}
+_LOOKS = looks_of(("absolute angles", "place of the hand"))
 _STRAIGHT = 1e-13  # [rad] where the straight arm itself is drawn, on an axis that has no zero
 _SMALLEST = 1e-18  # an error of zero is drawn here
 _SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditioned ones
@@ -38,7 +37,7 @@ def coordinate_invariance(numbers: Table) -> Drawn:
     panels = (Panel(_through_the_pose(rows), words, "Towards the straight arm"),
               Panel(_against_the_bound(rows), words, "Error against bound"))  # fmt: skip
     angles, hand = _LOOKS.values()
-    legend = (("in absolute angles", angles), ("in the place of the hand", hand), ("bound", STYLES["bound"]))
+    legend = (("in absolute angles", angles), ("in the place of the hand", hand), ("bound", BOUND))
     return Drawn(panels, numbers, legend)
 
 
@@ -66,7 +65,7 @@ def _against_the_bound(rows: Rows) -> str:
             plot.marks([(row["bound"], max(row["error"], _SMALLEST)) for row in rows
                         if row["coordinates"] == name and row["error"] is not None], look, markersize=5)  # fmt: skip
         low, high = 1e-15, max(row["bound"] for row in rows)
-        plot.curve([(low, low), (high, high)], STYLES["bound"], marked=False)
+        plot.curve([(low, low), (high, high)], BOUND, marked=False)
         plot.axes.axvline(1.0, color=MUTED, linewidth=0.8)
         plot.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
         note(plot.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
@@ -74,7 +73,7 @@ def _against_the_bound(rows: Rows) -> str:
 
 
 def _dashed(look: LineStyle, width: float) -> LineStyle:
-    return LineStyle(look.color, "", STYLES["bound"].dash, width)
+    return LineStyle(look.color, "", BOUND.dash, width)
 
 
 _QUANTITIES = {
@@ -83,10 +82,10 @@ _QUANTITIES = {
     "attitude error": ("Attitude", "attitude error [rad]"),
 }
 _INTEGRATORS = {
-    "semi_implicit_euler": ("semi-implicit Euler", CYCLE[0]),
-    "midpoint": ("midpoint", CYCLE[1]),
-    "runge_kutta_4": ("Runge-Kutta 4", replace(CYCLE[2], filled=False)),
-    "commutator_free_4": ("commutator-free Runge-Kutta 4", CYCLE[3]),
+    "semi_implicit_euler": STYLES["semi-implicit Euler"],
+    "midpoint": STYLES["midpoint"],
+    "runge_kutta_4": STYLES["Runge-Kutta 4"],
+    "commutator_free_4": STYLES["commutator-free Runge-Kutta 4"],
 }
 
 
@@ -99,10 +98,10 @@ _INTEGRATORS = {
 )  # fmt: skip
 def tumbling_drift(numbers: Table) -> Drawn:
     """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
-    series = [(name, look, numbers.where(integrator=integrator, motion="turning over").records())
-              for integrator, (name, look) in _INTEGRATORS.items()]  # fmt: skip
+    series = [(look.name, look, numbers.where(integrator=integrator, motion="turning over").records())
+              for integrator, look in _INTEGRATORS.items()]  # fmt: skip
     panels = tuple(_drift(series, column, *names) for column, names in _QUANTITIES.items())
-    legend = (*_INTEGRATORS.values(), ("declared slope", STYLES["bound"]))
+    legend = (*((look.name, look) for look in _INTEGRATORS.values()), ("declared slope", BOUND))
     return Drawn(panels, numbers, legend)
 
 
@@ -118,7 +117,7 @@ def _drift(series: Sequence[tuple[str, LineStyle, Rows]], column: str, name: str
     return Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name)
 
 
-_SETTINGS = ("no filter", "coherence alone", "clustering alone", "both filters")
+_SETTINGS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))
 _DAMPING = 40.0  # [N s/m] of the panels in time: the scene's own
 _DURATION = 2.0  # [s]
 
@@ -143,16 +142,16 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
               "Energy lost in false collisions, cumulative.", "Energy that they take"),
         Panel(_bars(counts), words, "By damping of the contact"),
     )  # fmt: skip
-    return Drawn(panels, counts, tuple(zip(_SETTINGS, CYCLE, strict=False)))
+    return Drawn(panels, counts, tuple(_SETTINGS.items()))
 
 
 def _in_time(numbers: Table, column: str, label: str) -> str:
     with Plot(f"socket-collisions-{numbers.keys.index(column)}") as plot:
         axes, here = plot.axes, numbers.where(damping=_DAMPING)
-        for number, setting in enumerate(_SETTINGS):
+        for setting, style in _SETTINGS.items():
             mine = here.where(filters=setting)
             time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
-            look = line_arguments(CYCLE[number], marked=bool(mine.rows))
+            look = line_arguments(style, marked=bool(mine.rows))
             axes.step(time, [*value, value[-1]], where="post", **look | {"markevery": 4, "clip_on": False})
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
         axes.set_ylim(bottom=0.0)
@@ -165,10 +164,10 @@ def _bars(numbers: Table) -> str:
     dampings = sorted(set(numbers.column("damping")))
     with Plot("socket-collisions-damping") as plot:
         axes = plot.axes
-        for number, setting in enumerate(_SETTINGS):
+        for number, (setting, style) in enumerate(_SETTINGS.items()):
             heights = [numbers.where(filters=setting, damping=b).column("false collisions")[0] for b in dampings]
             places = [k + 0.2 * (number - 1.5) for k in range(len(dampings))]
-            axes.bar(places, heights, width=0.17, color=CYCLE[number].color)
+            axes.bar(places, heights, width=0.17, color=style.color)
             for place, height in zip(places, heights, strict=True):
                 note(axes, (place, height), str(height), (0, 6), fontsize=8)
         axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])

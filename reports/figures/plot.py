@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from types import TracebackType
 from typing import Any
 
+from reports.figures.labels import name_curves
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import PANEL, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg, traced_svg
@@ -52,6 +53,7 @@ class Plot:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:  # fmt: skip
         if error is None:
+            name_curves(self.axes)
             self.svg = traced_svg(self.drawing, self.key, self.kind) if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
 

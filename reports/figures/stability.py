@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import BLUE, INK, MUTED, PAPER, STYLES, VERMILION, LineStyle
+from reports.figures.style import BOUND, MUTED, STYLES, LineStyle
 from verification.finding import Table
 
-_LEGEND = (
-    ("both laws", LineStyle(MUTED, "o", (), 0.0)),
-    ("only impulses", LineStyle(BLUE, "o", (), 0.0, filled=False)),
-    ("only penalties", LineStyle(VERMILION, "s", (), 0.0)),
-    ("b = KT/2 + B", LineStyle(INK, "", (4, 2), 1.2)),
-)
+_HOLDS = {  # which laws hold a wall -> its mark, in the colour of the world
+    "both laws": LineStyle(MUTED, "o", (), 0.0),
+    "only impulses": replace(STYLES["impulses"], width=0.0, filled=False, name=""),
+    "only penalties": replace(STYLES["penalty"], width=0.0, name=""),
+}
 _LOOP = ("rate", "sensors", "device damping")
 _SETTLES = "+"
 
@@ -32,7 +32,7 @@ def stability_map(table: Table, dampings: Table) -> Drawn:
     damping = np.array(dampings.column("damping"))
     panels = tuple(_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
                    for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows)))  # fmt: skip
-    return Drawn(panels, table, _LEGEND)
+    return Drawn(panels, table, (*_HOLDS.items(), ("b = KT/2 + B", BOUND)))
 
 
 def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray) -> Panel:
@@ -43,21 +43,18 @@ def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray
     shown = np.where(damping > 0.0, damping, damping[damping > 0.0].min() / 2.0)  # the row without damping
     K, B = np.meshgrid(stiffness, shown, indexing="ij")
     with Plot(f"stability-map-{number}", (3.1, 2.5)) as plot:
-        for where, look in ((theirs & ours, {"marker": ".", "color": MUTED, "s": 9}),
-                            (ours & ~theirs, {"marker": "o", "facecolor": PAPER, "edgecolor": BLUE, "s": 17}),
-                            (theirs & ~ours, {"marker": "s", "color": VERMILION, "s": 11})):  # fmt: skip
-            plot.axes.scatter(K[where], B[where], zorder=3, **look)
+        for where, look in zip((theirs & ours, ours & ~theirs, theirs & ~ours), _HOLDS.values(), strict=True):
+            plot.marks(zip(K[where], B[where], strict=True), look, markersize=3.6)
         if (bound > 0.0).any():
             fine = np.geomspace(stiffness[0], 2.0 * b * rate * 0.999, 60)
-            plot.axes.plot(fine, np.maximum(b - 0.5 * fine / rate, shown[0] * 0.7), color=INK, dashes=(4, 2),
-                           linewidth=1.2)  # fmt: skip
+            plot.curve(zip(fine, np.maximum(b - 0.5 * fine / rate, shown[0] * 0.7), strict=True), BOUND)
         plot.log("stiffness [N/m]", "damping [N s/m]", xlim=(stiffness[0] / 1.3, stiffness[-1] * 1.3),
                  ylim=(shown[0] * 0.7, shown[-1] * 1.4))  # fmt: skip
     alt = f"Of {ours.size} walls {int(theirs.sum())} come to rest with penalties, {int(ours.sum())} with impulses."
     return Panel(plot.svg, alt, f"{rate:.0f} Hz, {sensors} sensors, b = {b:g} N s/m")
 
 
-_LAWS = {"penalty": STYLES["PB"], "impulses": STYLES["IAPB"]}
+_LAWS = {"penalty": STYLES["penalty"], "impulses": STYLES["impulses"]}
 _FELT = ("rate-hardness", "settles after", "penetration")
 
 

@@ -6,9 +6,10 @@ grey print can be read. The page maps each colour to a variable, so that dark mo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any
 
 INK, MUTED, RULE, PAPER = "#1b1f24", "#66707b", "#d9dde2", "#fffefc"
@@ -32,37 +33,74 @@ class LineStyle:
     dash: tuple[float, ...] = ()
     width: float = 1.5
     filled: bool = True
+    name: str = ""  # of what is drawn; the drawing and its legend carry it
 
 
-STYLES: dict[str, LineStyle] = {
-    # worlds of Figures 7, 8, 10, 11
-    "ideal": LineStyle(INK, "", (), 2.4),
-    "IAPB": LineStyle(BLUE, "o", (), 1.6),
-    "PB": LineStyle(VERMILION, "s", (5, 1.6), 1.5),
-    "CBuc": LineStyle(GREEN, "^", (1.4, 1.4), 1.6),
-    # device limits, Figure 9
-    "pfull": LineStyle(BLUE, "o", (), 1.6),
-    "psaturated": LineStyle(VERMILION, "s", (5, 1.6), 1.5),
-    "pscaled": LineStyle(PURPLE, "D", (1.4, 1.4), 1.6),
-    "pspread": LineStyle(GREEN, "^", (6, 1.6, 1.4, 1.6), 1.6),
-    # emulated device, Figures 12, 13
-    "IAPB LM": LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6), 1.5),
+# A row per thing that is drawn: the names that figures give it, and its look. No two rows look alike, and what is drawn
+# of one thing looks the same in every figure. A world's colour and marker belong to it alone.
+LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
+    # the paper's worlds, and ours
+    (("ideal", "rigid, QP per step"), LineStyle(INK, "", (), 2.4)),
+    (("IAPB", "pfull", "factored", "IAPB kernel", "IAPB, Euler", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
+    (("PB", "PB, Euler", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
+    (("CBuc",), LineStyle(GREEN, "^", (1.4, 1.4), 1.6)),
+    (("ideal-friction",), LineStyle(INK, "D", (4, 1.6), 1.6)),
+    (("IAPB-friction",), LineStyle(SKY, "v", (6, 1.6, 1.4, 1.6), 1.5)),
+    (("IAPB-push",), LineStyle(AMBER, "P", (3, 1.2), 1.5)),
+    # IAPB with a limited device
+    (("psaturated",), LineStyle(AMBER, "X", (5, 1.6), 1.5)),
+    (("pscaled",), LineStyle(SKY, "D", (1.4, 1.4), 1.6)),
+    (("pspread", "IAPB LM"), LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6), 1.6)),
+    # methods for an impact and solvers; what Python calls is dashed, its marks empty
+    (("IAPB, Python", "IAPB, RK4"), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
+    (("factored, no clamp",), LineStyle(SKY, "s", (5, 1.6))),
+    (("printed, numpy", "gram_pinv", "gram_pinv, as printed", "IAPB printed formula"),
+     LineStyle(PURPLE, "s", (4, 2), 1.4)),
+    (("Gauss-Seidel",), LineStyle(VERMILION, "v", (), 1.4)),
+    (("gauss_seidel",), LineStyle(VERMILION, "v", (4, 2), 1.2, filled=False)),
+    (("Lemke", "Lemke kernel"), LineStyle(GREEN, "<", (), 1.4)),
+    (("lemke",), LineStyle(GREEN, "<", (4, 2), 1.2, filled=False)),
+    (("DAQP, Python", "daqp"), LineStyle(AMBER, "D", (4, 2), 1.2, filled=False)),
+    (("quadprog",), LineStyle(MUTED, ">", (4, 2), 1.2, filled=False)),
+    (("proxqp",), LineStyle(INK, "*", (4, 2), 1.2, filled=False)),
+    (("cvxpy_clarabel",), LineStyle(SKY, "P", (4, 2), 1.2, filled=False)),
+    (("cvxpy_socp",), LineStyle(SKY, "P", (4, 2))),
+    (("newton_cones",), LineStyle(BLUE, "^", (1.4, 1.4))),
+    (("nsgs",), LineStyle(VERMILION, "P", (6, 1.6, 1.4, 1.6))),
+    (("pinocchio_admm",), LineStyle(PURPLE, "v")),
+    (("pinocchio_pgs",), LineStyle(AMBER, "*", (3, 1.2))),
+    # other engines
+    (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
+    (("Drake",), LineStyle(AMBER, "v", (1.4, 1.4))),
+    # integrators
+    (("semi-implicit Euler",), LineStyle(MUTED, "s")),
+    (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),
+    (("Runge-Kutta 4",), LineStyle(GREEN, "D", (1.4, 1.4), filled=False)),
+    (("commutator-free Runge-Kutta 4",), LineStyle(PURPLE, "P", (6, 1.6, 1.4, 1.6))),
+    # rows of an impact
+    (("relative rows (12)",), LineStyle(BLUE, "D")),
+    (("per-body rows (13)-(14)",), LineStyle(VERMILION, "X", (5, 1.6))),
+    (("event by event",), LineStyle(GREEN, ">", (1.4, 1.4))),
     # Figure 3
-    "KE₀": LineStyle(INK, "", (4, 2), 1.2),
-    "uniform rods": LineStyle(BLUE, "o", (), 1.8),
-    "point masses": LineStyle(VERMILION, "s", (5, 1.6), 1.5, filled=False),
-    "bound": LineStyle(INK, "", (4, 2), 1.2),
-    # maps of conditions
+    (("uniform rods",), LineStyle(SKY, "o", (), 1.8)),
+    (("point masses",), LineStyle(PURPLE, "o", (5, 1.6), 1.5, filled=False)),
+)  # fmt: skip
+STYLES: dict[str, LineStyle] = {name: replace(look, name=name) for names, look in LOOKS for name in names}
+
+BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, a declared slope, the value before
+
+# marks of maps and tables: how a trial came out
+OUTCOMES: dict[str, LineStyle] = {
     "holds": LineStyle(BLUE, "o", (), 0.0),
     "fails": LineStyle(VERMILION, "X", (), 0.0),
     "cannot tell": LineStyle(MUTED, "o", (), 0.0, filled=False),
 }
 
-# series that are ours to number: methods, tolerances, ...
+# series that are ours to number: sizes, scenes, filters; none looks like a world
 CYCLE = (
-    LineStyle(BLUE, "o"), LineStyle(VERMILION, "s", (5, 1.6)), LineStyle(GREEN, "^", (1.4, 1.4)),
-    LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6)), LineStyle(AMBER, "v"), LineStyle(SKY, "P", (3, 1.2)),
-    LineStyle(INK, "X", (1, 1)), LineStyle(MUTED, "*", (4, 1, 1, 1)), LineStyle(GREEN, "<", (8, 2)),
+    LineStyle(SKY, "o"), LineStyle(AMBER, "s", (5, 1.6)), LineStyle(PURPLE, "^", (1.4, 1.4)),
+    LineStyle(MUTED, "D", (6, 1.6, 1.4, 1.6)), LineStyle(BLUE, "v"), LineStyle(VERMILION, "P", (3, 1.2)),
+    LineStyle(INK, "X", (1, 1)), LineStyle(GREEN, "*", (4, 1, 1, 1)), LineStyle(AMBER, "<", (8, 2)),
     LineStyle(PURPLE, ">", (8, 2, 1, 2)),
 )
 
@@ -84,15 +122,15 @@ _PARAMETERS: Any = {
 PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a desk, one on a phone
 
 
-def series_legend(names: Sequence[str], *, line: bool = True) -> tuple[tuple[str, LineStyle], ...]:
-    """Return the legend of series that are numbered in the order of `names`; without `line`, markers only."""
-    looks = (CYCLE[number % len(CYCLE)] for number in range(len(names)))
-    return tuple((name, look if line else replace(look, width=0.0)) for name, look in zip(names, looks, strict=True))
+def looks_of(names: Iterable[str]) -> dict[str, LineStyle]:
+    """Return the look of each name: its own where it has one, else the next of the numbered ones."""
+    numbers = count()
+    return {name: STYLES[name] if name in STYLES else numbered(next(numbers), name) for name in dict.fromkeys(names)}
 
 
-def numbered(number: int) -> LineStyle:
+def numbered(number: int, name: str = "") -> LineStyle:
     """Return the style of a numbered series; from the second round on with empty markers."""
-    return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE))
+    return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE), name=name)
 
 
 @contextmanager
@@ -108,6 +146,7 @@ def styled() -> Iterator[Any]:
 def line_arguments(style: LineStyle, *, marked: bool = True) -> dict[str, Any]:
     """Return the keyword arguments with which matplotlib draws a curve of this style."""
     return {
+        **({"gid": f"curve={style.name}"} if style.name else {}),
         "color": style.color,
         "linewidth": style.width,
         "linestyle": (0, style.dash) if style.dash else "-",

@@ -22,7 +22,7 @@ TIME, PATH = "time", "path"  # a curve over time may be zoomed along t alone; a 
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
-_TOLD = re.compile(r'\sid="(curve|axis|label)=([^"]*)"')  # what a gid tells the page's script, see `traced_svg`
+_TOLD = re.compile(r'\sid="(curve|name|axis|label)=([^"]*)"')  # what a gid tells the page's script, see `traced_svg`
 _TURNED_BY_NOTHING = re.compile(r'\stransform="rotate\(-?0 [^)]*\)"')
 _COMMAND = re.compile(r"\s*([MLCQz])\s*")  # of a path's data; the letters part the numbers by themselves
 _PATH = re.compile(r'\sd="[^"]*"')
@@ -96,11 +96,6 @@ def _themed(text: str) -> str:
     """Let the page choose colours and font."""
     text = _FONT.sub("var(--sans, sans-serif)", text)
     return _HEX.sub(lambda match: f"var(--{VARIABLES[match.group()]}, {match.group()})", text)
-
-
-def curve_id(name: str) -> str:
-    """Return the `gid` of a curve; the legend toggles curves by this name."""
-    return f"curve={name}"
 
 
 def traced_svg(drawing: Any, key: str, kind: str = TIME) -> str:

@@ -17,7 +17,7 @@ from reports.figures.canvas import Canvas, arrow, note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import Placement, body_placements
 from reports.figures.plot import Plot
-from reports.figures.style import BLUE, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
+from reports.figures.style import BLUE, BOUND, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
 from verification.finding import titled
 
 LENGTH, MASS = 1.0, 1.0  # of both links [m], [kg]
@@ -121,7 +121,7 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
     rows = tuple((float(energies["restitution"][k]), *(float(energies[name][k]) for name in series)) for k in shown)
     note = "KE₀ is 7/3 J for uniform rods and 5 J for point masses at the far ends of the links."
     numbers = titled(("e", *(f"{name} [J]" for name in series)), rows, digits=6, note=note)
-    legend = (*((reading, reading) for reading in READINGS), ("before the collision, KE₀", "KE₀"))
+    legend = (*((reading, STYLES[reading]) for reading in READINGS), ("before the collision, KE₀", BOUND))
     return Drawn(tuple(_collision(energies, contact) for contact in CONTACTS), numbers, legend)
 
 
@@ -130,7 +130,7 @@ def _collision(energies: Mapping[str, Floats], contact: str) -> Panel:
     with Plot(f"fig03-{contact}") as plot:
         for reading, kinetic in zip(READINGS, ("7/3", "5"), strict=True):
             before = energies[f"{reading}, KE0"]
-            plot.axes.plot(e, before, **line_arguments(STYLES["KE₀"]))
+            plot.axes.plot(e, before, **line_arguments(BOUND))
             plot.axes.plot(e, energies[f"{reading}, {contact}"], **line_arguments(STYLES[reading]), markevery=5)
             plot.axes.annotate(f"KE₀ = {kinetic} J", (0.0, before[0]), xytext=(2, 4), textcoords="offset points",
                                fontsize=8.5)  # fmt: skip

@@ -6,16 +6,11 @@ from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.numbers import power_of_ten
-from reports.figures.style import AMBER, PURPLE, SKY, STYLES, LineStyle, line_arguments, numbered, styled
+from reports.figures.style import LineStyle, line_arguments, looks_of, styled
 from reports.figures.svg import to_svg
 from verification.finding import Table
 
 _SIZE = (9.6, 5.4)  # inches
-_WORLDS = STYLES | {
-    "ideal-friction": LineStyle(PURPLE, "D", (), 2.0),
-    "IAPB-friction": LineStyle(SKY, "v", (6, 1.6, 1.4, 1.6), 1.5),
-    "IAPB-push": LineStyle(AMBER, "P", (3, 1.2), 1.5),
-}
 _DISTANCES = ("configuration", "velocity", "impulse")  # zero in the reference world
 _LINEAR = 30.0  # largest ratio of peaks that an even scale shows; beyond, distances are on a logarithmic one
 _ROUNDING = 1e-9  # share of the largest peak under which a curve is rounding and need not be seen
@@ -38,7 +33,7 @@ def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""
     names = [str(name) for name in table.column("world")]
     against = next((row["world"] for row in table.records() if row["configuration, rms"] is None), "")
-    looks = {name: _WORLDS.get(name, numbered(k)) for k, name in enumerate(names)}
+    looks = looks_of(names)
     with styled() as new_figure:
         drawing = new_figure(figsize=_SIZE, layout="constrained")
         axes = drawing.subplots(2, 3).ravel()

@@ -15,27 +15,21 @@ from reports.figures import RECIPES, energy_gains
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.numbers import format_cell, format_number
-from reports.figures.style import CYCLE, STYLES, VARIABLES
+from reports.figures.style import CYCLE, VARIABLES
 from reports.figures.two_link_arm import arm_energies
-from verification.cost.impacts import METHOD_COLUMNS
-from verification.finding import table_of, titled
+from tests.reports.figure_inputs import tables
+from verification.finding import titled
 
 GAINS = titled(
     (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE),
     (("factored", "1e2", 0.0, 0.0), ("factored", "1e4", 1e-16, 0.1), ("printed", "1e2", 1e-3, 1e11),
      ("printed", "all", 1e-3, 1e11)),
 )
-WORK = table_of(METHOD_COLUMNS, [
-    {"contacts": 4, "coordinates": 3, "problem": "peg", "method": method, "work": "all rows", "called": called,
-     "time": time, "relative error": error, "relative energy gain": gain, "outcome": "ok"}
-    for method, called, time, error, gain in (
-        ("IAPB", "compiled", 1.0, 1e-16, 0.0), ("printed formula (numpy)", "from Python", 20.0, 1e-12, 1e-9))
-])
 
 
 @pytest.fixture(scope="module")
 def inputs() -> dict[str, object]:
-    """Everything the recipes ask for; two short runs stand for all the runs, the tables are real."""
+    """What the recipes ask for, but for some films: two short runs stand for all the runs, the tables are real."""
     from iapb.contact.laws import ImpulseAugmented
     from iapb.haptics.coupling import FourChannel
     from iapb.simulation import simulate
@@ -48,8 +42,7 @@ def inputs() -> dict[str, object]:
     names = {name for recipe in RECIPES for name in recipe.needs}
     given: dict[str, object] = {name: run for name in names if name.startswith(("corner/", "device/"))}
     given |= {name: load_scene(find_scene(name[6:])).resolved() for name in names if name.startswith("scene/")}
-    tables = {"arm_energies": arm_energies(), "energy-gains/impacts": GAINS, "work_precision": WORK}
-    return given | tables | {"group/IAPB": group}
+    return given | tables() | {"arm_energies": arm_energies(), "group/IAPB": group}
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.key)
@@ -130,11 +123,8 @@ def test_keys_of_figures_are_unique() -> None:
     assert len(keys) == len(set(keys))
 
 
-@pytest.mark.parametrize("group", [
-    ("ideal", "IAPB", "PB", "CBuc"), ("ideal", "pfull", "psaturated", "pscaled", "pspread"), ("IAPB", "IAPB LM", "PB"),
-])
-def test_curves_of_one_figure_differ_without_their_colour(group: tuple[str, ...]) -> None:
-    looks = [(STYLES[name].marker, STYLES[name].dash) for name in group]
+def test_curves_of_one_figure_differ_without_their_colour(figure: Figure) -> None:
+    looks = [(look.marker, look.dash, look.filled, look.width > 0) for _, look in figure.legend if look.name]
     assert len(set(looks)) == len(looks)
 
 

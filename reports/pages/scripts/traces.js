@@ -50,6 +50,8 @@ class TraceFigure {
       for (const plot of this.plots) {
         const named = plot.curves.filter((curve) => curve.name === entry.dataset.curve);
         named.forEach((curve) => curve.group.toggleAttribute("hidden", !shown));
+        const names = [...plot.svg.querySelectorAll("[data-name]")].filter((text) => text.dataset.name === entry.dataset.curve);
+        names.forEach((text) => text.toggleAttribute("hidden", !shown));
         plot.show(plot.window);
       }
     });
