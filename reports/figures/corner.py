@@ -7,7 +7,7 @@ the paper's Figure 4. Lengths in metres, angles in radians, unless a name says o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,10 +36,14 @@ DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
-# An impact of one step is hundreds of times the force that holds the peg afterwards, so each force is drawn twice: in
-# full, and magnified around the force that balances the hand (coordinate, heading, label, where it is cut).
+# An impact of one step is hundreds of times the force that holds the peg afterwards, so each force is drawn at contact,
+# in full and magnified around the force that balances the hand (coordinate, heading, label, where it is cut).
 _FORCES = ((0, "force along x", "Fx [N]", 1.5), (2, "torque", "τ [N m]", 0.03))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
+_AT_CONTACT = (0.01, 0.14)  # [s] before and after the first contact: the blows of all worlds, apart from one another
+# what deviates from the ideal hand: its coordinates, in words, on the axis, factor to what is drawn
+_DEVIATIONS = ((slice(0, 2), "position", "distance from ideal [mm]", MILLI),
+               (slice(2, 3), "angle", "angle from ideal [°]", DEGREES))  # fmt: skip
 _LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
 _MARKS = 9  # markers along a curve: enough to tell it in grey, few enough to see the line
 # A peg slower than this (and turning slower than this) counts as settled: a tenth of its speed at contact, where
@@ -49,6 +53,7 @@ _FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over th
 _SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
 _HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
          "balance holds 0.32 and −0.4 N.")  # fmt: skip
+_LOST_AXES = "The axes that the paper printed are lost; ours show all values."
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
 
@@ -82,28 +87,32 @@ FIGURES = (
           "line (“ideal”) is the rigid world. Look at which curve leaves it at the first contact, and which come "
           "back to it. The device can apply any force here. Of the axes that the paper printed we know one range, "
           "0 to −2.5; its unit, the other axis and the start of the peg are lost. Our axes are therefore in mm and "
-          "degrees. The last panel uses the printed range, in mm, for the depth of the hand past the place where the "
-          "rigid world stops it."),
+          "degrees. The fifth and sixth panel show the distance from ideal at the same time, in position and in angle. "
+          "The last panel uses the printed range, in mm, for the depth of the hand past the place where the rigid "
+          "world stops it."),
     Shown(8, "Forces that the hand feels", UNLIMITED, True,
-          "In full: a new contact answers with one blow of one step in the worlds with impulses. Magnified: what "
-          "remains between blows, to be compared with the 0.32 N that balances the hand."),
+          "At the first contact: the worlds with impulses answer with blows of one step each, penalties with a rise "
+          "over many. Then the whole run, and what remains between blows, to be compared with the 0.32 N that balances "
+          f"the hand. {_LOST_AXES}"),
     Shown(9, "Three ways to live with a weak device", STRATEGIES, False,
           "The device can apply 15 N and 1 N m only. Saturating clips what the device gets, so that tool and device "
-          "come apart (fifth panel); scaling weakens the blow for both; spreading repeats the scaled blow in the "
-          "next steps."),
+          "come apart; scaling weakens the blow for both; spreading repeats the scaled blow in the next steps. The "
+          f"fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
     Shown(10, "Hand trajectories with a limited device", LIMITED, False,
           "As Figure 7, but IAPB spreads its impulses over as many steps as the 15 N and 1 N m of the device ask "
-          "for. The last panel shows how deep the virtual peg sinks into the walls; rigid worlds do not."),
+          "for. The fifth and sixth panel show the distance from ideal, the last how deep the virtual peg sinks into "
+          f"the walls; rigid worlds do not. {_LOST_AXES}"),
     Shown(11, "Forces with a limited device", LIMITED, True,
-          "As Figure 8 with spread impulses. Compare the first contact of IAPB, now spread over steps, with the slow"
-          " rise of the penalty force."),
+          "As Figure 8 with spread impulses. At the first contact IAPB now takes several steps of at most 15 N; "
+          f"compare them with the slow rise of the penalty force. {_LOST_AXES}"),
     Shown(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
           "The paper measured these on hardware; here the device is emulated at 512 Hz with the delay, quantisation "
-          "and damping that the scene states. Look at how often each curve bounces, and when it comes to rest."),
+          "and damping that the scene states. Look at how often each curve bounces, and when it comes to rest. "
+          f"{_LOST_AXES}"),
     Shown(13, "Emulated device at 512 Hz: forces", DEVICE, True,
           "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
           "within the limits of the device. The fine chatter is the resolution of the encoders, felt through the "
-          "damping of the position channel."),
+          f"damping of the position channel. {_LOST_AXES}"),
 )  # fmt: skip
 
 
@@ -118,11 +127,11 @@ def marks(count: int, number: int) -> tuple[int, int]:
     return (number * every // 5) % every, every
 
 
-def first_shown(runs: Mapping[str, Run]) -> int:
-    """Return the step shortly before the first contact of any run: before it all paths are one straight line."""
+def first_shown(runs: Mapping[str, Run], before: float = _BEFORE_CONTACT) -> int:
+    """Return the step shortly `before` [s] the first contact of any run: until then all paths are one straight line."""
     touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
     dt = next(iter(runs.values())).dt
-    return max(min(touching) - round(_BEFORE_CONTACT / dt), 0) if touching else 0
+    return max(min(touching) - round(before / dt), 0) if touching else 0
 
 
 _PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; a line of room for curves at 0
@@ -134,6 +143,8 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run],
                        names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Table]:
     """The path and the three coordinates; where the device is limited, also tool against device and penetration."""
     panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
+    if "ideal" in runs:
+        panels += [_deviation_panel(key, runs, *each) for each in _DEVIATIONS]
     if names == UNLIMITED:
         panels.append(_printed_panel(key, runs))
     if names in (LIMITED, STRATEGIES):
@@ -162,17 +173,32 @@ def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
 
 
 def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Floats], label: str, *,
-               shown: float | None = None, **how: Any) -> str:
-    """Draw one quantity of each run over time; `shown` cuts the axis to plus and minus that value."""
+               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None, **how: Any) -> str:
+    """Draw one quantity of each run over time, or from one step to another; `height` cuts the other axis."""
     with Plot(key, kind=TIME) as plot:
         for number, (curve, run) in enumerate(runs.items()):
-            values = values_of(run)
-            plot.axes.plot(run.time[: len(values)], values, **line_arguments(STYLES[curve]), **how,
+            values = values_of(run)[first:last]
+            plot.axes.plot(run.time[first : first + len(values)], values, **line_arguments(STYLES[curve]), **how,
                            markevery=marks(len(values), number), zorder=3 + number / 10)
-        plot.axes.set(xlabel="t [s]", ylabel=label, xlim=(0, max(run.time[-1] for run in runs.values())))
-        if shown is not None:
-            plot.axes.set_ylim(-shown, shown)
+        longest = max(runs.values(), key=lambda run: run.steps)
+        plot.axes.set(xlabel="t [s]", ylabel=label, xlim=(longest.time[first], longest.time[: last][-1]))
+        if height is not None:
+            plot.axes.set_ylim(height)
     return plot.svg
+
+
+def _deviation_panel(key: str, runs: Mapping[str, Run], which: slice, name: str, label: str, factor: float) -> Panel:
+    """How far the hand is from where the rigid world has it, at the same time."""
+    ideal = runs["ideal"].device_q
+
+    def apart(run: Run) -> Floats:
+        count = min(len(ideal), len(run.device_q))
+        return factor * np.linalg.norm(run.device_q[:count, which] - ideal[:count, which], axis=1)
+
+    others = {curve: run for curve, run in runs.items() if curve != "ideal"}
+    largest = ", ".join(f"{curve} {apart(run).max():.2g}" for curve, run in others.items())
+    svg = _over_time(f"{key}-off-{name}", others, apart, label)
+    return Panel(svg, f"{label} over time; at most: {largest}.", f"deviation from ideal, {name}")
 
 
 def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
@@ -184,15 +210,10 @@ def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
 def _printed_panel(key: str, runs: Mapping[str, Run]) -> Panel:
     """How deep the hand goes along y past where the rigid world stops, on the axis that Figure 7 prints."""
     stop = runs["ideal"].device_q[-1, 1]
-    with Plot(f"{key}-printed", kind=TIME) as plot:
-        for number, (curve, run) in enumerate(runs.items()):
-            depth = MILLI * (stop - run.device_q[:, 1])
-            plot.axes.plot(run.time, depth, **line_arguments(STYLES[curve]),
-                           markevery=marks(len(depth), number), zorder=3 + number / 10)  # fmt: skip
-        plot.axes.set(xlabel="t [s]", ylabel="past the rigid place [mm]", xlim=(0, runs["ideal"].time[-1]),
-                      ylim=_PRINTED_RANGE)
+    svg = _over_time(f"{key}-printed", runs, lambda run: MILLI * (stop - run.device_q[:, 1]),
+                     "past the rigid place [mm]", height=_PRINTED_RANGE)  # fmt: skip
     deepest = ", ".join(f"{curve} {MILLI * (stop - run.device_q[:, 1].max()):.2f}" for curve, run in runs.items())
-    return Panel(plot.svg, f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
+    return Panel(svg, f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
                  "depth along y past the rigid place, on the printed range")  # fmt: skip
 
 
@@ -254,9 +275,8 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
 
 
 def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Table]:
-    """Force along x and torque, each in full and magnified; peaks, and what is held at the end."""
-    panels = tuple(_force_panel(key, runs, k, title, label, shown) for k, title, label, cut in _FORCES
-                   for shown in (None, cut))  # fmt: skip
+    """Force along x and torque, each in full, at the first contact and between blows; peaks, and what is held."""
+    panels = tuple(panel for each in _FORCES for panel in _force_panels(key, runs, *each))
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")
     rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(), *held_force(run).tolist())
@@ -264,11 +284,18 @@ def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...],
     return panels, titled(columns, rows, digits=3, note=_HELD)
 
 
-def _force_panel(key: str, runs: Mapping[str, Run], k: int, title: str, label: str, shown: float | None) -> Panel:
-    magnified = f", magnified: cut at ±{shown:g} {label[label.index('[') + 1 : -1]}" if shown else ""
-    svg = _over_time(f"{key}-{k}{'m' if shown else ''}", runs, lambda run: run.device_force[:, k], label, shown=shown,
-                     drawstyle="steps-post")
-    return Panel(svg, f"{label} over time{magnified}, for {', '.join(runs)}.", title + magnified)
+def _force_panels(key: str, runs: Mapping[str, Run], k: int, title: str, label: str, cut: float) -> Iterator[Panel]:
+    dt = next(iter(runs.values())).dt
+    start = first_shown(runs, _AT_CONTACT[0])
+    unit = label[label.index("[") + 1 : -1]
+    views: dict[str, dict[str, Any]] = {
+        f"at the first contact: {sum(_AT_CONTACT):g} s": {"first": start, "last": start + round(sum(_AT_CONTACT) / dt)},
+        "the whole run": {}, f"what remains between blows: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
+    }  # fmt: skip
+    for number, (view, shown) in enumerate(views.items()):
+        svg = _over_time(f"{key}-{k}{'cam'[number]}", runs, lambda run: run.device_force[:, k], label,
+                         drawstyle="steps-post", **shown)
+        yield Panel(svg, f"{label} over time, {view}, for {', '.join(runs)}.", f"{title}, {view}")
 
 
 def held_force(run: Run) -> Floats:

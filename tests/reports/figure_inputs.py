@@ -1,6 +1,6 @@
 """Tables for every figure: rows of a real report, thinned and rounded, kept beside this file.
 
-Where a study's columns have changed and a figure no longer finds them, take them again from a report that is up to date:
+Where a study's columns have changed and a figure no longer finds them, take them again from a new report:
 
     iapb reproduce && python -m tests.reports.figure_inputs out
 """

@@ -177,6 +177,10 @@ class Plot {
   }
 
   readTime(shown, x) {
+    if (x < this.frame[0] || x > this.frame[2]) { // a plot of a shorter time
+      this.cursorLine.setAttribute("d", "");
+      return [];
+    }
     this.cursorLine.setAttribute("d", `M${this.seenX(x)} ${this.frame[1]}V${this.frame[3]}`);
     const rows = [[this.names[0], this.format("x", this.value("x", x))]];
     for (const curve of shown) {
