@@ -82,7 +82,7 @@ def _worst(record: EngineRecord) -> str:
     if record.failure:
         return "failed: " + record.failure.rstrip(".")
     if record.rests:
-        return f"moves by {record.drift:.2g} m"
+        return f"moves by {record.drift:.3g} m"
     errors = {"energy": record.energy_error, "momentum": record.momentum_error, "velocity": record.velocity_error}
     name, value = max(errors.items(), key=lambda item: abs(item[1] or 0.0))
     return f"{name} off by {abs(value or 0.0):.2g}"
@@ -110,10 +110,21 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
     answer = (
         f"{len({record.engine for record in present})} engines on {len({record.scene for record in present})} scenes "
         f"of known outcome: the law is met in {_met(own)} of {len(own)} runs at their own settings and in "
-        f"{_met(matched)} of {len(matched)} at 1 ms."
-    )
+        f"{_met(matched)} of {len(matched)} at 1 ms. {_misses(present)}"
+    ).rstrip()
     tables = {"errors": errors_table(records), "settings": settings_table(records)}
     return finding_of("engines", TITLE, QUESTION, answer, parts, tables, failures)
+
+
+def _misses(records: Sequence[EngineRecord]) -> str:
+    """Whose every miss is, ours first; "" where there is none."""
+    missed: dict[str, list[str]] = {}
+    for record in sorted(records, key=lambda record: (not record.title.endswith("(ours)"), record.title)):
+        if verdict(record) != MET:
+            at = "own settings" if record.choice == OWN else "1 ms"
+            missed.setdefault(record.title, []).append(f"{record.scene.replace('_', ' ')} at {at} ({_worst(record)})")
+    said = "; by ".join(f"{title}: {', '.join(each)}" for title, each in missed.items())
+    return f"Missed by {said}." if missed else ""
 
 
 def _met(records: Sequence[EngineRecord]) -> int:

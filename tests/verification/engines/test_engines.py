@@ -88,3 +88,14 @@ def test_our_own_engine_that_stops_is_a_failure(monkeypatch):
 def test_depth_is_checked():
     with pytest.raises(ArgumentError, match="quick or full"):
         compare_engines(depth="deep")
+
+
+def test_the_answer_names_every_miss_ours_first():
+    """"31 of 32" hid that the one miss was ours, by 97 m."""
+    (ours, _) = compare_engines(["iapb"], ["redundant_wedge"])
+    moved = replace(ours, rests=True, drift=97.0, scene="heavy_stack")
+    other = replace(ours, engine="other", title="Another", rests=True, drift=5.7, choice="matched")
+    answer = finding([other, moved]).answer
+    assert answer.endswith("Missed by iapb (ours): heavy stack at own settings (moves by 97 m); "
+                           "by Another: redundant wedge at 1 ms (moves by 5.7 m).")
+    assert "Missed" not in finding([ours]).answer
