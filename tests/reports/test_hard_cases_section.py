@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from reports.evidence.stage import Stage
-from reports.figures.figure import Figure, draw
-from reports.figures.hard_cases import INPUT, MARKS, decade, hard_cases
+from reports.pages.matrix import MARKS, decade, matrices, worst_first
+from reports.pages.records import Evidence
 from reports.runner import Runner
-from verification.finding import Finding, Table
+from tests.reports.joined import joined
+from verification.finding import Column, Finding, Table, finding_of, table_of
 from verification.hard_cases import study
+from verification.hard_cases.study import STABLE
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 
@@ -58,24 +61,43 @@ def test_records_are_read_back_as_they_were(cases: tuple[Finding, ...], tmp_path
 
 
 def test_the_matrix_shows_every_case_and_method(cases: tuple[Finding, ...]) -> None:
-    figure = draw(hard_cases, {INPUT: summary(cases)})
-    assert isinstance(figure, Figure)
-    assert [panel.label for panel in figure.panels] == ["Impacts, by method", "Motions, by world"]
-    impacts = figure.panels[0].svg
-    assert "Grazing impact" in impacts and "cholesky" in impacts and "Contact chatter" not in impacts
-    assert {name for name, _ in figure.legend} >= {"stable", "gains energy", "wrong motion"}
+    impacts, motions = matrices(summary(cases))
+    assert (impacts.title, motions.title) == ("Impacts, by method", "Motions, by world")
+    assert impacts.methods[0] == "factored" and "gram_cholesky" in impacts.methods and motions.methods[0] == "IAPB"
+    assert {case for case, _ in impacts.rows} == {cases[0].title, cases[1].title}
+    gains = dict(impacts.rows)[cases[1].title][impacts.methods.index("gram_cholesky")]
+    assert gains is not None and gains[:3] == ("✕", "bad", "gains energy")
+
+
+def test_what_we_fail_stands_first_then_the_largest_share_of_what_is_allowed() -> None:
+    def rows(case: str, outcome: str, error: float, other: str = STABLE) -> list[dict[str, object]]:
+        same = {"case": case, "kind": "impact", "energy gain": None, "gain allowed": 1.0, "error allowed": 1e-10}
+        return [same | {"method": "factored", "outcome": outcome, "forward error": error},
+                same | {"method": "svd", "outcome": other, "forward error": 1.0}]
+
+    found = table_of([Column(key) for key in rows("", "", 0.0)[0]],
+                     [*rows("calm", STABLE, 1e-16), *rows("close", STABLE, 9e-11),
+                      *rows("others fail", STABLE, 1e-16, "wrong motion"), *rows("ours", "wrong motion", 1e-12)])
+    (matrix,) = matrices(found)
+    assert [case for case, _ in matrix.rows] == ["ours", "close", "others fail", "calm"]
+    alone = [finding_of(case, case, "", "", (), {case: found.where(case=case)}) for case in ("calm", "close", "ours")]
+    absent = finding_of("absent", "absent", "", "", ())
+    assert [case.key for case in worst_first([absent, *alone])] == ["ours", "close", "calm", "absent"]
+
+
+def test_the_page_says_the_verdict_before_the_decade(cases: tuple[Finding, ...]) -> None:
+    page = joined(Evidence(hard_cases=cases, topics=(study.on_hard_cases(cases),)), ())
+    assert re.search(r'✕</span> gains energy</span> <span class="decade">10[⁻\d⁰¹²³⁴-⁹]+</span>', page)
 
 
 def test_no_two_verdicts_look_alike() -> None:
-    looks = [(style.marker, style.color, style.filled) for style in MARKS.values()]
-    assert len(set(looks)) == len(looks)
+    assert len({mark for mark, _ in MARKS.values()}) == len(MARKS)
 
 
-@pytest.mark.parametrize(("value", "text"), [(2e-16, "−16"), (0.3, "−1"), (2.0, "0"), (0.0, ""), (None, "")])
+@pytest.mark.parametrize(("value", "text"), [(2e-16, "10⁻¹⁶"), (0.3, "10⁻¹"), (2.0, "10⁰"), (0.0, ""), (None, "")])
 def test_the_decade_of_a_value(value: float | None, text: str) -> None:
     assert decade(value) == text
 
 
-def test_without_cases_nothing_is_drawn() -> None:
-    figure = draw(hard_cases, {INPUT: Table(summary(()).columns)})
-    assert isinstance(figure, Figure) and figure.panels == ()
+def test_without_cases_there_is_no_matrix() -> None:
+    assert matrices(Table(summary(()).columns)) == ()

@@ -33,7 +33,7 @@ COLUMNS = (
     Column("exact rank"), Column("time", "µs", timed=True), Column("note"),
 )
 OF_CASE = (Column("case"), Column("kind"))
-_ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
+ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
 _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution to 1e-8, error within what is allowed. Gain exact, "
               "(KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric, allowed 10 n ε √κ (√κ + κ(A)), "
@@ -74,7 +74,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
 def _outcome(case: Finding) -> str:
     """What came of a case by the engine; empty where it was not tried."""
     by = {part.name: part.sentence for part in case.parts}
-    return next((by[name] for name in _ENGINE if name in by), "")
+    return next((by[name] for name in ENGINE if name in by), "")
 
 
 def _judged(name: str, simulate: Simulate, failures: list[Failure]) -> Finding:

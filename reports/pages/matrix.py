@@ -1,0 +1,76 @@
+"""Hard cases at a glance: a row per case, first those that we miss; a column per method or world; verdicts in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reports.figures.numbers import power_of_ten
+from verification.finding import Finding, Table
+from verification.hard_cases.study import ENGINE, STABLE
+
+# verdict -> its mark and the class of its colour: shape as well as colour
+MARKS = {
+    STABLE: ("●", "good"), "gains energy": ("✕", "bad"), "wrong motion": ("▲", "bad"), "failed": ("✶", "bad"),
+    "restitution unmet": ("■", "limited"), "hangs on rounding": ("□", "limited"), "refused": ("○", "open"),
+    "timed out": ("◇", "open"), "out of memory": ("◆", "open"),
+}  # fmt: skip
+KINDS = {"impact": "Impacts, by method", "motion": "Motions, by world"}
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """One kind of case: `rows` are a case and its cell for each of the `methods`, (mark, class, words, decade)."""
+
+    title: str
+    methods: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[tuple[str, str, str, str] | None, ...]], ...]
+
+
+def matrices(numbers: Table) -> tuple[Matrix, ...]:
+    """Return a matrix of the impacts and one of the motions, from a row per case and method."""
+    return tuple(_matrix(title, rows) for kind, title in KINDS.items() if (rows := numbers.where(kind=kind).records()))
+
+
+def worst_first(cases: Sequence[Finding]) -> list[Finding]:
+    """Return the cases in the order of the matrix; those without a table last."""
+    rows = {case.key: case.tables[case.key].records() for case in cases if case.key in case.tables}
+    return sorted(cases, key=lambda case: _rank(rows[case.key]) if case.key in rows else (9, 0.0, 0))
+
+
+def _matrix(title: str, rows: Sequence[Row]) -> Matrix:
+    cases: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        cases.setdefault(row["case"], {})[row["method"]] = row
+    methods = tuple(sorted({row["method"] for row in rows}, key=lambda name: (name not in ENGINE, name)))
+    order = sorted(cases, key=lambda case: _rank(tuple(cases[case].values())))
+    return Matrix(title, methods, tuple((case, tuple(_cell(cases[case].get(method)) for method in methods))
+                                        for case in order))  # fmt: skip
+
+
+def _rank(rows: Sequence[Row]) -> tuple[int, float, int]:
+    """What the engine fails first, then by the largest share that it takes of what is allowed, then by who fails."""
+    ours = [row for row in rows if row["method"] in ENGINE]
+    failing = sum(row["outcome"] != STABLE for row in rows)
+    return (int(all(row["outcome"] == STABLE for row in ours)), -max(map(_share, ours), default=0.0), -failing)
+
+
+def _share(row: Row) -> float:
+    pairs = (("energy gain", "gain allowed"), ("forward error", "error allowed"))
+    return max((row[found] / row[allowed] for found, allowed in pairs if row.get(found) and row.get(allowed)),
+               default=0.0)  # fmt: skip
+
+
+def _cell(row: Row | None) -> tuple[str, str, str, str] | None:
+    if row is None:
+        return None
+    value = row["energy gain"] if row["outcome"] == "gains energy" else row["forward error"]
+    return (*MARKS[row["outcome"]], row["outcome"], decade(value))
+
+
+def decade(value: float | None) -> str:
+    """The power of ten at or below an error or gain, as text; a zero or none at all is no number."""
+    return power_of_ten(10.0 ** math.floor(math.log10(value))) if value is not None and value > 0.0 else ""
