@@ -183,7 +183,8 @@ TIMED = {
 )  # fmt: skip
 def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     """Draw a panel for each family, and the steps."""
-    styles = {name: TIMED[name] for name in dict.fromkeys(numbers.column("solver")) if name in TIMED}
+    solvers = sorted(dict.fromkeys(numbers.column("solver")), key=lambda name: name not in TIMED)[: len(TIMED)]
+    styles = looks_of(solvers) | {name: TIMED[name] for name in solvers if name in TIMED}
     most = max(numbers.column("contacts"))
     panels = [_family(numbers.where(impacts=family).records(), styles, family, most)
               for family in dict.fromkeys(numbers.column("impacts"))]  # fmt: skip
