@@ -1,4 +1,4 @@
-"""Tables for every figure: rows of a real report, thinned and rounded, kept beside this file.
+"""Tables for every figure, and the README's second picture: rows of a real report, thinned and rounded, kept here.
 
 Where a study's columns have changed and a figure no longer finds them, take them again from a new report:
 
@@ -13,10 +13,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.figures import RECIPES
+from reports.figures import RECIPES, energy_gains
+from reports.figures.figure import Figure, draw
+from reports.figures.standalone import standalone
 from verification.finding import Column, Table
 
 FILE = Path(__file__).with_suffix(".json")
+ENERGY_PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "energy_gains.svg"  # of the README
 _LONG, _KEPT = 300, 12  # rows of a table that is thinned, and of those with the same texts in it
 
 
@@ -32,6 +35,13 @@ def write_tables(inputs: Mapping[str, Any]) -> None:
     wanted = sorted({name for recipe in RECIPES for name in recipe.needs if isinstance(inputs.get(name), Table)})
     texts = (f"{json.dumps(name)}: {_text(inputs[name])}" for name in wanted)
     FILE.write_text("{" + ",\n".join(texts) + "}\n", encoding="utf-8")
+
+
+def write_picture() -> None:
+    """Draw the README's second picture from the kept tables."""
+    figure = draw(energy_gains.energy_gains, tables())
+    assert isinstance(figure, Figure)
+    ENERGY_PICTURE.write_text(standalone(figure), encoding="utf-8")
 
 
 def _text(table: Table) -> str:
@@ -55,3 +65,4 @@ if __name__ == "__main__":
     from reports.pages.builder import figure_inputs
 
     write_tables(figure_inputs(gather(Path(sys.argv[1]), "quick", lambda *_: None)))
+    write_picture()
