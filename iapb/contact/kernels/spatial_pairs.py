@@ -97,20 +97,20 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
     if dot(apart, apart) > reach * reach:
         return count
     axes = (world_axis(shapes, box, 0, R), world_axis(shapes, box, 1, R), world_axis(shapes, box, 2, R))
-    inside, region, outward = True, 0, (0.0, 0.0, 0.0)
+    region, outward = 0, (0.0, 0.0, 0.0)
     exit_distance, exit_region, exit_normal = math.inf, 0, (0.0, 0.0, 1.0)
     for k in range(3):
         x = dot(apart, axes[k])
         beyond = abs(x) - half[k]
         sign = 1.0 if x >= 0.0 else -1.0
         if beyond > 0.0:
-            inside, region = False, region + (1 if x > 0.0 else 2) * 3**k
+            region += (1 if x > 0.0 else 2) * 3**k
             outward = add(outward, scale(sign * beyond, axes[k]))
         if -beyond < exit_distance:
             exit_distance, exit_region = -beyond, (1 if x >= 0.0 else 2) * 3**k
             exit_normal = scale(sign, axes[k])
     distance = math.sqrt(dot(outward, outward))
-    if inside or distance == 0.0:
+    if distance == 0.0:  # the centre is inside
         distance, region, normal = -exit_distance, exit_region, exit_normal
     else:
         normal = (outward[0] / distance, outward[1] / distance, outward[2] / distance)

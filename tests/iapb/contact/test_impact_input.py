@@ -290,3 +290,56 @@ def test_many_impacts_take_what_one_takes() -> None:
     many = resolve_impacts([mass], [rows], [v], 0.5, budget=10**30, clamp=None)
     assert one.rows_used == 10**30
     assert one.velocity.tolist() == plain.velocity.tolist() == many.velocity[0].tolist()
+
+
+@pytest.mark.parametrize("mass", [[[1.0, np.nan], [2.0, 1.0]], [[1.0, 0.2], [0.1, 1.0]], [[1.0, 0.0], [0.0, -3.0]],
+                                  [[1.0, 7.0], [7.0, 1.0]]])
+def test_the_entry_that_is_named_is_the_one_that_is_shown(mass: list[list[float]]) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        call(mass_matrix=mass)
+    i, j = (int(caught.value.argument[k]) for k in (-5, -2))
+    assert caught.value.argument == f"mass_matrix[{i}, {j}]"
+    assert np.array_equal(caught.value.value, mass[i][j], equal_nan=True)
+
+
+def test_restitution_on_the_ends_of_its_range_and_the_same_for_each_contact() -> None:
+    for e in (-1.0, 1.0):
+        many = resolve_impacts(**{**STACKED, "restitution": [e, e, e]})  # type: ignore[arg-type]
+        np.testing.assert_allclose(many.velocity, e, atol=1e-15)
+    for e in (-0.5, 0.5, 1.0, -1.0):
+        same, scalar = call(restitution=[e, e]), call(restitution=e)
+        assert (same.law, same.velocity.tolist()) == (scalar.law, scalar.velocity.tolist())  # type: ignore[attr-defined]
+    with pytest.raises(ArgumentError, match="contacts differ"):
+        call(restitution=[0.0, 1.5])
+    assert call(restitution=[0.0, 1.0]).status == call(restitution=[1.0, 0.0]).status == "complete"  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("v", [[0.0, 0.0], [1.0, 1.0]])
+def test_at_rest_or_parting_poissons_law_is_met_without_impulses(v: list[float]) -> None:
+    impact = call(velocity=v, restitution=[0.2, 0.9])
+    assert impact.status == "complete" and impact.velocity.tolist() == v  # type: ignore[attr-defined]
+    assert not impact.impulses.any() and impact.rank == 0 and impact.clamp == 1.0  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("share", "rank"), [(0.1, 2), (1e-3, 1)])
+def test_the_cutoff_of_the_printed_formula_is_a_share_of_the_largest_singular_value(share: float, rank: int) -> None:
+    """W of a hundred copies of one row and of one across: singular values 100 and share, cut off at 1e-4 of 100."""
+    rows = np.vstack((np.tile([1.0, 0.0], (100, 1)), [[0.0, np.sqrt(share)]]))
+    impact = resolve_impact(np.eye(2), rows, [-1.0, -1.0], 0.5, method="gram_pinv", rank_tolerance=1e-4)
+    assert impact.rank == rank
+    np.testing.assert_allclose(impact.velocity, [0.5, 0.5 if rank == 2 else -1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["gram_pinv", "gram_cholesky", "damped", "svd", "factored", "poisson"])
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e5])
+def test_every_method_solves_two_rows_across_each_other(method: str, scale: float) -> None:
+    """M = diag(2, 4), J = diag(3, −5), e = ½: P = −1.5 M v, p = J⁻ᵀ P, and ⅜ of each part of the energy is lost."""
+    mass, rows, v = np.diag([2.0, 4.0]), scale * np.diag([3.0, -5.0]), np.array([-1.0, 2.0])
+    impact = resolve_impact(mass, rows, v, 0.5, method=method)
+    tolerance = 1e-7 if method == "damped" else 1e-12  # λ is 1e-8 of the largest entry of W
+    np.testing.assert_allclose(impact.velocity, -0.5 * v, rtol=tolerance)
+    np.testing.assert_allclose(impact.generalized_impulse, -1.5 * mass @ v, rtol=tolerance)
+    np.testing.assert_allclose(impact.impulses, np.linalg.solve(rows.T, -1.5 * mass @ v), rtol=tolerance)
+    assert impact.energy_change == pytest.approx(-0.375 * (v @ mass @ v), rel=tolerance)
+    assert (impact.rank, impact.status, impact.method, impact.rows_used) == (2, "complete", method, None)
+    assert impact.clamp == pytest.approx(1.0, rel=1e-12)

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core import config
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.compiled import block
+from iapb.contact.kernels import passive
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.passive import (
     clamped_step,
@@ -179,6 +181,45 @@ def test_a_clamped_step_shortens_by_roundings_only_and_writes_its_products() -> 
         assert longest * (1.0 - 1e-11) <= factor <= longest * (1.0 + 1e-13)
         np.testing.assert_allclose(w, v + factor * change, rtol=0.0, atol=1e-15 * (np.abs(v) + np.abs(change)).max())
         assert gamma(mass, v, w) <= 0
+
+
+def elastic(rng: np.random.Generator, decades: float) -> Arrays:
+    """M, v and the change of an elastic impact on one row, of a mass matrix of that condition."""
+    d = int(rng.integers(1, 8))
+    mass, v, row = mass_of(rng, d, decades), rng.normal(size=d), rng.normal(size=d)
+    direction = np.linalg.solve(mass, row)
+    return mass, v, -2.0 * (row @ v) / (row @ direction) * direction
+
+
+def test_well_conditioned_steps_are_shortened_by_a_few_roundings() -> None:
+    """Bounds that are too wide would ask for more: half of the steps lose two units in the last place at most."""
+    rng, lost = np.random.default_rng(9), []
+    for _ in range(200):
+        mass, v, change = elastic(rng, 1.0)
+        half, (w, *scratch) = 0.5 * (mass + mass.T), np.empty((4, len(v)))
+        longest = min(1.0, float(-2.0 * (v @ half @ change) / (change @ half @ change)))
+        lost.append((longest - clamped_step(mass, v, change, w, *scratch)) * 2.0**52)
+    assert np.median(lost) <= 2.0 and np.percentile(lost, 90) <= 30.0
+
+
+@pytest.mark.skipif(not config.DISABLE_JIT, reason="compiled kernels call each other directly")
+def test_well_conditioned_steps_need_no_second_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any) -> None:
+        raise AssertionError("the bound of `clamped_step` is too wide")
+
+    monkeypatch.setattr(passive, "passive_step", never)
+    rng = np.random.default_rng(9)
+    for _ in range(200):
+        mass, v, change = elastic(rng, 1.0)
+        clamped_step(mass, v, change, *np.empty((4, len(v))))
+
+
+def test_nothing_that_moves_gains_nothing() -> None:
+    mass, v = np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([0.3, -0.7])
+    for M, a, b in ((mass, v, v), (mass, 0.0 * v, 0.0 * v), (0.0 * mass, v, 2.0 * v)):
+        assert wide_gain(M, a, b) == (0.0, 0.0, 0.0, 0)
+        assert gain(M, a, b)[:3] == (0.0, 0.0, 0.0)
+        assert gain_enclosure(M, a, b)[1] <= 2.0**-1000
 
 
 def test_signs_of_many_gains() -> None:

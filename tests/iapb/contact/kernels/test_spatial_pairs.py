@@ -9,7 +9,7 @@ import pytest
 
 from iapb.compiled import block
 from iapb.contact.geometry import HalfSpace, SpatialBox, Sphere, make_contact_buffer, make_spatial_shapes
-from iapb.contact.kernels.spatial_pairs import PARALLEL_SINE, spatial_pair
+from iapb.contact.kernels.spatial_pairs import PARALLEL_SINE, _edge_middle, spatial_pair
 
 SIGNS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
 
@@ -121,3 +121,73 @@ def test_two_edges_meet_midway_between_their_nearest_points(margin: float) -> No
         assert buffer.point[0] == pytest.approx(0.5 * (x + s * a + y + t * b), abs=1e-10)
         assert int(buffer.feature[0]) >> 40 == 5
     assert len(met) == 9
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_ball_and_a_box_meet_at_the_boxs_nearest_point(swapped: bool) -> None:
+    """Each of the 26 regions around a box has its own feature; a centre inside leaves by the nearest face as outside.
+
+    The normal points from the second body into the first: away from the box where that is the second.
+    """
+    rng, features = np.random.default_rng(4), set()
+    half = np.array([0.3, 0.2, 0.4])
+    for signs in np.array(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1])).reshape(3, 27).T:
+        for depth in (0.15, -0.02) if np.count_nonzero(signs) == 1 else (0.15,):
+            R, p = random_frames(rng, 2), rng.uniform(-0.3, 0.3, (2, 3))
+            turn, middle = random_frames(rng, 1)[0], rng.uniform(-0.1, 0.1, 3)
+            inside = rng.uniform(-0.3, 0.3, 3) * half
+            local = np.where(signs != 0, signs * (half + depth), inside)
+            nearest = np.clip(local, -half, half)
+            if not signs.any():  # the middle, a little nearer to one face than to the others
+                k = int(np.argmin(half - np.abs(local)))
+                signs = np.eye(3)[k] * np.sign(local[k])
+            if np.all(np.abs(local) <= half):
+                nearest = np.where(signs != 0, signs * half, local)
+                normal, distance = signs.astype(float), -float(np.abs(nearest - local).max())
+            else:
+                distance = float(np.linalg.norm(local - nearest))
+                normal = (local - nearest) / distance
+            place = p[1] + R[1] @ (middle + turn @ local)
+            ball = Sphere(0.1, R[0].T @ (place - p[0]), 0)
+            box = SpatialBox(2.0 * half, middle, turn, 1)
+            count, buffer = found(ball, box, R, p, 5.0, swapped)
+            assert count == 1 and buffer.gap[0] == pytest.approx(distance - 0.1, abs=1e-14)
+            outward = R[1] @ turn @ normal
+            assert buffer.normal[0] == pytest.approx(-outward if swapped else outward, abs=1e-13)
+            assert buffer.point[0] == pytest.approx(place - (0.1 + 0.5 * (distance - 0.1)) * outward, abs=1e-13)
+            assert (int(buffer.body_a[0]), int(buffer.body_b[0])) == ((1, 0) if swapped else (0, 1))
+            features.add((int(buffer.feature[0]), tuple(signs.astype(int))))
+            assert found(ball, box, R, p, distance - 0.1 - 1e-12, swapped)[0] == 0
+            assert found(ball, box, R, p, distance - 0.1 + 1e-12, swapped)[0] == 1
+    assert len(features) == 26 == len({feature for feature, _ in features})
+
+
+def test_the_twelve_edges_of_a_box_have_their_middles_and_numbers() -> None:
+    rng, half = np.random.default_rng(5), np.array([0.3, 0.2, 0.4])
+    frame, center = random_frames(rng, 1)[0], rng.normal(size=3)
+    axes, numbers = tuple(tuple(frame[:, k]) for k in range(3)), set()
+    for k in range(3):
+        for signs in SIGNS:
+            if signs[k] < 0:
+                continue
+            n = frame @ (signs * rng.uniform(0.1, 1.0, 3))
+            middle, number = _edge_middle(tuple(center), axes, tuple(half), k, tuple(n))
+            assert middle == pytest.approx(center + frame @ np.where(np.arange(3) == k, 0.0, signs * half), abs=1e-15)
+            numbers.add(number)
+            assert number // 4 == k
+    assert numbers == set(range(12))
+
+
+def test_more_contacts_than_there_is_room_for_are_told() -> None:
+    floor, box = HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), SpatialBox((1.0, 1.0, 1.0), body=0)
+    frames = np.array([np.eye(3)] * 2)
+    tilted = np.array([np.linalg.qr([[1.0, 0.5, 0.2], [0.1, 1.0, -0.3], [0.4, 0.2, 1.0]])[0], np.eye(3)])
+    over = np.array([[0.1, 0.2, 0.99], [0.0, 0.0, 0.0]])
+    cases = [(box, floor, frames[:1], np.zeros((1, 3)), 8), (box, SpatialBox((1.0, 1.0, 1.0), body=1), frames, over, 4),
+             (Sphere(0.5, body=0), Sphere(0.5, body=1), frames, over, 1), (Sphere(1.0, body=0), floor, frames[:1],
+             np.zeros((1, 3)), 1), (box, Sphere(0.6, body=1), tilted, over, 1)]
+    for a, b, R, p, most in cases:
+        shapes = block(make_spatial_shapes([a, b]))
+        for room in range(1, most + 1):
+            buffer: Any = block(make_contact_buffer(room))
+            assert spatial_pair(shapes, 0, 1, R, p, 1.0, buffer, 0) == (-1 if room < most else most)
