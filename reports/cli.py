@@ -21,24 +21,23 @@ from iapb.errors import ArgumentError, IapbError
 # command -> its line in `iapb --help`. Its module in reports.commands holds a function of the same name and is imported
 # where the command is the one that was given; `iapb --help` imports none.
 COMMANDS = {
-    "run": "Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.",
-    "check": "Warn of what would make a run of SCENE worthless, each with its number and what to set; end with 3 then.",
+    "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
+    "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
     "scenes": "List the scenes that come with the project: their names, and what they show.",
-    "live": "Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable.",
+    "live": "Simulate SCENE in real time, report missed deadlines, and store the run and its tick times.",
     "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
     "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
-    "certify": "Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit.",
+    "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent.",
     "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
     "prove": "Check every machine-checked statement, or print the proof of one.",
     "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
               "counterexample.",
-    "compare": "Compare the worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
-    "bench": "Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula.",
-    "sweep": "Simulate every point of STUDY that is not there yet, one run file each, and write a table of them all.",
-    "store": "Look after the run and table files below a folder.",
-    "reproduce": "Regenerate the report; what was computed before is read from its files.",
-    "report": "Say which numbers of two reports agree exactly, within a tolerance, or not; end with 1 where some "
-              "differ.",
+    "compare": "Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
+    "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
+    "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
+    "store": "Check, repair and clean up the run and table files below a folder.",
+    "reproduce": "Regenerate the report; cached results are reused.",
+    "report": "Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ.",
 }  # fmt: skip
 
 

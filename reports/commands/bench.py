@@ -23,7 +23,7 @@ LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that tak
 
 
 def bench(
-    full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compiling: minutes.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compile times.")] = False,
     tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
     budget: Annotated[str, typer.Option("--budget", help="Name the method for an impact in this time, such as 50us.")]
     = "",
@@ -31,7 +31,7 @@ def bench(
     coordinates: Annotated[int, typer.Option("--coordinates", help="Coordinates of that impact.")] = 6,
     json_: Json = False,
 ) -> None:
-    """Time a step, an impact, a whole motion: beside MuJoCo, Pinocchio, solvers and the printed formula."""
+    """Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula."""
     with facts_of(json_) as facts:
         if budget:
             _answer(seconds_of(budget), contacts, coordinates, facts)

@@ -27,10 +27,10 @@ def certify(
     files: Annotated[list[Path], typer.Argument(
         metavar="RUN...", help="Run files (.h5), folders of them, or impacts of another engine (.npz).")],
     export: Annotated[Path | None, typer.Option(
-        metavar="FILE", help="Write every impact as a line of integers, for the checker that Coq proves.")] = None,
+        metavar="FILE", help="Write every impact as a line of integers, for the checker proved in Coq.")] = None,
     json_: Json = False,
 ) -> None:
-    """Judge every recorded impact exactly: whether it gained energy, whether impulse and velocities fit."""
+    """Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent."""
     paths = list(dict.fromkeys(path for given in files for path in _files(given)))
     found = _exported(paths, export) if export else {path: certificate_of(path) for path in paths}
     failed = [path for path, one in found.items() if not one.passed]

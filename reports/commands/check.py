@@ -15,11 +15,11 @@ from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, s
 
 def check(
     scene: SceneName,
-    world: Annotated[str, typer.Option(help="World that the scene is to run in; see iapb run.")] = "IAPB",
+    world: Annotated[str, typer.Option(help="World of the run; see iapb run.")] = "IAPB",
     set_: Values = None,
     json_: Json = False,
 ) -> None:
-    """Warn of what would make a run of SCENE worthless, each with its number and what to set; end with 3 then."""
+    """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then."""
     source, remarks = settled(scene_given(scene, set_))
     law = find_world(world).law
     cautions, (said, refused) = check_scene(source, law), cost_in_words(source, law)
@@ -41,8 +41,8 @@ def _print(source: Scene, remarks: tuple[str, ...], limits: Any, cautions: tuple
         print(f"{remark}.")
     if limits is not None:
         print(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
-              f"contact.damping <= {limits.damping:.3g} N s/m, each beside the other as given; least at "
-              f"{limits.where}, effective mass {limits.mass:.3g} kg.")
+              f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "
+              f"contacts: {limits.where}, effective mass {limits.mass:.3g} kg.")
     for caution in cautions:
         print(f"Warning: {caution}.")
     if not cautions:

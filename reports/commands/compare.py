@@ -47,28 +47,28 @@ _SHOWN = {
 
 def compare(
     scene: Annotated[str | None, typer.Argument(
-        help="A scene file, or the name of a scene that comes with the project; without one: IAPB beside "
+        help="A scene file, or the name of a scene that comes with the project; without one: IAPB and "
              "complementarity, on random impacts and the project's scenes.")] = None,
     worlds: Annotated[str | None, typer.Option(
-        help="Worlds of SCENE, as IAPB,PB,ideal; default: IAPB, PB, ideal, and those with friction if SCENE has some."
+        help="Worlds to run; default: IAPB,PB,ideal, and those with friction if SCENE has some."
     )] = None,
     against: Annotated[str | None, typer.Option(
         help="The world that the others are compared with; default: ideal, or ideal-friction if SCENE has friction."
     )] = None,
     set_: Values = None,
-    impacts: Annotated[int, typer.Option(min=0, help="Impacts of SCENE, at most, that every solver is given.")] = 12,
+    impacts: Annotated[int, typer.Option(min=0, help="Largest number of impacts of SCENE given to every solver.")] = 12,
     problems: Annotated[list[Path] | None, typer.Option(
         help="A folder of problem files (LCP, MLCP, FCLIB) for every solver. Repeatable.")] = None,
     only_problems: Annotated[bool, typer.Option(
         "--only-problems", help="Only the problem files, not the comparison on impacts.")] = False,
     full: Annotated[bool, typer.Option("--full", help="Ten times the impacts, more repeats.")] = False,
     export: Annotated[Path | None, typer.Option(
-        help="Write our own problems to this folder as FCLIB files, and stop.")] = None,
+        help="Write iapb's own problems to this folder as FCLIB files, and stop.")] = None,
     out: Annotated[Path | None, typer.Option(
         help="File of the results, .h5 or .json; default: in out/compare. The figure stands beside it.")] = None,
     json_: Json = False,
 ) -> None:
-    """Compare the worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
+    """Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
     if out is not None and out.suffix not in (".h5", ".json"):

@@ -29,20 +29,20 @@ LONGEST = 1e8  # ticks: at 1 kHz more than a day
 def live(
     scene: SceneName,
     rate: Annotated[float, typer.Option(help="Steps per second; replaces the scene's own.")] = 1000.0,
-    seconds: Annotated[float, typer.Option(help="How long, of real time; Ctrl-C ends it before.")] = 60.0,
+    seconds: Annotated[float, typer.Option(help="Duration in real time; Ctrl-C ends it earlier.")] = 60.0,
     world: Annotated[str, typer.Option(help="Contact law and coupling, as in `iapb run`.")] = "IAPB",
     rendering: Rendering = "full",
     device: Annotated[str, typer.Option(
-        help="module:factory of a device of your own (factory(scene) -> iapb.haptics.device.Device), or: simulated. "
+        help="module:factory of your own device (factory(scene) -> iapb.haptics.device.Device), or: simulated. "
              "Default: the device compiled into the loop.")] = "",
     view: Annotated[bool, typer.Option("--view", help="Show it in a browser, with the mouse as the hand.")] = False,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Of the viewer's web page, on this machine only.")] = 8080,
-    budget: Annotated[bool, typer.Option(help="Give impacts the rows that the time left allows, or all.")] = True,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the viewer, on this machine only.")] = 8080,
+    budget: Annotated[bool, typer.Option(help="Limit the rows of an impact to the time left.")] = True,
     set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
     json_: Json = False,
 ) -> None:
-    """Simulate SCENE in real time, say how it kept to the clock, and store the run and its timetable."""
+    """Simulate SCENE in real time, report missed deadlines, and store the run and its tick times."""
     if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:

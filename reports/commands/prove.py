@@ -14,9 +14,9 @@ from verification.proofs.second_tool import CERTIFIED, second_opinion
 
 
 def prove(
-    name: Annotated[str | None, typer.Argument(help="A statement; without it all are checked and listed.")] = None,
+    name: Annotated[str | None, typer.Argument(help="A statement; default: check and list all.")] = None,
     second_tool: Annotated[bool, typer.Option(
-        "--second-tool", help="Let Coq check the certificates and its own theorems, too.")] = False,
+        "--second-tool", help="Also check the certificates and the Coq theorems with Coq.")] = False,
     json_: Json = False,
 ) -> None:
     """Check every machine-checked statement, or print the proof of one."""

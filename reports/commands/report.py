@@ -31,7 +31,7 @@ def report(
     tolerance: Annotated[float, typer.Option(min=0.0, help="Relative difference up to which numbers agree.")] = 1e-9,
     json_: Json = False,
 ) -> None:
-    """Say which numbers of two reports agree exactly, within a tolerance, or not; end with 1 where some differ."""
+    """Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ."""
     if not math.isfinite(tolerance):
         raise ArgumentError("--tolerance", tolerance, "a finite number, 0 or more")
     first, second = read_numbers(old), read_numbers(new)

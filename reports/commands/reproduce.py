@@ -41,10 +41,10 @@ def reproduce(
     = False,
     figure: Annotated[str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")] = None,
     check: Annotated[Path | None, typer.Option(
-        help="A report to check: compute everything again, and say which numbers agree with it.")] = None,
+        help="Recompute everything and compare all numbers with this report.")] = None,
     json_: Json = False,
 ) -> None:
-    """Regenerate the report; what was computed before is read from its files."""
+    """Regenerate the report; cached results are reused."""
     depth, folder = "full" if full else "quick", out or Path("out")
     with facts_of(json_) as facts:
         if check is not None:

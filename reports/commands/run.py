@@ -49,14 +49,14 @@ def run(
                                             "IAPB-push: contacts only push.")] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped or killed.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was stopped or killed.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Json = False,
 ) -> None:
-    """Simulate SCENE and store the run as HDF5. A run that exists is read, not computed again.
+    """Simulate SCENE and store the run as HDF5. An existing run is reused.
 
-    Warnings about the scene come first, as of iapb check. Ends with 3 where the result is not to be trusted.
-    The memory that it takes does not depend on the number of steps; a run that is killed can be resumed.
+    Prints the warnings of iapb check first. Ends with status 3 if the result is not to be trusted.
+    Memory does not grow with the number of steps. A killed run can be resumed.
     """
     source, runner = scene_given(scene, set_), Runner(out)
     law = find_world(world, rendering).law

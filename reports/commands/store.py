@@ -54,9 +54,9 @@ def store(
     delete: Annotated[bool, typer.Option("--delete", help="gc: remove what it lists.")] = False,
     json_: Json = False,
 ) -> None:
-    """Look after the run and table files below a folder.
+    """Check, repair and clean up the run and table files below a folder.
 
-    repair and gc act in marked stores only, and there on files of iapb only.
+    repair and gc act in marked stores only, and only on files of iapb.
     """
     if not (where.is_file() or where.is_dir()):
         raise ArgumentError("where", str(where), "a folder of results, or a run file")

@@ -23,9 +23,9 @@ def sweep(
     out: Annotated[Path, typer.Option(help="Folder of the sweeps.")] = Path("out/sweeps"),
     json_: Json = False,
 ) -> None:
-    """Simulate every point of STUDY that is not there yet, one run file each, and write a table of them all.
+    """Simulate every point of STUDY that has no run file yet, and write a table of all points.
 
-    Stop it whenever you like; the same command goes on where it stopped.
+    If it is stopped, the same command continues.
     """
     path = find_study(study)
     chosen = load_study(path)

@@ -33,23 +33,23 @@ def verify(
         help="package.module:function, called as (mass_matrix, contact_jacobian, velocity, restitution); with "
              "--contract frictional as (mass_matrix, contact_jacobian, tangents, velocity, restitution, friction).")]
     = ENGINE,
-    contract: Annotated[str, typer.Option(help=f"What it is taken for: {', '.join(CONTRACTS)}.")] = "equality",
+    contract: Annotated[str, typer.Option(help=f"Contract of the resolver: {', '.join(CONTRACTS)}.")] = "equality",
     laws: Annotated[list[str] | None, typer.Option(
         help="Only these laws, by name: kinetic_energy,pushing; may be repeated.")] = None,
     impacts: Annotated[int | None, typer.Option(min=1, help="Random impacts; default 5000, with --full 1,000,000.")]
     = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the draw.")] = 0,
-    unequal: Annotated[bool, typer.Option("--unequal", help="Also give it a restitution per contact.")] = False,
-    full: Annotated[bool, typer.Option("--full", help="A million impacts and thousands of trajectories; what was done "
-                                       "before is kept, and can be gone on with after a stop.")] = False,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random impacts.")] = 0,
+    unequal: Annotated[bool, typer.Option("--unequal", help="Also pass one restitution per contact.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="A million impacts and thousands of trajectories; a "
+                                       "stopped campaign continues.")] = False,
     trajectories: Annotated[int, typer.Option(min=0, help="Random scenes of --full.")] = 5000,
     workers: Annotated[int, typer.Option(min=1, max=512, help="Processes of --full.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the batches of --full.")] = Path("out/verify"),
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
     allow_code: Annotated[bool, typer.Option(
-        "--allow-code", help="With --recheck: import and call the resolver that the file names.")] = False,
+        "--allow-code", help="With --recheck: import and call the resolver named in the file.")] = False,
     simulator: Annotated[list[str] | None, typer.Option(
-        help="Instead, an engine on the fixed scenes: mujoco, drake, ... or all; may be repeated.")] = None,
+        help="Test an engine on the fixed scenes instead: mujoco, drake, ... or all; may be repeated.")] = None,
     scene: Annotated[list[str] | None, typer.Option(
         help="With --simulator: only this fixed scene; may be repeated.")] = None,
     json_: Json = False,
@@ -105,7 +105,7 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
         with stage_progress() as progress:
             campaign.run(batches, progress)
     except KeyboardInterrupt:
-        print("Stopped; the same command goes on from here. So far:")
+        print("Stopped; the same command continues. So far:")
         _print_counts(campaign, batches)
         raise
     kept = _print_counts(campaign, batches)
