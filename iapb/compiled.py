@@ -15,11 +15,11 @@ import inspect
 import struct
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -138,11 +138,13 @@ class Block:
 
     block_type: BlockType
     address: int  # of the layout in memory
+    _folded: tuple[_Tree, np.ndarray, int]  # of a twin: what it is made of
+    _piece: np.ndarray | None = None  # of a twin: the memory of its layouts, then of its arrays
 
     def __init__(self, content: Any) -> None:
         members = [block(value) if _is_named_tuple(value) else value for value in content]
         self._content = content._replace(**dict(zip(content._fields, members, strict=True)))
-        kinds = tuple(member.block_type if isinstance(member, Block) else _kind(member) for member in members)
+        kinds = tuple(map(_kind, members))
         self.block_type = _block_type_of(type(content).__name__, content._fields, kinds)
         words = [word for member in members for word in _layout(member)]
         self._memory = np.array(words, dtype=np.int64)
@@ -151,37 +153,57 @@ class Block:
     def twin(self, blank: bool = False) -> Block:
         """Return a block of the same layout in memory of its own, a copy or all zeros: quicker than making one.
 
-        All its arrays lie in one piece of memory, so that one address gives all the others.
+        Its layouts and arrays lie in one piece of memory; the Python objects of a nested block are made when first
+        asked for.
         """
-        piece = np.zeros(self._size + _LINE, np.uint8)
-        base: int = piece.__array_interface__["data"][0]
-        return self._twin(piece, base, -base % _LINE, blank)[0]
+        plan, empty = self._plan, np.zeros if blank else np.empty
+        raw = empty(plan.size + _LINE, np.uint8)
+        start: int = raw.__array_interface__["data"][0]
+        piece = raw[-start % _LINE:][: plan.size]
+        words, base = piece[: plan.words.nbytes].view(np.int64), start + -start % _LINE
+        words[:] = plan.words
+        words[plan.addresses] += base
+        made = _unfolded(plan.tree, piece, base)
+        made._plan, made._piece = plan, piece
+        if not blank and self._piece is not None:
+            piece[plan.words.nbytes :] = self._piece[plan.words.nbytes :]
+        elif not blank:
+            for ours, theirs in zip(made.arrays(), self.arrays(), strict=True):
+                ours[...] = theirs
+        return made
 
     @cached_property
-    def _size(self) -> int:
-        """Bytes of all arrays and layouts, each rounded up to whole lines."""
-        own = [_rounded(array.nbytes) for array in self._content if isinstance(array, np.ndarray)]
-        nested = [member._size for member in self._content if isinstance(member, Block)]
-        return sum(own) + sum(nested) + _rounded(self._memory.nbytes)
+    def _plan(self) -> _Plan:
+        """Where everything lies in a twin."""
+        blocks = list(self._with_nested())
+        starts = np.cumsum([0, *(_rounded(each._memory.nbytes) for each in blocks)]).tolist()
+        places = dict(zip(map(id, blocks), starts, strict=False))
+        words, addresses, at = np.zeros(starts[-1] // 8, np.int64), [], starts[-1]
+        trees: dict[int, _Tree] = {}
+        for each in reversed(blocks):  # nested ones first
+            first = places[id(each)] // 8
+            members: list[Any] = []
+            words[first : first + len(each._memory)] = each._memory
+            for member, place in zip(each._content, each.block_type.places, strict=True):
+                if isinstance(member, np.ndarray):
+                    members.append(_Part(at, member.shape, member.dtype, member.strides))
+                    words[first + place + 4], at = at, at + _rounded(member.nbytes)
+                    addresses.append(first + place + 4)
+                elif isinstance(member, Block):
+                    members.append(trees[id(member)])
+                    words[first + place] = places[id(member)]
+                    addresses.append(first + place)
+                else:
+                    members.append(member)
+            layout = 8 * first, 8 * first + each._memory.nbytes
+            trees[id(each)] = _Tree(*layout, type(each._content), each.block_type, members)
+        return _Plan(at, words, np.array(addresses, np.int64), trees[id(self)])
 
-    def _twin(self, piece: np.ndarray, base: int, at: int, blank: bool) -> tuple[Block, int]:
-        """The twin in `piece` from byte `at` on, and the byte after it."""
-        memory = np.ndarray(self._memory.shape, np.int64, piece, at)
-        memory[:] = self._memory
-        made, members = object.__new__(type(self)), list(self._content)
-        made.address, at = base + at, at + _rounded(memory.nbytes)
-        for index, (member, place) in enumerate(zip(self._content, self.block_type.places, strict=True)):
-            if isinstance(member, np.ndarray):
-                members[index] = array = np.ndarray(member.shape, member.dtype, piece, at, member.strides)
-                if not blank:
-                    array[...] = member
-                memory[place + 4], at = base + at, at + _rounded(member.nbytes)
-            elif isinstance(member, Block):
-                members[index], at = member._twin(piece, base, at, blank)
-                memory[place] = members[index].address
-        made.block_type, made._memory = self.block_type, memory
-        made._content = type(self._content)(*members)
-        return made, at
+    def _with_nested(self) -> Iterator[Block]:
+        yield self
+        for member in self._content:
+            if isinstance(member, Block):
+                yield from member._with_nested()
 
     def arrays(self) -> list[np.ndarray]:
         """All arrays, those of nested blocks too."""
@@ -189,9 +211,52 @@ class Block:
         return [*(member for member in self._content if isinstance(member, np.ndarray)), *chain(*nested)]
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # not yet made, as when unpickling
-            raise AttributeError(name)
+        if name.startswith("_"):  # not yet made
+            if name == "_content" and "_folded" in self.__dict__:
+                tree, piece, base = self._folded
+                self._content = tree.kind(*(
+                    np.ndarray(member.shape, member.dtype, piece, member.at, member.strides)
+                    if type(member) is _Part else _unfolded(member, piece, base) if type(member) is _Tree else member
+                    for member in tree.members))
+                return self._content
+            raise AttributeError(name)  # as when unpickling
         return getattr(self._content, name)
+
+
+class _Part(NamedTuple):
+    """An array of a twin: byte of its piece at which it begins, and what it looks like."""
+
+    at: int
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    strides: tuple[int, ...]
+
+
+class _Tree(NamedTuple):
+    """A block of a twin: bytes of its piece between which its layout lies, and what it is made of."""
+
+    at: int
+    stop: int
+    kind: Callable[..., Any]
+    block_type: BlockType
+    members: list[Any]  # parts, trees and numbers
+
+
+class _Plan(NamedTuple):
+    """A twin: bytes in all, the layouts with addresses as if the piece lay at 0, which words are addresses."""
+
+    size: int
+    words: np.ndarray
+    addresses: np.ndarray
+    tree: _Tree
+
+
+def _unfolded(tree: _Tree, piece: np.ndarray, base: int) -> Block:
+    """The block of a twin, of which nothing but the address is made yet."""
+    made = object.__new__(Block)
+    made.block_type, made.address, made._folded = tree.block_type, base + tree.at, (tree, piece, base)
+    made._memory = piece[tree.at : tree.stop].view(np.int64)
+    return made
 
 
 _LINE = 64  # bytes of a cache line: every array of a twin begins at one
@@ -224,6 +289,7 @@ def _is_named_tuple(value: Any) -> bool:
 
 # Types that were found before: numba takes 20 µs to find that of an array, and a simulation has hundreds.
 _KINDS: dict[Any, types.Type] = {}
+_NUMBERS = {bool: types.boolean, int: types.intp, float: types.float64}
 _BLOCK_TYPES: dict[Any, tuple[BlockType, tuple[types.Type, ...]]] = {}
 
 
@@ -233,9 +299,11 @@ def _kind(value: Any) -> types.Type:
         if known not in _KINDS:
             _KINDS[known] = typeof(value)
         return _KINDS[known]
-    if isinstance(value, bool | np.bool_):
-        return types.boolean
-    return typeof(value)
+    if isinstance(value, Block):
+        return value.block_type
+    if type(value) in _NUMBERS:
+        return _NUMBERS[type(value)]
+    return types.boolean if isinstance(value, np.bool_) else typeof(value)
 
 
 def _block_type_of(name: str, fields: tuple[str, ...], kinds: tuple[types.Type, ...]) -> BlockType:

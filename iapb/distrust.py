@@ -167,10 +167,11 @@ def _squeezed(run: Run) -> str:
     if not len(table.gap) or len(bodies) != len(run.body_names):
         return ""
     for b, body in enumerate(bodies):
-        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
         size = _size(body.get("shapes", ()))
-        if len(rows) < 2 or not math.isfinite(size):
+        deep = table.gap < -0.5 * NARROW * size  # of two that overlap by more together, one does by half of it
+        if not deep.any() or not (deep & (table.body_a == b) & (table.body_b < 0)).any():
             continue
+        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
         step = np.searchsorted(table.offsets, rows, "right") - 1
         caught, narrow = _pressed(step, table.normal[rows], table.gap[rows], NARROW * size)
         if not len(caught):

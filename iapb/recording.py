@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -29,6 +30,7 @@ STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
 STEPS = quantities(Run, "step")
 CONTACTS = quantities(ContactTable, "contact")
 IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
+_LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
 _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
                       "device_actuator_work")
 
@@ -195,11 +197,14 @@ class Recorder:
         """Count from a number of steps that were done, and written down, before."""
         self.first = self.steps = steps
 
-    def joined(self, lines: str, name: str) -> np.ndarray:
-        """One array over all chunks: a column of the record's `steps`, `contacts` or `impacts`."""
+    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
+        """The columns of the record's `steps`, `contacts` or `impacts` over all chunks; `before`: a line ahead."""
         sizes = self.sizes if lines == "steps" else [int(each.used[int(lines == "impacts")]) for each in self.records]
-        return np.concatenate([
-            getattr(getattr(each, lines), name)[:size] for each, size in zip(self.records, sizes, strict=True)])
+        parts = [getattr(each, lines) for each in self.records]
+        return {each.name: np.concatenate([
+            *([before[each.name][None]] if before and each.name in before else []),
+            *(getattr(part, each.name)[:size] for part, size in zip(parts, sizes, strict=True))])
+            for each in _LINES[lines]}
 
     def run(self, world: str, stopped: str) -> Run:
         """Everything held as a Run; `stopped` says why it is not complete."""
@@ -216,14 +221,12 @@ class Recorder:
     def _part(self, world: str, stopped: str) -> tuple[Run, dict[str, Floats]]:
         """The Run, and its whole ledger."""
         simulation, system = self.simulation, self.simulation.system
-        states: dict[str, Any] = {
-            each.name: np.concatenate([self.start[each.name][None], self.joined("steps", each.name)])
-            for each in STATES}
+        steps = self.joined("steps", self.start)
+        states = {each.name: steps.pop(each.name) for each in STATES}
         counts = [each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)]
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
         law, coupling = simulation.law, simulation.coupling
-        steps: dict[str, Any] = {each.name: self.joined("steps", each.name) for each in STEPS}
-        impacts: dict[str, Any] = {each.name: self.joined("impacts", each.name) for each in IMPACTS}
+        impacts = self.joined("impacts")
         struck = states["q"][impacts["step"] - self.first]
         run = Run(
             scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
@@ -236,7 +239,7 @@ class Recorder:
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states,
             pose=system.mechanism.poses(states["q"], planar=not isinstance(simulation.scene, SpatialScene)),
             **steps,
-            contacts=ContactTable(offsets, **{each.name: self.joined("contacts", each.name) for each in CONTACTS}),
+            contacts=ContactTable(offsets, **self.joined("contacts")),
             impacts=ImpactTable(**impacts, mass_digest=digests(system.mechanism.mass_matrices(struck))),
             energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
                                      for one in simulation.effects),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,14 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import State, Stops, Switches, World
-from iapb.contact.laws import ImpulseAugmented
+from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import PLANNED, Port
 from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.integrators import INTEGRATORS
+from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
@@ -44,6 +46,8 @@ from iapb.scene.mechanism import (
 )
 
 Floats = NDArray[np.float64]
+
+_factored = Entry(cholesky)
 
 
 class System:
@@ -77,9 +81,9 @@ class System:
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
-        self._device: Mechanism | None = None
         self._worlds: dict[Any, World] = {}
         self._first: dict[Any, Any] = {}  # states and ports at the start, of which copies are used
+        self._effects: dict[Any, tuple[Effect, ...]] = {}
         self._advances: dict[Any, Entry] = {}
 
     def _held_body(self) -> int:
@@ -98,10 +102,7 @@ class System:
 
     def device_mechanism(self) -> Mechanism:
         """The device: kinematically and inertially the hand-held tree, alone (paper VI)."""
-        if self._device is None:
-            bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
-            self._device = Mechanism([self.mechanism.bodies[b] for b in bodies])
-        return self._device
+        return self.mechanism.alone(self.tool_tree)
 
     def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> ContactBuffer:
         """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q: geometry only.
@@ -148,7 +149,7 @@ class System:
         """
         decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
         on = active_names(decided)
-        key = coupling.kind, *(tuple(gains) for gains in coupling.settings.values()), on, external
+        key = *_gains_of(coupling), on, external
         if key not in self._first:
             self._first[key] = _make_port(self, coupling, on, external)
         port: Port = self._first[key].twin()
@@ -156,7 +157,17 @@ class System:
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """What is on under a law and a coupling: the world, the port and the record are made from it."""
-        return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+        if type(law) not in (ImpulseAugmented, Penalty):  # one of a user's own may say something else each time
+            return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+        key = law, *_gains_of(coupling)
+        if key not in self._effects:
+            self._effects[key] = decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+        return self._effects[key]
+
+
+def _gains_of(coupling: Coupling | None) -> tuple[Any, ...]:
+    """What a port and the effects depend on besides scene and law."""
+    return (None,) if coupling is None else (coupling.kind, *map(tuple, coupling.settings.values()))
 
 
 def _key(law: Any) -> tuple[Any, ...]:
@@ -215,7 +226,7 @@ def make_world(system: System, law: Any) -> World:
     integrator = INTEGRATORS[law.integrator]
     ranges = np.array(mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
     return block(World(
-        mechanism=mechanism.arrays, shapes=system.shapes, pairs=system.pairs,
+        mechanism=mechanism.block, shapes=system.shapes, pairs=system.pairs,
         broad_phase=make_broad_phase(system.shapes, system.pairs[: len(system.pairs) * switches.broad_phase]),
         tree_of_body=mechanism.tree_of_body,
         tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
@@ -250,22 +261,33 @@ def slides_in_impacts(scene: Scene) -> bool:
 
 def make_state(system: System) -> State:
     """Allocate everything a step writes and place the scene at its start."""
-    mechanism, capacity = system.mechanism, system.capacity
-    d, nq, trees = mechanism.nv, mechanism.nq, len(mechanism.tree_dofs)
-    rows = capacity * (2 if system.scene.contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
-    q, v = start_of(system.scene)
+    scene, mechanism = system.scene, system.mechanism
+    rows = system.capacity * (2 if scene.contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
+    q, v = start_of(scene)
     mass = mechanism.mass_matrix(q)
-    lower = np.zeros((d, d))
-    if cholesky(mass, lower):
-        raise ArgumentError("scene", system.scene.name, "bodies whose mass matrix is positive definite at the start")
-    sliding, tangents = slides_in_impacts(system.scene), 2 if isinstance(system.scene, SpatialScene) else 1
-    rubbing = largest_friction(system.scene) > 0.0 and system.scene.contact.friction_law == "coulomb"
+    lower = np.zeros_like(mass)
+    if _factored(mass, lower):
+        raise ArgumentError("scene", scene.name, "bodies whose mass matrix is positive definite at the start")
+    state: State = _blank_state(
+        (len(mechanism.bodies), len(mechanism.tree_dofs), mechanism.nq, mechanism.nv, _largest_tree(mechanism)),
+        system.capacity, rows, 2 if isinstance(scene, SpatialScene) else 1, slides_in_impacts(scene),
+        largest_friction(scene) > 0.0 and scene.contact.friction_law == "coulomb",
+    ).twin()
+    for name, values in (("q", q), ("v", v), ("mass_matrix", mass), ("lower", lower)):
+        getattr(state, name)[:] = values
+    return state
+
+
+@lru_cache(maxsize=4)
+def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int, sliding: bool, rubbing: bool) -> Any:
+    """A state of these sizes, of which twins are used; scenes that differ in values alone have the same."""
+    bodies, trees, nq, d, largest_tree = sizes
     vectors = {name: np.zeros(d) for name in (
-        "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
+        "v", "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
         "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
-    squares = {name: np.zeros((d, d)) for name in ("group_mass", "group_lower", "triangle")}
+    squares = {name: np.zeros((d, d)) for name in ("mass_matrix", "lower", "group_mass", "group_lower", "triangle")}
     return block(State(
-        q=q, v=v, mass_matrix=mass, lower=lower, body=mechanism.workspace(),
+        q=np.zeros(nq), body=make_workspace(bodies, d),
         contacts=make_contact_buffer(capacity), previous=make_contact_buffer(capacity),
         stage_contacts=make_contact_buffer(capacity), contact_count=np.zeros(2, np.int64),
         group_of_tree=np.arange(trees, dtype=np.int64), state_of_tree=np.zeros(trees, np.int8),
@@ -275,7 +297,7 @@ def make_state(system: System) -> State:
         row_impulse=np.zeros(rows), row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
         push_work=make_push_work(d, rows),
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
-        step_friction=make_step_friction(d, capacity * rubbing, tangents, _largest_tree(mechanism)),
+        step_friction=make_step_friction(d, capacity * rubbing, tangents, largest_tree),
         impacts=_make_log(trees, d), **vectors, **squares,
     ))
 
@@ -310,14 +332,14 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
         start_of(scene), (q_start, v_start), (q_stop, v_stop), strict=True))
     mass = device.mass_matrix(q) if held else np.zeros((0, 0))
     lower = np.zeros_like(mass)
-    cholesky(mass, lower)
+    _factored(mass, lower)
     zeros: dict[str, Any] = {name: np.zeros(d) for name in (
         "hand_force", "coupling_force", "environment_force", "applied")}
     tool_zeros: dict[str, Any] = {name: np.zeros(v_stop - v_start) for name in (
         "device_hand_force", "device_force", "pulse_force", "error", "acceleration", "measured_v")}
     return block(Port(
         coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
-        v_stop=v_stop, mechanism=device.arrays, body=device.workspace(),
+        v_stop=v_stop, mechanism=device.block, body=device.workspace(),
         varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
         device_lower=lower, sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_),
         clock=np.zeros(1, np.int64), **_hand(system, device), **_gains(coupling, v_stop - v_start),

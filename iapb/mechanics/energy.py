@@ -19,34 +19,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import block
 from iapb.errors import ArgumentError
-from iapb.mechanics.bodies import finite_array, float_rows
-from iapb.mechanics.kernels.evaluation import displacements_along, energies_along, impact_loss
-from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.mechanism import Mechanism, entries
 from iapb.run import Run
 
 Floats = NDArray[np.float64]
 
 FORCES = ("hand", "coupling", "penalty", "friction")
-
-
-def energies(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return kinetic and potential energy (n,) [J] at n states, q (n, nq) and v (n, d), gravity (3,) [m/s^2]."""
-    kinetic, potential = np.zeros(len(q)), np.zeros(len(q))
-    field = finite_array("gravity", gravity, (3,), "m/s^2")
-    arrays = block(mechanism.arrays), block(mechanism.workspace())
-    energies_along(
-        *arrays, float_rows("q", q, mechanism.nq), float_rows("v", v, mechanism.nv), field, kinetic, potential
-    )
-    return kinetic, potential
-
-
-def displacements(mechanism: Mechanism, q: Floats) -> Floats:
-    """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations q."""
-    out = np.zeros((max(len(q) - 1, 0), mechanism.nv))
-    displacements_along(block(mechanism.arrays), float_rows("q", q, mechanism.nq), out)
-    return out
 
 
 def port_energy(force: Floats, displacement: Floats, before: float | None = None) -> Floats:
@@ -80,7 +59,7 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
     for k in np.flatnonzero(np.any(impulse, axis=1)):
         matrix = mechanism.mass_matrix(q[k]) if mass_matrix is None else mass_matrix
-        losses[k] = impact_loss(matrix, lower, v[k], impulse[k], change)
+        losses[k] = entries.impact_loss(matrix, lower, v[k], impulse[k], change)
     return losses
 
 
@@ -120,8 +99,8 @@ def energy_ledger(
         Arrays whose shapes do not belong together.
     """
     steps = len(q) - 1
-    kinetic, potential = energies(mechanism, gravity, q, v)
-    displacement = displacements(mechanism, q)
+    kinetic, potential = mechanism.energies(q, v, gravity)
+    displacement = mechanism.displacements(q)
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in (dict(forces) | {"impulse": impulse}).items():
         if np.shape(force) != (steps, mechanism.nv):
@@ -161,8 +140,8 @@ def energy_of_run(
     forces = {name: getattr(run, f"{name}_force") for name in FORCES}
     ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before)
     if device is not None and run.device_q.shape[1]:
-        moved = displacements(device, run.device_q)
-        ledger["device_kinetic"], _ = energies(device, gravity, run.device_q, run.device_v)
+        moved = device.displacements(run.device_q)
+        ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)
         ledger["device_hand_work"] = port_energy(
             run.hand_force[:, slice(*run.tool_dofs)], moved, _entry(before, "device_hand_work"))
         ledger["device_actuator_work"] = port_energy(run.device_force, moved, _entry(before, "device_actuator_work"))

@@ -33,9 +33,9 @@ Floats = NDArray[np.float64]
 entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
     configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
     evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
-    evaluation.is_configuration, evaluation.kinetic_energy, evaluation.mass_matrices_at, evaluation.mass_matrix_at,
-    evaluation.misplaced_body, evaluation.planar_poses_along, evaluation.poses_along, evaluation.potential_energy,
-    evaluation.rows_along,
+    evaluation.displacements_along, evaluation.energies_along, evaluation.impact_loss, evaluation.is_configuration,
+    evaluation.kinetic_energy, evaluation.mass_matrices_at, evaluation.mass_matrix_at, evaluation.misplaced_body,
+    evaluation.planar_poses_along, evaluation.poses_along, evaluation.potential_energy, evaluation.rows_along,
     kinematics.forward_kinematics, kinematics.frame_jacobian, kinematics.point_jacobian)})  # fmt: skip
 
 
@@ -80,6 +80,7 @@ class Mechanism:
         Range in v of each tree; empty for a tree of fixed bodies.
     has_constant_mass_matrix, has_velocity_terms : bool
         See `iapb.mechanics.structure`.
+    block : the arrays laid out for kernels, once
 
     Raises
     ------
@@ -92,11 +93,12 @@ class Mechanism:
         parents = parent_indices(self.bodies)
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
         self.arrays: MechanismArrays = collect_arrays(self.bodies, parents)
-        self._block: Block = block(self.arrays)
+        self.block: Any = block(self.arrays)
         self.nq: int = sum(body.joint.layout.nq for body in self.bodies)
         self.nv: int = int(self.arrays.v_count.sum())
         self._square = (self.nv, self.nv)
         self._scratch = _Scratch(self.workspace(), moving_parts(self.arrays))
+        self._alone: dict[int, Mechanism] = {}
         self.tree_of_body: NDArray[np.int64] = np.array(tree_indices(parents), dtype=np.int64)
         self.tree_dofs: list[tuple[int, int]] = tree_ranges(self.arrays, self.tree_of_body)
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(self.arrays)
@@ -143,6 +145,13 @@ class Mechanism:
         """Return fresh scratch for the kernels."""
         return make_workspace(len(self.bodies), self.nv)
 
+    def alone(self, tree: int) -> Mechanism:
+        """Return one tree by itself: the same mechanism where it has no other."""
+        if tree not in self._alone:
+            bodies = [self.bodies[b] for b in np.flatnonzero(self.tree_of_body == tree)]
+            self._alone[tree] = self if len(bodies) == len(self.bodies) else Mechanism(bodies)
+        return self._alone[tree]
+
     def neutral(self) -> Floats:
         """Return the configuration q (nq,) with every joint at rest."""
         return np.array([x for b in self.bodies for x in b.joint.layout.neutral], dtype=np.float64)
@@ -150,13 +159,13 @@ class Mechanism:
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt where that makes sense."""
         out = np.empty(self.nq)
-        entries.integrate(self._block, self._configuration(q), self._velocity(v), float(dt), out)
+        entries.integrate(self.block, self._configuration(q), self._velocity(v), float(dt), out)
         return out
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest turns."""
         out = np.empty(self.nv)
-        entries.difference(self._block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
+        entries.difference(self.block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
         return out
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
@@ -173,7 +182,7 @@ class Mechanism:
         places = float_rows("qs", qs, self.nq)
         out = np.empty((len(places), len(self.bodies), 3 if planar else 7))
         along = entries.planar_poses_along if planar else entries.poses_along
-        along(self._block, self._scratch.workspace, places, out)
+        along(self.block, self._scratch.workspace, places, out)
         return out
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
@@ -237,7 +246,7 @@ class Mechanism:
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
         out = np.empty((len(places), self.nv))
-        done = entries.rows_along(self._block, self._scratch.workspace, places, fixed_to, spots, along, out)
+        done = entries.rows_along(self.block, self._scratch.workspace, places, fixed_to, spots, along, out)
         if done < len(places):
             self._refuse(f"qs[{done}]", places[done])
         return out
@@ -246,13 +255,27 @@ class Mechanism:
         """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""
         return self._filled((6, self.nv), entries.frame_jacobian, self._at(q), self.index(body))
 
+    def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
+        """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for the field g (3,)."""
+        places, rates = float_rows("qs", qs, self.nq), float_rows("vs", vs, self.nv)
+        kinetic, potential = np.zeros(len(places)), np.zeros(len(places))
+        entries.energies_along(self.block, self._scratch.workspace, places, rates, _field(g), kinetic, potential)
+        return kinetic, potential
+
+    def displacements(self, qs: ArrayLike) -> Floats:
+        """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations qs."""
+        places = float_rows("qs", qs, self.nq)
+        out = np.zeros((max(len(places) - 1, 0), self.nv))
+        entries.displacements_along(self.block, places, out)
+        return out
+
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
         """Return the kinetic energy [J]."""
-        return float(entries.kinetic_energy(self._block, self._at(q), self._velocity(v)))
+        return float(entries.kinetic_energy(self.block, self._at(q), self._velocity(v)))
 
     def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
         """Return -sum m g . c [J] of the bodies that can move, for the field g (3,) [m/s^2]."""
-        return float(entries.potential_energy(self._block, self._at(q), _field(g)))
+        return float(entries.potential_energy(self.block, self._at(q), _field(g)))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the centre of mass of what moves."""
@@ -270,12 +293,12 @@ class Mechanism:
     def _at(self, q: ArrayLike) -> Block:
         """This thread's scratch, holding the kinematics of q until the next call."""
         workspace: Block = self._scratch.workspace
-        entries.forward_kinematics(self._block, self._configuration(q), workspace)
+        entries.forward_kinematics(self.block, self._configuration(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
         out = np.zeros(shape)
-        kernel(self._block, *given, out)
+        kernel(self.block, *given, out)
         return out
 
     def _velocity(self, v: ArrayLike, argument: str = "v") -> Floats:
@@ -284,14 +307,14 @@ class Mechanism:
 
     def _configuration(self, q: ArrayLike, argument: str = "q") -> Floats:
         values = float_vector(argument, q, self.nq)
-        if not entries.is_configuration(self._block, values):
+        if not entries.is_configuration(self.block, values):
             self._refuse(argument, values)
         return values
 
     def _refuse(self, argument: str, q: Floats, rates: str = "v", v: ArrayLike | None = None) -> None:
         """Raise what is wrong with a configuration, or with a velocity."""
         finite_array(argument, q, (self.nq,))
-        b = entries.misplaced_body(self._block, q)
+        b = entries.misplaced_body(self.block, q)
         if b >= 0:
             first, layout = int(self.arrays.q_start[b]), self.bodies[b].joint.layout
             unit = [first + i for i, (_, u) in enumerate(layout.coordinates) if u == "1"]

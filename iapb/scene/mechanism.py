@@ -26,6 +26,10 @@ from iapb.scene.model import Scene, SpatialScene
 
 Floats = NDArray[np.float64]
 
+_MECHANICAL = ("name", "parent", "joint", "axis", "origin", "angle", "rpy", "center_of_mass", "mass", "inertia")
+_KEPT = 8
+_MECHANISMS: dict[str, Mechanism] = {}  # by what the bodies say of it
+
 UNSTATED = 2.0  # larger than any restitution, so that the smaller of two is the one that is given
 
 
@@ -33,9 +37,15 @@ def mechanism_of(scene: Scene) -> Mechanism:
     """Return the scene's bodies as a mechanism, in the scene's order; q is their positions in a row.
 
     A planar moment of inertia I about z becomes diag(I/2, I/2, I): the inertia of a flat body, so that the
-    spatial engine sees a physical one. Only its zz entry ever moves in the plane.
+    spatial engine sees a physical one. Only its zz entry ever moves in the plane. Scenes whose bodies say the same of
+    it, to the last bit, have the same mechanism: nothing of it ever changes.
     """
-    return Mechanism(_body_in_space(body) for body in scene.bodies)
+    said = repr([[getattr(body, name, None) for name in _MECHANICAL] for body in scene.bodies])
+    found = _MECHANISMS.pop(said, None) or Mechanism(_body_in_space(body) for body in scene.bodies)
+    _MECHANISMS[said] = found  # the latest last
+    while len(_MECHANISMS) > _KEPT:
+        del _MECHANISMS[next(iter(_MECHANISMS))]
+    return found
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import bisect
 import copy
-import io
 import itertools
+import json
 import math
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
@@ -46,6 +47,8 @@ MAX_ROWS = 100_000  # of a hand's force over time
 MAX_DELAY = 1000  # steps; a longer delay is a broken line
 AUTO = ("stiffness", "damping", "coherence_distance")  # of a contact: what `auto` chooses where it is not given
 PerCoordinate = tuple[NonNegative, ...]
+_PLAIN = re.compile(r"[A-Za-z_][\w ./()*+-]*(?<! )", re.ASCII)  # a text that YAML reads as itself without quotes
+_OTHERWISE = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")  # but for these
 
 
 class FrictionPair(Part):
@@ -389,12 +392,40 @@ def scene_kind(given: Any) -> type[Scene]:
 
 def scene_text(scene: Scene, comment: str = "") -> str:
     """Return YAML text that reads back as this scene, exact to the last bit."""
-    from ruamel.yaml import YAML
+    return "\n".join([*([f"# {comment}"] if comment else []), *_block(scene.resolved(), ""), ""])
 
-    yaml, stream = YAML(typ="safe", pure=True), io.StringIO()
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = None, False  # type: ignore[assignment]
-    yaml.dump(scene.resolved(), stream)
-    return (f"# {comment}\n" if comment else "") + stream.getvalue()
+
+def _block(fields: dict[str, Any], indent: str) -> Iterator[str]:
+    """The lines of a mapping; a list or mapping of nothing but plain values stands on one line."""
+    for name, value in fields.items():
+        if not any(isinstance(item, dict | list) for item in (value.values() if isinstance(value, dict) else
+                                                              value if isinstance(value, list) else ())):
+            yield f"{indent}{name}: {_flow(value)}"
+            continue
+        yield f"{indent}{name}:"
+        if isinstance(value, dict):
+            yield from _block(value, indent + "  ")
+            continue
+        for item in value:
+            first, *rest = _block(item, indent + "  ") if isinstance(item, dict) else [f"{indent}  {_flow(item)}"]
+            yield f"{indent}- {first.lstrip()}"
+            yield from rest
+
+
+def _flow(value: Any) -> str:
+    """A value on one line."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_flow, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{name}: {_flow(item)}' for name, item in value.items())}}}"
+    if isinstance(value, str):
+        return value if _PLAIN.fullmatch(value) and value.lower() not in _OTHERWISE else _quoted(value)
+    return repr(value) if isinstance(value, float) else json.dumps(value)
+
+
+def _quoted(text: str) -> str:
+    """A text between double quotes; what cannot be printed by its code."""
+    return '"' + "".join(f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in text) + '"'
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from iapb import recording
+from iapb import compiled, recording, simulation, system
 from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import FREE, Run
-from iapb.scene import find_scene, load_scene
+from iapb.scene import find_scene, load_scene, mechanism
 from iapb.simulation import Simulation, simulate
-from iapb.system import coupling_of
+from iapb.system import coupling_of, system_of
 
 # A tilted, rough peg and a weak device: contacts one by one, friction, and impulses that exceed the limits.
 PEG = load_scene(find_scene("peg_corner")).with_values({
@@ -231,6 +233,64 @@ def test_a_scene_simulated_again_gives_the_same_bits_whatever_ran_between(name: 
         again = simulate(scene, law, steps=300)
         for array in ("q", "v", "impulse", "penalty_force", "state"):
             assert getattr(again, array).tobytes() == getattr(first, array).tobytes(), (law, array)
+
+
+def count_calls(monkeypatch, owners) -> Counter[str]:
+    """Count from now on the calls of functions of modules, by name."""
+    calls: Counter[str] = Counter()
+
+    def counted(name, function):
+        def call(*arguments, **named):
+            calls[name] += 1
+            return function(*arguments, **named)
+        return call
+
+    for owner, names in owners.items():
+        for name in names.split():
+            monkeypatch.setattr(owner, name, counted(name, getattr(owner, name)))
+    return calls
+
+
+def test_a_second_run_and_one_with_a_changed_value_make_only_what_is_new(monkeypatch) -> None:
+    scene = load_scene(find_scene("peg_corner"))
+    first, changed = (scene.with_values({"contact.stiffness": value}) for value in (900.0, 800.0))
+    path = find_scene("peg_corner")
+    for known in (scene, first, path):
+        simulate(known, world="IAPB", steps=5)
+    blanks = system._blank_state.cache_info().misses, recording._first_record.cache_info().misses
+    calls = count_calls(monkeypatch, {
+        compiled: "typeof", system: "make_world make_state _make_port decide_for", mechanism: "Mechanism",
+        simulation: "load_scene"})
+    simulate(scene, world="IAPB", steps=5)
+    simulate(path, world="IAPB", steps=5)
+    assert not calls
+    simulate(changed, world="IAPB", steps=5)
+    assert calls == {"make_world": 1, "make_state": 1, "_make_port": 1, "decide_for": 2}
+    assert blanks == (system._blank_state.cache_info().misses, recording._first_record.cache_info().misses)
+
+
+@pytest.mark.parametrize("name", ["peg_corner", "arm_pushing"])
+def test_simulations_share_nothing_that_changes(name: str) -> None:
+    """Of one scene, and of two that differ in a value: what one writes no other sees, and what both read stays."""
+    scene = load_scene(find_scene(name))
+    alike = scene.with_values({"contact.friction": 0.25})
+    coupling = coupling_of(scene, "four-channel")
+    moving, *others = (Simulation(system_of(each), coupling=coupling) for each in (scene, scene, alike))
+    arrays = [array for each in (moving, *others) for array in each.arrays() if array.nbytes]
+    places = sorted((array.__array_interface__["data"][0], array.nbytes) for array in arrays)
+    assert all(start + size <= following for (start, size), (following, _) in itertools.pairwise(places))
+
+    def seen() -> list[bytes]:
+        read = [each.world.arrays() + each.system.mechanism.block.arrays() for each in others]
+        return [array.tobytes() for array in itertools.chain(*read, *(each.arrays() for each in others))]
+
+    before = seen()
+    stopped = recording.Recorder(moving).chunk(moving.scene.steps)
+    assert stopped is None and moving.state.q.tobytes() != others[0].state.q.tobytes()
+    assert seen() == before
+    again = Simulation(system_of(scene), coupling=coupling)
+    for ours, theirs in zip(again.arrays(), others[0].arrays(), strict=True):
+        assert ours.tobytes() == theirs.tobytes()
 
 
 def test_a_changed_file_is_read_again(tmp_path: Path) -> None:

@@ -222,12 +222,13 @@ class Loop(RecordedLoop):
 
     def same_motion(self, other: Loop) -> bool:
         """Whether tool and device were at the same places with the same velocities, to the last bit, in all steps."""
-        return all(np.array_equal(self.recording.joined("steps", name), other.recording.joined("steps", name))
-                   for name in ("q", "v", "device_q", "device_v"))  # fmt: skip
+        ours, theirs = (each.recording.joined("steps") for each in (self, other))
+        return all(np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v"))
 
     def touching(self) -> frozenset[str]:
         """Kinds of the contacts of the last sample: "wall", "body" (of two trees) and "tree" (of one)."""
-        a, b = (self.recording.joined("contacts", name) for name in ("body_a", "body_b"))
+        contacts = self.recording.joined("contacts")
+        a, b = contacts["body_a"], contacts["body_b"]
         tree = self.simulation.system.mechanism.tree_of_body
         kinds = np.where(b < 0, "wall", np.where(tree[a] == tree[np.maximum(b, 0)], "tree", "body"))
         return frozenset(np.unique(kinds).tolist())

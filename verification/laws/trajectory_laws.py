@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from iapb.contact.laws import ENGINE_LAWS
 from iapb.errors import ArgumentError
-from iapb.mechanics.energy import energies
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.scene.mechanism import largest_friction
@@ -237,7 +236,7 @@ def ledger_closes(trajectory: Trajectory) -> LawResidual | None:
 def _energies(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """½ vᵀMv by einsum, and the potential energy of the scene, at all instants."""
     run, system = trajectory.run, trajectory.system
-    _, potential = energies(system.mechanism, system.gravity, run.q, run.v)
+    _, potential = system.mechanism.energies(run.q, run.v, system.gravity)
     last = system.mechanism.mass_matrix(run.q[-1])[None]
     masses = np.concatenate([trajectory.masses, last])
     return 0.5 * np.einsum("ni,nij,nj->n", run.v, masses, run.v), potential

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.energy import displacements, energy_ledger, impact_losses, passivity_deficit, port_energy
+from iapb.mechanics.energy import energy_ledger, impact_losses, passivity_deficit, port_energy
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 
@@ -116,6 +116,6 @@ def test_shapes_that_do_not_belong_together_are_named():
 def test_n_places_have_n_minus_one_displacements_between_them(steps):
     mechanism, rng = arm(), np.random.default_rng(0)
     q = rng.normal(size=(steps, 2))
-    found = displacements(mechanism, q)
+    found = mechanism.displacements(q)
     assert found.shape == (max(steps - 1, 0), 2)
     assert found == pytest.approx(np.diff(q, axis=0).reshape(-1, 2), abs=1e-15)

@@ -194,6 +194,15 @@ def test_resolved_scene_and_its_text_read_back_as_the_same_scene() -> None:
     assert scene_from_text(scene_text(FULL)).resolved() == plain
 
 
+@pytest.mark.parametrize("title", [
+    "", "a wall", "null", "Yes", "1e-3", "0x10", "# no comment", "a: b", "- a", "two\nlines\r", "it's \"so\" \\n",
+    " a ", "Größe 😀", "\x07\x7f\x85\u2028\ufeff\ud7ff", "[a, b]", "{a}", "&a *b !c %d @e `f",
+    "---", "... a", "a #b", "?", "~"])
+def test_any_text_stands_in_the_text_of_a_scene(title: str) -> None:
+    named = FULL.with_values({"title": title})
+    assert scene_from_text(named.source_text).title == title
+
+
 def test_scene_is_immutable() -> None:
     with pytest.raises(ValueError, match="frozen"):
         FULL.rate = 3.0  # type: ignore[misc]
