@@ -1,4 +1,4 @@
-"""The one way to time: a warm call first, contestants in random order, the processor time of this thread.
+"""The one way to time: a warm sample first, contestants in random order, the processor time of this thread.
 
 Other processes are not in a thread's time. They do empty caches, and so does the contestant that ran before: so every
 round calls all contestants in a new random order, and linear algebra runs on one thread. Ratios are made within one
@@ -104,14 +104,19 @@ def seconds(call: Call, times: int = 1) -> float:
 
 
 def sampler(call: Call) -> Callable[[], float]:
-    """Return a contestant for `take_turns`: `call`, as often in one sample as the clock needs, a warm one before it."""
+    """Return a contestant for `take_turns`: `call`, as often in one sample as the clock needs, and before it as often.
+
+    One warm call is not enough: after another contestant has run, the caches fill over many. Nor does the very first
+    call say how many a sample needs: it loads machine code.
+    """
+    call()
     times = 1
     while (spent := seconds(call, times) * times) < _SHORTEST_SAMPLE:
         times *= 4
 
     def sample() -> float:
         if spent < _WARMED:
-            call()
+            seconds(call, times)
         return seconds(call, times)
 
     return sample

@@ -63,3 +63,16 @@ def test_processor_time_is_of_work_and_per_call() -> None:
     result, spent = timed(lambda: sum(range(200_000)))
     assert result == 19_999_900_000 and spent > 0.0
     assert 0.0 < sampler(lambda: sum(range(20_000)))() < spent  # a tenth of the work, per call
+
+
+def test_the_first_call_does_not_say_how_many_a_sample_needs() -> None:
+    """It loads machine code, and what takes so long once would be timed alone and with cold caches ever after."""
+    calls: list[int] = []
+
+    def call() -> None:
+        calls.append(sum(range(1_000_000 if not calls else 10)))
+
+    sample = sampler(call)
+    before = len(calls)
+    sample()
+    assert len(calls) - before > 100  # a warm sample, then one that counts
