@@ -61,11 +61,14 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     if kept.failures["claims"] and not ledger:
         topics = (failed_topic("claims", kept.failures["claims"][0]), *topics)
     inputs["work_precision"] = timed
+    facts = provenance()
     needed = kept.stage("effects", dict[str, Table], effects.effects_of_scenes, {})
-    inputs["effect_costs"] = effects.summary(needed)
+    shown = {name: needed[name] for name in effects.SCENES if name in needed}
+    inputs |= {"effect_costs": effects.summary(shown), "effect_steps": effects.steps(needed),
+               "machine": "{cpu}, report of {date}".format_map(facts)}
     return Evidence(
         inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, counterexamples=broken, hard_cases=hard,
-        effects=needed, topics=topics, failed=kept.failed(), provenance=provenance(),
+        effects=shown, topics=topics, failed=kept.failed(), provenance=facts,
         manifest=manifest(runner.used, kept.stages, out),
     )  # fmt: skip
 

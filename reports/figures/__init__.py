@@ -52,5 +52,6 @@ RECIPES: tuple[Recipe, ...] = (
     complementarity.rigid_convergence,
     engine_errors.engine_errors,
     cost.impact_scaling,
+    cost.effect_steps,
     cost.effect_costs,
 )

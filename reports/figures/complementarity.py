@@ -189,7 +189,8 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     panels = [_family(numbers.where(impacts=family).records(), styles, family, most)
               for family in dict.fromkeys(numbers.column("impacts"))]  # fmt: skip
     words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
-    panels.append(Panel(_steps(steps), f"Median times of one step in microseconds: {words}.", "one step of a world"))
+    panels.append(Panel(_steps(steps), f"Median times of one step, in times IAPB's compiled: {words}.",
+                        "one step of a world"))
     return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in styles.values()))
 
 
@@ -235,7 +236,7 @@ def _steps(numbers: Table) -> str:
                 axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
                 plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
             axes.plot([], [], style.marker, color=style.color, label=scene)
-        axes.set(xscale="log", xlabel="time of one step [µs]", ylim=(len(ways) - 0.4, -0.6))
+        axes.set(xscale="log", xlabel="time of one step, over IAPB's compiled", ylim=(len(ways) - 0.4, -0.6))
         plain_powers(axes)
         axes.set_yticks(range(len(ways)), ways)
         axes.legend(loc="upper right", fontsize=8)

@@ -38,11 +38,10 @@ LAYERS = (
 LEGEND = (*((text, LineStyle(color, "s", width=0.0)) for _, text, color in LAYERS),
           ("all energy so far", LineStyle(INK, width=1.2)), ("impact", LineStyle(FORCE, "|", width=0.0)))  # fmt: skip
 _WIDTH, _ROW, _HEAD, _FOOT = 9.2, 0.46, 0.34, 0.12  # inches
-_COLUMNS = {"energy": (0.235, 0.40), "depth": (0.665, 0.13), "time": (0.835, 0.125)}  # left edge, width
+_COLUMNS = {"energy": (0.235, 0.52), "depth": (0.785, 0.15)}  # left edge, width
 _THIN = 3e-3  # share of a strip's height under which a layer cannot be seen and is not drawn
 _STILL = 1e-9  # share of the heights' energy under which all motion is rounding, and is said and not drawn
 _NO_DEPTH, _DEEPEST = 1e-3, 5.0  # [mm] ends of the logarithmic scale
-_LONGEST = 2.0  # times the longest step: right end of the scale of times
 
 
 @dataclass(frozen=True)
@@ -79,13 +78,13 @@ def _strip(name: str, numbers: Table) -> Strip:
 
 
 @recipe(
-    "every-scene", "Every scene at a glance", "scene-ledger/contact and time", "scene-ledger/books over time",
+    "every-scene", "Every scene at a glance", "scene-ledger/contact", "scene-ledger/books over time",
     section="scene-ledger",
     caption="A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by "
     "the hand and the coupling. Under it lies where that energy is: still in motion, in height and springs, or lost in "
     "impacts, contact damping and friction. Where the colours do not reach the line the steps in time swallowed "
-    "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap "
-    "and the time of a step, both on logarithmic scales.",
+    "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap, "
+    "on a logarithmic scale.",
 )  # fmt: skip
 def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
     """Draw every row."""
@@ -111,9 +110,6 @@ def _row(drawing: Any, bottom: float, height: float, strip: Strip, facts: Mappin
     depth = fact["most penetration"]
     _bar(drawing, "depth", bottom, height, depth, (_NO_DEPTH, _DEEPEST), LINK,
          f"{format_number(depth, 2)} mm" if depth else "touches nothing")  # fmt: skip
-    times = [each["time per step"] for each in facts.values()]
-    _bar(drawing, "time", bottom, height, fact["time per step"], (0.5 * min(times), _LONGEST * max(times)), LINK,
-         f"{format_number(fact['time per step'], 2)} µs")
 
 
 def _facts_in_words(fact: Mapping[str, Any]) -> str:
@@ -153,16 +149,14 @@ def _bar(drawing: Any, column: str, bottom: float, height: float, value: float, 
 
 
 def _headings(drawing: Any, height: float) -> None:
-    texts = {"energy": "energy over time, each scene to its own scale", "depth": "deepest overlap",
-             "time": "time of a step"}  # fmt: skip
+    texts = {"energy": "energy over time, each scene to its own scale", "depth": "deepest overlap"}
     for column, text in texts.items():
         drawing.text(_COLUMNS[column][0], height, text, va="center", fontsize=9)
 
 
 def _words(shown: Sequence[Strip], facts: Mapping[str, Mapping[str, Any]]) -> str:
     deepest = max(facts.values(), key=lambda fact: fact["most penetration"])
-    longest = max(facts.values(), key=lambda fact: fact["time per step"])
     return (
         f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
-        f"{deepest['scene']}; longest step {longest['time per step']:.2g} µs in {longest['scene']}."
+        f"{deepest['scene']}."
     )

@@ -170,13 +170,13 @@ def _say_races(tables: Tables) -> Iterator[Part]:
         forms = [race for race in chosen if race["scene"] == scene]
         texts = [
             "{ratio:.2g} times MuJoCo's as {MuJoCo's form} ({its contacts:.0f} contacts, {MuJoCo's solver}, "
-            "{its step:.2f} µs; quartiles {quartiles})".format_map(race) for race in forms
+            "quartiles {quartiles})".format_map(race) for race in forms
         ]  # fmt: skip
         met = all(race["ratio"] <= race["asked for"] for race in forms)
         missed = "" if met else f" Where the time goes: {_largest_parts(tables['parts of a step'], scene)}."
-        ours, step, target = (forms[0][key] for key in ("our contacts", "our step", "asked for"))
+        ours, target = (forms[0][key] for key in ("our contacts", "asked for"))
         yield _part(
-            f"{scene.capitalize()}, at rest: a recorded step of ours, with {ours:.0f} contacts, takes {step:.2f} µs, "
+            f"{scene.capitalize()}, at rest: a recorded step of ours, with {ours:.0f} contacts, takes "
             f"{'; '.join(texts)}. Asked for: at most {target:g}.{missed}", met)  # fmt: skip
 
 

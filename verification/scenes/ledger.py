@@ -11,10 +11,8 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.scene import find_scene, load_scene, scene_names
-from reference.worlds import run_world
 from verification.finding import (
     MIXED,
-    NOT_COMPUTED,
     REFUTED,
     REPRODUCED,
     Failure,
@@ -47,13 +45,10 @@ QUESTION = (
     "Every scene file of the project, run in the world IAPB at the scene's own step. The energy books say where each "
     "joule came from and went; what they leave open is energy that the steps in time made up or swallowed, and must "
     "fall with the integrator's declared order when the step is shortened. It is added by size, over the motion and "
-    "the contact springs: opposite signs do not cancel. Other load on the machine lengthens the times per step: "
-    "compare the ratios."
+    "the contact springs: opposite signs do not cancel."
 )
 WORLD = "IAPB"
-TIMED_AGAIN = 3  # short runs are timed in one piece, which may hold compilation
 REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
-YARDSTICK = "peg_corner"  # the paper's scene: its step is the unit of time
 INSTANTS = 90  # of the books over time: as many as a strip of the figure can show
 
 AT_REST = 1e-3  # share of the largest kinetic energy below which a scene is said to have come to rest
@@ -65,12 +60,11 @@ DEEP = 0.5  # share of the thinnest moving shape from where a contact would be p
 WORTH_NAMING = 1.0  # [%] of the energy turned over from which open books are named one by one
 WIDE = 2.0  # [%] from which the sentence gives both channels; the table has them for every scene
 
-_TIMES = ("time per step [µs]", "time per step, peg in the corner = 1", "times faster than real time")
 CONTACTS = titled((
     "scene", "dimensions", "steps", "step [ms]", "most penetration [mm]", "thinnest moving shape [mm]", "impacts",
     "most rows in one impact", "most energy added by an impact, share of the energy turned over",
-    "most contacts in one step", *_TIMES, "how it ends", "energy turned over [J]",
-), timed=_TIMES).columns  # fmt: skip
+    "most contacts in one step", "how it ends", "energy turned over [J]",
+)).columns
 LEDGER = titled(("scene", *BOOK)).columns
 _ADDED = "most energy added by an impact, share of the energy turned over"
 _SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_damping", "lost_friction")
@@ -90,9 +84,8 @@ def scene_ledger(run: Callable[..., Run], depth: str, progress: Callable[[int, i
         progress(next(done), len(names))
         scene = load_scene(find_scene(name))
         found = run(scene, WORLD)
-        measured = measure(found, [run_world(scene, WORLD) for _ in range(TIMED_AGAIN)])
         refined = open_books(scene, lambda shorter: run(shorter, WORLD, keep=False), REFINEMENTS[depth])
-        yield measured, refined, over_time([found])
+        yield measure(found), refined, over_time([found])
 
     found = list(of_each(names, studied, failures))
     progress(len(names), len(names))
@@ -103,15 +96,15 @@ def scene_ledger(run: Callable[..., Run], depth: str, progress: Callable[[int, i
 def finding(
     measures: Sequence[Measure], books: Sequence[OpenBooks], series: Sequence[Table], failures: Sequence[Failure] = ()
 ) -> Finding:
-    """Return what these records say; the scene that is the unit of time may have failed."""
+    """Return what these records say."""
     judges = {
         "overlap": partial(_penetration, measures), "impacts": partial(_impacts, measures),
         "order": partial(_order, books), "open books": partial(_open, measures, books),
-        "gains": partial(_gains, measures), "endings": partial(_endings, measures), "time": partial(_time, measures),
+        "gains": partial(_gains, measures), "endings": partial(_endings, measures),
     }  # fmt: skip
     more = list(failures)
     tried = [attempt(f"sentence on {name}", judge, more) for name, judge in judges.items()]
-    tables = {"contact and time": contacts(measures), "energy ledger": ledger(measures),
+    tables = {"contact": contacts(measures), "energy ledger": ledger(measures),
               "what the books leave open": left_open_table(books),
               "books over time": Table(over_time(()).columns, tuple(row for one in series for row in one.rows))}
     deepest, widest = _deepest(measures), max(measures, key=_open_share)
@@ -124,12 +117,8 @@ def finding(
     return finding_of("scene-ledger", TITLE, QUESTION, answer, [one for one in tried if one], tables, more)
 
 
-def measure(run: Run, again: Sequence[Run] = ()) -> dict[str, Any]:
-    """Return one row of both tables; `again`: the same simulation once more, to time its step with less chance.
-
-    The time is that of the quickest timed chunk: the first may hold compilation, and other load only adds.
-    """
-    pace = min(float((timed.chunk_seconds / timed.chunk_steps).min()) for timed in (run, *again))
+def measure(run: Run) -> dict[str, Any]:
+    """Return one row of both tables."""
     book = energy_book(run)
     turned = book["energy turned over"]
     return {
@@ -138,8 +127,8 @@ def measure(run: Run, again: Sequence[Run] = ()) -> dict[str, Any]:
         "thinnest moving shape": thinnest(run), "impacts": len(run.impacts.step),
         "most rows in one impact": int(run.impacts.rows.max(initial=0)),
         _ADDED: float(-run.impacts.energy_lost.min(initial=0.0)) / turned if turned else 0.0,
-        "most contacts in one step": int(np.diff(run.contacts.offsets).max(initial=0)), "time per step": 1e6 * pace,
-        "times faster than real time": run.dt / pace, "how it ends": ending(run, turned), **book,
+        "most contacts in one step": int(np.diff(run.contacts.offsets).max(initial=0)),
+        "how it ends": ending(run, turned), **book,
     }  # fmt: skip
 
 
@@ -167,16 +156,8 @@ def _thickness(shape: Mapping[str, Any]) -> float:
 
 
 def contacts(measures: Sequence[Measure]) -> Table:
-    """How deep, how many collisions, how long a step takes, how it ends."""
-    unit = _pace(measures)
-    rows = ({**m, "time per step, peg in the corner = 1": unit and m["time per step"] / unit} for m in measures)
-    note = "Time of the quickest part of each run, measured on this machine: compare the ratios."
-    return table_of(CONTACTS, rows, digits=3, note=note)
-
-
-def _pace(measures: Sequence[Measure]) -> float | None:
-    """Time of the yardstick's step [µs]; None where that scene failed."""
-    return next((m["time per step"] for m in measures if m["scene"] == YARDSTICK), None)
+    """How deep, how many collisions, how it ends."""
+    return table_of(CONTACTS, measures, digits=3)
 
 
 def ledger(measures: Sequence[Measure]) -> Table:
@@ -333,15 +314,3 @@ def _endings(measures: Sequence[Measure]) -> Part:
 def _plural(ending: str, count: int) -> str:
     first, _, rest = ending.partition(" ")
     return f"{first.removesuffix('s')} {rest}" if count != 1 else ending
-
-
-def _time(measures: Sequence[Measure]) -> Part:
-    unit, slow = _pace(measures), max(measures, key=lambda m: float(m["time per step"]))
-    near = min(measures, key=lambda m: float(m["times faster than real time"]))
-    if unit is None:
-        return Part(f"Times are not compared: {YARDSTICK} failed, whose step is the unit.", NOT_COMPUTED, timed=True)
-    return Part(
-        f"A step of {slow['scene']}, the dearest, takes {slow['time per step'] / unit:.0f} times as long as one of "
-        f"{YARDSTICK} ({unit:.1f} µs on this machine). Nearest to real time is {near['scene']}: a step is computed "
-        f"{near['times faster than real time']:.1f} times as fast as it lasts.",
-        REPRODUCED if near["times faster than real time"] > 1.0 else MIXED, timed=True)  # fmt: skip
