@@ -137,7 +137,7 @@ def effects_of(
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
-    whole = _loop(scene, chosen, Variant())
+    whole = Loop(scene, chosen, Variant())
     tried: dict[str, Any] = {_ALL_ON: _loop(scene, chosen, Variant(switches=SWITCHED, on=True))}
     for effect in effects:
         if effect.active and effect.name in LEFT_OUT:
