@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.energy import energy_ledger, impact_losses, passivity_deficit, port_energy
+from iapb.mechanics.energy import energy_ledger, impact_losses, last_of, passivity_deficit, port_energy
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 
@@ -119,3 +119,38 @@ def test_n_places_have_n_minus_one_displacements_between_them(steps):
     found = mechanism.displacements(q)
     assert found.shape == (max(steps - 1, 0), 2)
     assert found == pytest.approx(np.diff(q, axis=0).reshape(-1, 2), abs=1e-15)
+
+
+def test_a_run_summed_in_parts_has_the_bits_of_the_whole():
+    mechanism, steps = arm(), 24
+    q, v, forces, impulses = driven(mechanism, INTEGRATORS["midpoint"], steps, 0.5)
+    impulses[3] = [-0.1, 0.4]
+    whole, before = energy_ledger(mechanism, FIELD, q, v, forces, impulses), None
+    for start, stop in ((0, 9), (9, 10), (10, steps)):
+        part = energy_ledger(mechanism, FIELD, q[start:stop + 1], v[start:stop + 1],
+                             {name: force[start:stop] for name, force in forces.items()}, impulses[start:stop], before)
+        assert set(part) == set(whole)
+        for name, values in part.items():
+            extra = 1 if name in ("kinetic", "potential") else 0
+            np.testing.assert_array_equal(values, whole[name][start:stop + extra], err_msg=name)
+        before = last_of(part, before)
+    assert {name: before[name] for name in whole} == {name: values[-1] for name, values in whole.items()}
+
+
+def test_the_deficit_is_what_comes_out_beyond_what_was_there():
+    entered = np.array([0.5, -0.25, -2.0, 1.0])
+    assert passivity_deficit(entered) == 2.0
+    assert passivity_deficit(entered, 1.5) == 0.5
+    assert passivity_deficit(entered, 2.5) == 0.0
+    assert passivity_deficit(np.array([0.5, 0.25]), 0.0) == passivity_deficit(np.zeros(0)) == 0.0
+
+
+def test_the_loss_of_an_impact_is_the_fall_of_kinetic_energy():
+    mechanism, rng = arm(), np.random.default_rng(0)
+    q, v, impulse = rng.normal(size=(3, 5, 2))
+    impulse[2] = 0.0
+    losses = impact_losses(mechanism, q, v, impulse)
+    for k in range(5):
+        mass = mechanism.mass_matrix(q[k])
+        after = v[k] + np.linalg.solve(mass, impulse[k])
+        assert losses[k] == pytest.approx(0.5 * (v[k] @ mass @ v[k] - after @ mass @ after), rel=1e-12, abs=1e-14)
