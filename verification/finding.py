@@ -227,6 +227,7 @@ class Part:
     region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
     optional : about what does not come with the project, as another engine: absent, it leaves the verdict to others
+    miss : where ours falls short, in a clause for the first page; "" where it does not, or another falls short
     """
 
     sentence: str
@@ -240,6 +241,7 @@ class Part:
     timed: bool = False
     optional: bool = False
     cases: int = 0
+    miss: str = ""
 
     @property
     def outcome(self) -> str:
@@ -292,6 +294,11 @@ class Finding:
     def computed(self) -> bool:
         """Whether anything was found."""
         return self.verdict != NOT_COMPUTED
+
+    @property
+    def miss(self) -> str:
+        """Where ours falls short, the clauses of all parts; "" where none says so."""
+        return "; ".join(part.miss for part in self.parts if part.miss)
 
 
 def check_depth(depth: str) -> None:

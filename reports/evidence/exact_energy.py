@@ -51,13 +51,14 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
                       "cancelled": one.cancelled, "median price": _known(one.price[0]),
                       "largest price": _known(one.price[2]), HOLDS: one.holds})
-    recorded = (f"{_sum(rows, 'impacts')} impacts of the {len(rows)} runs of the engine: "
-                f"{_sum(rows, 'gains')} gained energy (exact)")  # fmt: skip
+    recorded = (f"{_sum(rows, 'gains')} of {_sum(rows, 'impacts'):,} impacts in {len(rows):,} runs of the engine "
+                "gained energy, judged by exact arithmetic")  # fmt: skip
     least = min((one["moved"] for one in drawn), default=0.0)
-    adverse = (f"{_sum(drawn, 'impacts')} adverse impacts: {_sum(drawn, 'gains')} gained energy (exact); "
-               f"{least:.1%} or more of each family changed the velocity")  # fmt: skip
+    adverse = (f"nor did {_sum(drawn, 'impacts'):,} drawn to provoke a gain" if not _sum(drawn, "gains") else
+               f"{_sum(drawn, 'gains')} of {_sum(drawn, 'impacts'):,} drawn to provoke a gain did")  # fmt: skip
+    moved = f"in {least:.1%} of these or more, for each way of drawing, the velocity changed"
     parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows)),
-             Part(adverse, verdict_of_families([one[HOLDS] for one in drawn])))  # fmt: skip
+             Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn])))  # fmt: skip
     tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn)}
     question = "Does any impact gain energy, even in the last bit?"
     return finding_of("exact-energy", "Exact energy", question, f"{recorded}; {adverse}.", parts, tables, failures)

@@ -110,7 +110,6 @@ def where_to_stop(numbers: Table) -> Drawn:
     """Draw the distance from complementarity over contacts and redundancy, and the price of pushing."""
     rows = numbers.records()
     limit = max(row["most contacts that agree"] for row in rows)
-    beyond = [row for row in rows if row["contacts"] > limit]
     price = [row["time of pushing"] / row["time of (21)"] for row in rows]
     panels = (
         Panel(_distance_over(rows, "contacts", limit), f"No pile of more than {limit} contacts agrees.",
@@ -121,13 +120,12 @@ def where_to_stop(numbers: Table) -> Drawn:
         Panel(_price(rows, price), f"Pushing takes {min(price):.2g} to {max(price):.2g} times as long as (21).",
               "price of impulses that only push"),
     )  # fmt: skip
-    pulling = 100.0 * sum(row["share of impulses that pull"] for row in beyond) / max(len(beyond), 1)
     caption = (
         "A pile of spheres falls on the floor; every mark is one kind of pile, with all contacts that approach, or all "
         f"that touch, as equalities (19). Stop using (19) where more than {limit} contacts collide at once: from there "
-        f"on its motion is never that of complementarity, and {pulling:.0f} % of its impulses pull. The world "
-        "IAPB-push (method “poisson”) only pushes, agrees with complementarity to rounding, and takes "
-        f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
+        "on its motion is never that of complementarity, and some of its impulses pull. The world IAPB-push (method "
+        f"“poisson”) only pushes, agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e}"
+        f", and takes {min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
     )
     looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
     return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)

@@ -22,7 +22,7 @@ from reports.figures.style import FORCE, INK, LINK, MUTED, PEG, RULE, VARIABLES,
 from verification.finding import Table, titled
 
 SIGHT = {sight.run: sight for sight in SIGHTS}
-MARKS = "Blue dots are contacts, with a line as long as the root of their force; red rays are impulses."
+MARKS = "Blue dots are contacts; the line at a dot grows with its force; red rays are impulses."
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ Each sentence is made from findings; what was not computed is left out.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 from statistics import median
 
@@ -15,9 +15,13 @@ from verification.claims.c11_forces import LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 
 ERRATA = (
-    "(18) and (24) lack a factor ½ (C01, C02); (37) holds for another inverse than the pseudo-inverse; the rows (13) "
-    "and (14) do not keep momentum; the printed formula can gain energy in floating point."
+    "The energy lost in a collision, (18) and (24), lacks a factor ½ (C01, C02). The inverse in the proof, (37), is "
+    "not the pseudo-inverse. Impulses by (13) and (14) do not keep momentum. The printed formula can gain energy by "
+    "rounding."
 )
+
+
+LIMIT = "This holds for impacts; springs and steps in time are not exact: see what we miss."
 
 
 @dataclass(frozen=True)
@@ -69,13 +73,16 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     found = [Fact(label, topics[key].answer, key) for label, key in (("Is it safe?", "exact-energy"),
                                                                      ("Is it fast?", "haptic-rate"))
              if key in topics and topics[key].computed]  # fmt: skip
+    if found and found[0].id == "exact-energy":
+        found[0] = replace(found[0], text=f"{found[0].text} {LIMIT}")
     if evidence.claims:
         found.append(Fact("Errors in the paper", ERRATA, "claims"))
     answered = [topic for topic in evidence.topics if topic.answer]
-    missed = [topic.title for topic in answered if topic.verdict in (MIXED, REFUTED)]
+    missed = [f"{topic.title} ({topic.miss})" if topic.miss else topic.title
+              for topic in answered if topic.verdict in (MIXED, REFUTED)]  # fmt: skip
     lacking = [topic.title for topic in answered if topic.verdict == NOT_COMPUTED]
     if answered:
-        text = f"Not everything holds in: {', '.join(missed)}." if missed else "Every finding of ours holds."
+        text = f"{'. '.join(missed)}." if missed else "Every finding of ours holds."
         absent = f" Not computed: {', '.join(lacking)}." if lacking else ""
         found.append(Fact("What we miss", text + absent, "verdict"))
     made = [evidence.provenance[name] for name in ("date", "cpu", "blas") if name in evidence.provenance]

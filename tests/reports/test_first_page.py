@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from reports.pages.first import answer, facts
+from reports.pages.first import LIMIT, answer, facts
 from reports.pages.records import Evidence
 from verification.claims.c11_forces import LARGE
 from verification.finding import (
@@ -31,8 +31,8 @@ PARTS = (Part("s.", WHERE, "x, on the full grid", 9, 40, region=NEAR_FLAT), Part
 PATH = finding_of("C10", "C10", "", "", PARTS)
 
 
-def topic(key: str, title: str, verdict: str) -> Finding:
-    return finding_of(key, title, "", f"answer of {key}", (Part("p.", verdict),))
+def topic(key: str, title: str, verdict: str, miss: str = "") -> Finding:
+    return finding_of(key, title, "", f"answer of {key}", (Part("p.", verdict), Part("q.", verdict, miss=miss)))
 
 
 def test_the_answer_is_made_from_the_claims() -> None:
@@ -52,12 +52,12 @@ def test_nothing_is_said_of_what_was_not_computed() -> None:
 
 
 def test_the_facts_name_our_own_misses() -> None:
-    topics = (topic("exact-energy", "Energy", REPRODUCED), topic("engines", "Engines", MIXED),
+    topics = (topic("exact-energy", "Energy", REPRODUCED), topic("engines", "Engines", MIXED, "a stack moves"),
               topic("haptic-rate", "The haptic rate", NOT_COMPUTED))
     made = {"commit": "c" * 40, "cpu": "P"}
     said = {fact.label: fact.text for fact in facts(Evidence(topics=topics, provenance=made))}
     assert "No impact of the engine ever gained energy." in answer(Evidence(topics=topics))
-    assert said["Is it safe?"] == "answer of exact-energy" and "Is it fast?" not in said
-    assert said["What we miss"] == "Not everything holds in: Engines. Not computed: The haptic rate."
+    assert said["Is it safe?"] == f"answer of exact-energy {LIMIT}" and "Is it fast?" not in said
+    assert said["What we miss"] == "Engines (a stack moves). Not computed: The haptic rate."
     assert said["Made from"] == "commit cccccccccccc, P" and "Errors in the paper" not in said
     assert "Every finding of ours holds." in {fact.text for fact in facts(Evidence(topics=topics[:1]))}

@@ -295,12 +295,12 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     found = claim.conclude(claim.judge(table_of(claim.columns, rows)))
     pile = dict.fromkeys(("contacts", "redundant", "time of (21)", "time of pushing"), 10.0)
     piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
-                     "share of impulses that pull": pulls, "median distance from the LCP": pulls}
+                     "median distance from the LCP": pulls, "pushing from the LCP": 1e-3 * pulls}
              for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
     table = table_of([Column(key) for key in piles[0]], piles)
     topic = finding_of("complementarity", "Piles", "", "No.", (Part("n.", REFUTED),), {"piles": table})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is the closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "where more than 14 contacts collide at once" in page and "25 % of its impulses pull" in page
+    assert "where more than 14 contacts collide at once" in page and "with complementarity to 3e-04" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))

@@ -100,7 +100,8 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
     groups: dict[tuple[str, str], list[EngineRecord]] = {}
     for record in present:
         groups.setdefault((record.engine, record.choice), []).append(record)
-    parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED) for group in groups.values()]
+    parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED, miss=_our_misses(group))
+             for group in groups.values()]  # fmt: skip
     absent = sorted({record.title for record in records if record.missing})
     if absent:
         said = f"Not installed here, and so not compared: {', '.join(absent)}."
@@ -125,6 +126,11 @@ def _misses(records: Sequence[EngineRecord]) -> str:
             missed.setdefault(record.title, []).append(f"{record.scene.replace('_', ' ')} at {at} ({_worst(record)})")
     said = "; by ".join(f"{title}: {', '.join(each)}" for title, each in missed.items())
     return f"Missed by {said}." if missed else ""
+
+
+def _our_misses(records: Sequence[EngineRecord]) -> str:
+    ours = [record for record in records if record.title.endswith("(ours)")]
+    return _misses(ours).removeprefix("Missed by ").removesuffix(".")
 
 
 def _met(records: Sequence[EngineRecord]) -> int:

@@ -67,7 +67,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     rows = [{"case": case.title, "kind": case.details["kind"], **row}
             for case in tried for row in case.tables[case.key].records()]  # fmt: skip
     table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all but the notes
-    parts = (Part(sentence, verdict),)
+    parts = (Part(sentence, verdict, miss="; ".join(failing)),)
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, {"every method": table}, failures)
 
 

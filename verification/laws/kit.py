@@ -490,8 +490,9 @@ def _counterexample(
         fails = partial(_fails, law, resolver, bounds, least, ends)
         found = search_counterexample(fails, search, seed, kind) if search and time.monotonic() < ends else None
         drawn = [case for case in (broken.smallest_case, broken.largest_case) if case is not None and fails(case)]
-        if found is not None or drawn:
-            return shrink(min([found] * (found is not None) + drawn, key=_size), fails)
+        failing = drawn if found is None else [found, *drawn]
+        if failing:
+            return shrink(min(failing, key=_size), fails)
     return None
 
 

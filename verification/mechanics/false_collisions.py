@@ -149,4 +149,5 @@ def filters(found: Sequence[FalseCollisions]) -> Part:
         f"distances beyond the {1e3 * EDGE_JUMP:.1f} mm of an edge, collides falsely: {counts}. Without filters up to "
         f"{lost:.0%} of the fall's energy goes with them. Coherence removes them, clustering the doubled contacts "
         f"({doubled[0]} without filters, {doubled[1]} with both).{bounce}",
-        REFUTED if len(left) == len(both) else MIXED if left else REPRODUCED)  # fmt: skip
+        REFUTED if len(left) == len(both) else MIXED if left else REPRODUCED,
+        miss=f"false collisions remain at {', '.join(f'{b:g}' for b in left)} N s/m" if left else "")  # fmt: skip

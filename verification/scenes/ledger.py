@@ -263,6 +263,7 @@ def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
     return Part(
         f"At the scene's own step {len(wide)} of {len(measures)} books leave more than {WORTH_NAMING:.0f} % of the "
         f"energy turned over open, the sizes of both channels added: {said}.", MIXED,
+        miss=f"up to {_open_share(wide[0]):.1f} % of a scene's energy is unaccounted for ({wide[0]['scene']})",
     )  # fmt: skip
 
 

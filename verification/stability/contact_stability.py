@@ -102,7 +102,8 @@ def held(maps: Maps) -> Part:
     return Part(
         f"Of {theirs.size} walls, penalties hold {theirs.sum()} and impulses {ours.sum()}, {more.min():.2f} to "
         f"{more.max():.2f} times as many per loop; {lost} walls are stable only with penalties.",
-        REFUTED if more.min() < 1.0 else MIXED if lost else REPRODUCED)  # fmt: skip
+        REFUTED if more.min() < 1.0 else MIXED if lost else REPRODUCED,
+        miss=f"{lost} of {theirs.size} walls are stable only without impulses" if lost else "")  # fmt: skip
 
 
 def beyond(maps: Maps) -> Part:
