@@ -108,7 +108,7 @@ def test_shapes_that_do_not_belong_together_are_named():
     q, v, forces, impulse = driven(mechanism, INTEGRATORS["midpoint"], 4)
     with pytest.raises(ArgumentError, match="hand"):
         energy_ledger(mechanism, FIELD, q, v, forces | {"hand": np.zeros((3, 2))}, impulse)
-    with pytest.raises(ArgumentError, match="q of shape"):
+    with pytest.raises(ArgumentError, match="qs of shape"):
         energy_ledger(mechanism, FIELD, q[:, :1], v, forces, impulse)
 
 
