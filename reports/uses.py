@@ -11,8 +11,8 @@ from typing import Any
 
 from iapb.errors import ArgumentError, IapbError
 from iapb.scene import Scene, find_scene, load_scene, scene_names
+from iapb.scene.document import DocumentError, read_document
 from iapb.scene.model import set_value
-from iapb.scene.reading import DocumentError, read_document
 
 COMPLETE, PARTIAL = "complete", "partial"
 

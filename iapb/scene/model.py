@@ -8,10 +8,8 @@ from __future__ import annotations
 import bisect
 import copy
 import itertools
-import json
 import math
-import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
@@ -22,6 +20,7 @@ from iapb.errors import ArgumentError, SceneError
 from iapb.names import one_of
 from iapb.scene.across import across_parts
 from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, Wall
+from iapb.scene.document import block_lines, read_document
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     Fraction,
@@ -47,8 +46,6 @@ MAX_ROWS = 100_000  # of a hand's force over time
 MAX_DELAY = 1000  # steps; a longer delay is a broken line
 AUTO = ("stiffness", "damping", "coherence_distance")  # of a contact: what `auto` chooses where it is not given
 PerCoordinate = tuple[NonNegative, ...]
-_PLAIN = re.compile(r"[A-Za-z_][\w ./()*+-]*(?<! )", re.ASCII)  # a text that YAML reads as itself without quotes
-_OTHERWISE = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")  # but for these
 
 
 class FrictionPair(Part):
@@ -299,8 +296,6 @@ class Scene(Part):
         """Return where a field stands: "file:line:column: " if the scene was read from a file, else empty."""
         if not self._file:
             return ""
-        from iapb.scene.reading import read_document
-
         line, column = read_document(self._source_text)[0].stands_at(path)
         return f"{self._file}:{line}:{column}: "
 
@@ -392,40 +387,7 @@ def scene_kind(given: Any) -> type[Scene]:
 
 def scene_text(scene: Scene, comment: str = "") -> str:
     """Return YAML text that reads back as this scene, exact to the last bit."""
-    return "\n".join([*([f"# {comment}"] if comment else []), *_block(scene.resolved(), ""), ""])
-
-
-def _block(fields: dict[str, Any], indent: str) -> Iterator[str]:
-    """The lines of a mapping; a list or mapping of nothing but plain values stands on one line."""
-    for name, value in fields.items():
-        if not any(isinstance(item, dict | list) for item in (value.values() if isinstance(value, dict) else
-                                                              value if isinstance(value, list) else ())):
-            yield f"{indent}{name}: {_flow(value)}"
-            continue
-        yield f"{indent}{name}:"
-        if isinstance(value, dict):
-            yield from _block(value, indent + "  ")
-            continue
-        for item in value:
-            first, *rest = _block(item, indent + "  ") if isinstance(item, dict) else [f"{indent}  {_flow(item)}"]
-            yield f"{indent}- {first.lstrip()}"
-            yield from rest
-
-
-def _flow(value: Any) -> str:
-    """A value on one line."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_flow, value))}]"
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{name}: {_flow(item)}' for name, item in value.items())}}}"
-    if isinstance(value, str):
-        return value if _PLAIN.fullmatch(value) and value.lower() not in _OTHERWISE else _quoted(value)
-    return repr(value) if isinstance(value, float) else json.dumps(value)
-
-
-def _quoted(text: str) -> str:
-    """A text between double quotes; what cannot be printed by its code."""
-    return '"' + "".join(f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in text) + '"'
+    return "\n".join([*([f"# {comment}"] if comment else []), *block_lines(scene.resolved()), ""])
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:

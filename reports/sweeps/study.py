@@ -16,8 +16,9 @@ from pydantic_core import InitErrorDetails
 from iapb.errors import ArgumentError, Mistake, SceneError
 from iapb.names import one_of
 from iapb.scene import find_scene, scene_folder, scene_names
+from iapb.scene.document import MAX_CHARACTERS
 from iapb.scene.parts import Name, Number, Part, Text, located, mistakes_of
-from iapb.scene.reading import MAX_CHARACTERS, read_values
+from iapb.scene.reading import read_values
 from reports.store.keys import hash_of
 
 LAW = "law."  # paths below it are settings of the contact law

@@ -28,7 +28,7 @@ from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.recording import Recorder
 from iapb.scene import Scene, find_scene, scene_folder
-from iapb.scene.reading import read_document
+from iapb.scene.document import read_document
 from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import read_problem

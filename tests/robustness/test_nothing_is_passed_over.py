@@ -15,7 +15,7 @@ import pytest
 from iapb.errors import ArgumentError, IapbError, SceneError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import load_scene, scene_folder
-from iapb.scene.reading import read_document
+from iapb.scene.document import read_document
 from reference.datasets import DatasetError, read_problem
 from reports.sweeps.study import find_study, scene_of, study_from_text
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from iapb.scene import find_scene, scene_names, scene_schema
-from iapb.scene.reading import read_document
+from iapb.scene.document import read_document
 
 SCHEMA = scene_schema()
 
