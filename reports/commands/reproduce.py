@@ -26,6 +26,7 @@ from reports.figures.figure import Figure, draw
 from reports.figures.standalone import standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
+from reports.pages.quantities import contradictions
 from reports.pages.records import FailedCases
 from reports.report import write_report
 from reports.runner import Runner
@@ -63,7 +64,8 @@ def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
         evidence = gather(out, depth, _timed(progress, took))
     undrawn: list[Failure] = []
     recipes, figures = remembering(RECIPES, undrawn)
-    path = write_report(out, build_report(evidence, recipes))
+    pages = build_report(evidence, recipes)
+    path = write_report(out, pages)
     failed = evidence.failed + failed_cases(out / "tables", "figures", undrawn)
     beside = write_companions(out, evidence, figures, depth)
     for topic in evidence.topics:
@@ -75,7 +77,18 @@ def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
     print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
     facts.update(page=path, beside=beside, files=files, seconds=took,
                  answers={topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics})
+    facts["contradictions"] = print_contradictions(pages)
     _end_where_something_failed(failed, facts)
+    if facts["contradictions"]:
+        raise typer.Exit(1)
+
+
+def print_contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Name the quantities for which the pages give more than one number, and return them."""
+    found = contradictions(pages)
+    for name, texts in found.items():
+        print(f"More than one number for one quantity in the report. {name}: {', '.join(texts)}.")
+    return found
 
 
 def _end_where_something_failed(failed: Sequence[FailedCases], facts: dict[str, Any]) -> None:

@@ -6,6 +6,8 @@ import re
 
 from markupsafe import Markup, escape
 
+from reports.pages.quantities import marked
+
 _INLINE = re.compile(r"\$([^$]+)\$")
 _REFERENCE = re.compile(r"&#x([0-9A-Fa-f]+);")
 _GROUP_OF_ONE = re.compile(r"<mrow>(<(m[ion])>[^<]*</\2>)</mrow>")
@@ -38,7 +40,7 @@ def prose(text: str) -> Markup:
 def _powers(text: str) -> Markup:
     """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶, -1 has a true minus sign and >= is one sign."""
     signs = text.replace(">=", "≥").replace("<=", "≤")
-    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, str(escape(signs)))))
+    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, marked(str(escape(signs))))))
 
 
 def _power(match: re.Match[str]) -> str:

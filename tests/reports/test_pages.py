@@ -233,7 +233,7 @@ def test_a_hard_case_without_its_files_says_so() -> None:
 
 def test_a_figure_of_an_empty_table_has_no_panels_and_costs_nothing_else() -> None:
     page = joined(Evidence(topics=(on_hard_cases(()),)))
-    assert "stable on 0 of 0 hard cases" in page
+    assert "0 of 0</data> hard cases" in page
 
 
 def test_the_first_page_names_the_hard_cases_that_the_engine_fails() -> None:
