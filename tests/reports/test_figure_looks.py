@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,12 +13,12 @@ import pytest
 from matplotlib.axes import Axes
 
 import reports.figures
-from iapb import find_scene, load_scene
 from iapb.run import Run
 from reports.figures import RECIPES, corner
 from reports.figures.figure import Figure, draw
 from reports.figures.style import CYCLE, LOOKS, STYLES, LineStyle
 from reports.figures.two_link_arm import arm_energies
+from tests.reports.browser.conftest import made_motion
 from tests.reports.figure_inputs import tables
 
 MOST_SERIES = 6
@@ -76,17 +76,9 @@ def strangers(lines: list[Drawn]) -> list[Drawn]:
 
 
 @pytest.fixture(scope="module")
-def inputs() -> dict[str, Any]:
-    from iapb.contact.laws import ImpulseAugmented
-    from iapb.haptics.coupling import FourChannel
-    from iapb.simulation import simulate
-
-    scene = load_scene(find_scene("peg_corner"))
-    gains = scene.couplings.four_channel
-    coupling = FourChannel(tuple(gains.stiffness), tuple(gains.damping))
-    run = simulate(scene, ImpulseAugmented(), coupling, world="IAPB", steps=400)
-    needs = {name for recipe in RECIPES for name in recipe.needs}
-    runs: dict[str, Run] = {name: run for name in needs if name.startswith(("corner/", "device/"))}
+def inputs(make_run: Callable[..., Run]) -> dict[str, Any]:
+    names = sorted({name for recipe in RECIPES for name in recipe.needs if name.startswith(("corner/", "device/"))})
+    runs = {name: made_motion(make_run, "peg_corner", k) for k, name in enumerate(names)}
     return {**runs, **tables(), "arm_energies": arm_energies()}
 
 

@@ -86,7 +86,7 @@ def opened(started: Any, path: Path, size: tuple[int, int] = DESK, **context: An
     room.close()
 
 
-def _run(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
+def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
     """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
     loaded = load_scene(find_scene(scene))
     resolved = loaded.resolved()
@@ -104,7 +104,7 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     """Made-up records: a little of each kind, wide tables and long words among them."""
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
     names = sorted({name for recipe in recipes for name in recipe.needs if "/" in name})
-    runs = {name: _run(make_run, SPATIAL.get(name, "peg_corner"), k) for k, name in enumerate(names)}
+    runs = {name: made_motion(make_run, SPATIAL.get(name, "peg_corner"), k) for k, name in enumerate(names)}
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
         inputs={**runs, "arm_energies": arm_energies()},
