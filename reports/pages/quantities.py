@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import partial
 
 # name -> how sentences say it; the group is its value. To add a quantity: a line here.
 QUANTITIES: dict[str, re.Pattern[str]] = {
@@ -20,11 +21,11 @@ _MARKED = re.compile(r'<data value="([^"]+)">([^<]*)</data>')
 def marked(text: str) -> str:
     """Return escaped text in which every quantity carries its name: ``<data value="impacts certified">12</data>``."""
     for name, pattern in QUANTITIES.items():
-        text = pattern.sub(lambda found, name=name: _named(found, name), text)
+        text = pattern.sub(partial(_named, name), text)
     return text
 
 
-def _named(found: re.Match[str], name: str) -> str:
+def _named(name: str, found: re.Match[str]) -> str:
     start, end = (edge - found.start() for edge in found.span(1))
     said = found.group()
     return f'{said[:start]}<data value="{name}">{said[start:end]}</data>{said[end:]}'
