@@ -18,7 +18,7 @@ _BLOCK = 1 << 20
 PAPER_TITLE = "Haptic rendering of rigid contacts using impulsive and penalty forces"
 PAPER_AUTHORS = "D. Constantinescu, S. E. Salcudean, E. A. Croft"
 PAPER_PLACE = "IEEE Transactions on Robotics 21(3), 2005"
-_ACTION, _SOFTWARE, _MACHINE, _PAPER = "#reproduce", "#iapb", "#machine", "#paper"
+_ACTION, _SOFTWARE, _MACHINE, _PAPER, _AUTHORS = "#reproduce", "#iapb", "#machine", "#paper", "#authors"
 _FORMATS = {".html": "text/html", ".json": "application/json", ".diff": "text/x-diff", ".yml": "application/yaml",
             ".h5": "application/x-hdf5", ".zip": "application/zip"}  # fmt: skip
 _MACHINE_FACTS = ("system", "cpu", "blas", "python")
@@ -81,6 +81,7 @@ def _root(parts: list[dict[str, str]], facts: Mapping[str, str]) -> dict[str, An
                        "table that it was made from.",
         "datePublished": datetime.now(UTC).date().isoformat(), "license": {"@id": LICENSE}, "hasPart": parts,
         "mentions": {"@id": _ACTION}, "isBasedOn": {"@id": _PAPER}, "version": facts.get("version", ""),
+        "author": {"@id": _AUTHORS}, "publisher": {"@id": _AUTHORS},
     }  # fmt: skip
 
 
@@ -108,4 +109,5 @@ def _machine(facts: Mapping[str, str]) -> dict[str, Any]:
 def _license_and_paper() -> list[dict[str, Any]]:
     paper = f"{PAPER_AUTHORS}: {PAPER_TITLE}, {PAPER_PLACE}"
     return [{"@id": LICENSE, "@type": "CreativeWork", "name": "MIT License", "identifier": "MIT"},
+            {"@id": _AUTHORS, "@type": "Organization", "name": "The iapb authors"},
             {"@id": _PAPER, "@type": "ScholarlyArticle", "name": paper}]

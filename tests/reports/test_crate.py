@@ -70,6 +70,7 @@ def test_the_crate_says_what_ro_crate_1_1_asks_for(out: Path) -> None:
     missing = {name for name in references(crate["@graph"]) if name not in entities and not name.startswith("https://")}
     assert not missing
     root, action = entities["./"], entities["#reproduce"]
+    assert {entities[root[role]["@id"]]["@type"] for role in ("author", "publisher")} == {"Organization"}
     assert {"@type", "name", "description", "datePublished"} <= set(root) and root["license"]["@id"].endswith("MIT")
     on_disk = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
     marks = {"runs/index.jsonl", f"runs/{MARK_NAME}", f"tables/{MARK_NAME}"}
