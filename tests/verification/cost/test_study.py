@@ -10,10 +10,10 @@ import pytest
 import typer
 
 from reports.commands import bench as command
-from reports.figures.cost import anytime, effect_costs, impact_scaling, trajectory_precision
+from reports.figures.cost import anytime, effect_costs, effect_steps, impact_scaling, trajectory_precision
 from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
-from verification.cost.effects import summary
+from verification.cost.effects import steps, summary
 from verification.cost.growth import FACTORED, PRINTED, RATE_COLUMNS, SCALING_COLUMNS, fitted
 from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
@@ -138,7 +138,7 @@ def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
     motions = trajectory_precision.draw(inputs)
     assert len(motions.panels) == 2
-    assert [name for name, _ in motions.legend] == ["IAPB, Runge-Kutta 4", "PB, semi-implicit Euler", "MuJoCo"]
+    assert [name for name, _ in motions.legend] == ["IAPB, RK4", "PB, Euler", "MuJoCo"]
     without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
     assert motions.panels[0].svg != trajectory_precision.draw(without).panels[0].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
@@ -152,6 +152,19 @@ def test_the_front_of_effects_is_pareto() -> None:
     assert {row["effect"]: row["best of its error"] for row in table.records()} == {
         "cheap": "yes", "dear": "yes", "bad": "no"}  # fmt: skip
     assert len(effect_costs.draw({"effect_costs": table}).panels) == 1
+
+
+def test_steps_are_shown_with_the_shares_that_exceed_the_noise() -> None:
+    keys = ("effect", "active", "step", "all on", "faster than real time", "time saved")
+    rows = [("gravity", True, 2.0, 3.0, 500.0, 10.0), ("wall_contacts", True, 2.0, 3.0, 500.0, 40.0),
+            ("friction", True, 2.0, 3.0, 500.0, None), ("delay", False, 2.0, 3.0, 500.0, None)]
+    noisy = [("gravity", True, 1.0, 1.5, 900.0, None)]
+    table = steps({name: table_of(EFFECT_COLUMNS, [dict(zip(keys, row, strict=True)) for row in each])
+                   for name, each in (("slow", rows), ("quick", noisy))})  # fmt: skip
+    assert table.rows == (("quick", 1, 1.0, 1.5, 900.0, "each below the noise"),
+                          ("slow", 3, 2.0, 3.0, 500.0, "wall contacts 40 %, gravity 10 %"))
+    drawn = effect_steps.draw({"effect_steps": table, "machine": "a processor, report of a day"})
+    assert "a processor, report of a day" in drawn.caption and "slow 2 µs, with all on 3 µs" in drawn.panels[0].alt
 
 
 def test_bench_ends_with_1_where_a_row_failed(
