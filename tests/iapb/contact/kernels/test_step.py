@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+import iapb.contact.kernels.broadphase
 import iapb.system
 from iapb.compiled import block
 from iapb.contact.kernels.step import OK, advance, contact_state, locate, touching
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.system import System
 
 K, B, MU, THRESHOLD, E, SLOW = 300.0, 2.0, 0.3, 0.05, 0.4, 1e-3
@@ -223,13 +224,61 @@ def test_the_forces_noted_at_the_contacts_carry_the_box() -> None:
     assert state.friction_force[:2] == pytest.approx(friction[:2], abs=1e-12)
 
 
-def test_the_broad_phase_leaves_out_no_touching_pair(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Twelve discs thrown together: the contacts of the near pairs are those of all pairs."""
-    discs = "".join(
+def discs() -> Scene:
+    bodies = "".join(
         f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 1e-5, shapes: [{{kind: circle, radius: 0.5}}]}}\n"
         for k in range(12)
     )
-    scene = scene_from_text(f"name: discs\nrate: 1000\nduration: 0.1\nbodies:\n{discs}contact: {{stiffness: 500}}\n")
+    return scene_from_text(f"name: discs\nrate: 1000\nduration: 0.1\nbodies:\n{bodies}contact: {{stiffness: 500}}\n")
+
+
+def test_more_near_pairs_than_there_is_room_for_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(iapb.system, "WORTHWHILE_PAIRS", 0)
+    monkeypatch.setattr(iapb.contact.kernels.broadphase, "PAIRS_PER_SHAPE", 0)  # room for one pair
+    system = System(discs())
+    world, state = system.world_under(Penalty()), system.make_state()  # all discs at one place
+    assert locate(world, state)
+    assert touching(world, state, state.contacts) < 0
+
+
+def test_a_contact_that_was_gone_for_a_step_is_new() -> None:
+    system = crowd("relative")
+    world, state = thrown(system, 0, old=False)
+    m, q, v, still = system.mechanism, state.q.copy(), state.v.copy(), np.zeros(36)
+    apart = m.integrate(m.neutral(), np.array([[10.0 * k, 0.0, 20.0, 0.0, 0.0, 0.0] for k in range(6)]).ravel(), 1.0)
+    news = []
+    for place in (q, q, apart, q):
+        state.q[:], state.v[:] = place, v
+        assert advance(world, state, still) == OK
+        news.append(state.contacts.is_new[: state.contact_count[0]].tolist())
+    first, lasted, gone, again = news
+    assert len(first) > 2 and all(first) and not any(lasted) and gone == [] and again == first
+
+
+def test_a_step_of_a_linkage_by_runge_kutta_is_the_textbooks() -> None:
+    """The classical method on (q, v), in numpy, with mass matrix and bias at each stage's own place."""
+    system = System(load_scene(find_scene("double_pendulum")))
+    world, state, m = system.world_under(Penalty(integrator="runge_kutta_4")), system.make_state(), system.mechanism
+    rng, h = np.random.default_rng(0), system.dt
+    q, v, applied = rng.normal(size=m.nv), 10.0 * rng.normal(size=m.nv), rng.normal(size=m.nv)
+    state.q[:], state.v[:] = q, v
+
+    def rate(y: np.ndarray) -> np.ndarray:
+        force = applied - m.gravity(y[: m.nq], system.gravity) - m.bias(y[: m.nq], y[m.nq :])
+        return np.concatenate([y[m.nq :], np.linalg.solve(m.mass_matrix(y[: m.nq]), force)])
+
+    y = np.concatenate([q, v])
+    a = rate(y)
+    b = rate(y + h / 2 * a)
+    c = rate(y + h / 2 * b)
+    d = rate(y + h * c)
+    assert advance(world, state, applied) == OK
+    np.testing.assert_allclose(np.concatenate([state.q, state.v]), y + h / 6 * (a + 2 * b + 2 * c + d), atol=1e-12)
+
+
+def test_the_broad_phase_leaves_out_no_touching_pair(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve discs thrown together: the contacts of the near pairs are those of all pairs."""
+    scene = discs()
     q = np.random.default_rng(1).uniform(-1.5, 1.5, 36)
     touched = []
     for worthwhile in (0, 10**9):
@@ -242,6 +291,7 @@ def test_the_broad_phase_leaves_out_no_touching_pair(monkeypatch: pytest.MonkeyP
         count = touching(world, state, state.contacts)
         touched.append(list(zip(state.contacts.shape_a[:count], state.contacts.shape_b[:count], strict=True)))
     assert touched[0] == touched[1] and len(touched[0]) > 5
+
 
 class Trees(NamedTuple):
     """What `contact_state` reads of a state."""
