@@ -41,6 +41,11 @@ class Film {
     return this.times[this.times.length - 1];
   }
 
+  // Shortly before anything touches; never where nothing does.
+  get start() {
+    return this.marks.length ? Math.max(this.times[this.marks[0]] - 0.03, 0) : Infinity;
+  }
+
   // The last moment that is not after a time.
   momentAt(time) {
     let [low, high] = [0, this.times.length - 1];
@@ -139,10 +144,12 @@ class Player {
     this.films = [...figure.querySelectorAll(".panel")].map((panel) => new Film(panel));
     this.end = Math.max(...this.films.map((film) => film.end));
     this.speed = SPEEDS.find((speed) => this.end / speed >= PLEASANT * 0.7) || SPEEDS[SPEEDS.length - 1];
-    this.time = 0;
+    const start = Math.min(...this.films.map((film) => film.start));
+    this.start = Number.isFinite(start) ? start : 0;
+    this.time = this.start;
     this.playing = false;
     this.makeControls(figure);
-    this.seek(0);
+    this.seek(this.start);
   }
 
   makeControls(figure) {
@@ -190,7 +197,7 @@ class Player {
   }
 
   play() {
-    if (this.time >= this.end) this.time = 0;
+    if (this.time >= this.end) this.time = this.start;
     this.playing = true;
     this.label();
     let last;

@@ -32,7 +32,7 @@ ARGUMENTS = (
     "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 DESK, PHONE = (1400, 900), (400, 800)
-STEPS = 128
+STEPS, UNTOUCHED = 128, 40
 FIGURES = ("fig07", "fig08", "film-corner", "film-obstacles", "fig03")
 SPATIAL = {"space/arm_obstacles": "arm_obstacles"}  # the runs that are not of the peg in the corner
 
@@ -96,6 +96,8 @@ def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
     pose = mechanism_of(loaded).poses(start + swing, planar=not isinstance(loaded, SpatialScene))
     run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
                    scene_name=scene, scene_resolved=resolved)
+    late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
+    run = replace(run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point))
     return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
 
 

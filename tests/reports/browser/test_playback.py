@@ -77,3 +77,11 @@ def _numbers(paths: list[str]) -> np.ndarray:
 def test_no_film_is_large(evidence: Evidence) -> None:
     run = evidence.inputs["corner/ideal"]
     assert len(film(run, None, [run]).text) <= LARGEST
+
+
+def test_a_film_begins_shortly_before_the_first_contact(desk: Any, evidence: Evidence) -> None:
+    runs = [evidence.inputs[name] for name in UNLIMITED.values()]
+    touched = min(run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]] for run in runs)
+    begins = float(desk.page.locator("#film-corner input[type=range]").input_value())
+    assert touched > 0.07
+    assert touched - 0.031 <= begins <= touched - 0.03 + 5 * runs[0].dt
