@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -222,6 +224,13 @@ def test_every_error_has_the_common_root() -> None:
 @pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])
 def test_no_rows_in_any_form_leave_the_velocity_as_it_is(rows: object) -> None:
     assert np.array_equal(call(contact_jacobian=rows).velocity, call(contact_jacobian=np.zeros((0, 2))).velocity)
+
+
+def test_fractions_and_whole_numbers_in_object_arrays_are_numbers() -> None:
+    """GOOD, exactly, as objects: the same impact to the bit."""
+    exact = np.array([[2, Fraction(1, 2)], [Fraction(1, 2), 1]], dtype=object)
+    moved = call(mass_matrix=exact, velocity=np.array([-1, 2], dtype=object))
+    assert np.array_equal(moved.velocity, call().velocity)
 
 
 @given(seed=st.integers(0, 10_000), d=st.integers(1, 6), c=st.integers(0, 8), clamp=st.booleans(),
