@@ -178,8 +178,12 @@ def scene_of(study: Study, path: Path) -> Path:
     given = Path(study.scene)
     if given.is_absolute() or ".." in given.parts or "\0" in study.scene:
         raise ArgumentError("scene", study.scene, "a path inside the study's folder, or the name of a scene of ours")
-    found = (folder / given).resolve()
-    if not (found.is_relative_to(folder) and found.is_file()):
+    try:
+        found = (folder / given).resolve()
+        here = found.is_relative_to(folder) and found.is_file()
+    except (OSError, RuntimeError):  # a name too long for the system, or links in a circle
+        here = False
+    if not here:
         expected = one_of(given.stem, scene_names(), "a file beside the study, or one of: ")
         raise ArgumentError("scene", study.scene, expected)
     return found

@@ -6,9 +6,12 @@ To add one: write the file, add a line to SOLVERS.
 
 from __future__ import annotations
 
+import fcntl
 import importlib
 import time
 from dataclasses import dataclass
+from importlib.util import find_spec
+from types import ModuleType
 
 import numpy as np
 
@@ -106,6 +109,23 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
     return Solution(problem, impulse, solver, answer.note, answer.refused, answer.seconds or seconds)
 
 
+def import_alone(name: str) -> ModuleType:
+    """Import a module of another package, one process at a time.
+
+    Two processes that import quantecon for the first time at once spoil its cache of compiled code: every later
+    import then aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock is on the package's own file.
+    """
+    package = name.partition(".")[0]
+    found = find_spec(package)
+    if found is None:
+        raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+    if found.origin is None:
+        return importlib.import_module(name)
+    with open(found.origin) as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        return importlib.import_module(name)
+
+
 def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
     if entry.of_the_machine:
         module = importlib.import_module(entry.module)
@@ -113,7 +133,7 @@ def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
         return module.solve
     try:
         for package in entry.package.split():  # here, so that imports do not count as the solver's time
-            importlib.import_module(package)
+            import_alone(package)
         return importlib.import_module(entry.module).solve
     except ImportError as error:
         install = "pip install " + " ".join(_INSTALL_NAMES.get(x, x) for x in entry.package.split())

@@ -6,32 +6,22 @@ Semidefinite W is degenerate, and rounding can then end a solvable problem on a 
 
 from __future__ import annotations
 
-import fcntl
 from collections.abc import Callable
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
+from reference.complementarity.solvers import import_alone
 
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
 
 def import_lcp_lemke() -> Callable[..., Any]:
-    """Import quantecon's compiled solver, one process at a time.
-
-    Two processes that import quantecon for the first time at once spoil its cache of compiled code: every later
-    import then aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock is on quantecon's own file.
-    """
-    found = find_spec("quantecon")
-    if found is None or found.origin is None:
-        raise ModuleNotFoundError("No module named 'quantecon'", name="quantecon")
-    with open(found.origin) as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        from quantecon.optimize import lcp_lemke
-    return lcp_lemke
+    """Import quantecon's compiled solver, one process at a time."""
+    found: Callable[..., Any] = import_alone("quantecon.optimize").lcp_lemke
+    return found
 
 
 def solve(problem: ImpactProblem) -> Answer:

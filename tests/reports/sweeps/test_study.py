@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from iapb import load_scene
@@ -94,3 +96,12 @@ def test_each_study_that_comes_with_the_project_can_be_run(name: str) -> None:
 def test_an_unknown_study_hears_the_known_ones() -> None:
     with pytest.raises(ArgumentError, match="struck_discs"):
         find_study("nothing")
+
+
+def test_a_scene_that_the_system_cannot_look_up_is_refused_by_name(study: Study, tmp_path: Path) -> None:
+    """A name longer than any file's (found by wrong input), and links that lead in a circle."""
+    (tmp_path / "a.yaml").symlink_to("b.yaml")
+    (tmp_path / "b.yaml").symlink_to("a.yaml")
+    for scene in ("9" * 1000 + ".yaml", "a.yaml"):
+        with pytest.raises(ArgumentError, match="scene = "):
+            scene_of(study.model_copy(update={"scene": scene}), tmp_path / "study.yaml")
