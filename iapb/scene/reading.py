@@ -96,7 +96,10 @@ def load_scene(path: str | Path) -> Scene:
     return scene_from_text(text, str(path))
 
 
-def scene_from_text(text: str, file: str = "(text)") -> Scene:
+_TEXT = "(text)"  # name of what stands in no file
+
+
+def scene_from_text(text: str, file: str = _TEXT) -> Scene:
     """Read a scene from YAML text; `file` is the name that mistakes are reported under.
 
     Raises
@@ -113,7 +116,7 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     mistakes += wrong
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
-    scene._file = file if given is root.value else ""
+    scene._file = file if given is root.value and file != _TEXT else ""
     scene._source_text = text if given is root.value else scene_text(scene, f"{scene.name} with its robots as bodies")
     return scene
 
