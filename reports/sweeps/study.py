@@ -49,8 +49,12 @@ class Range(Part):
         """The values, ends exact."""
         shares = [i / (self.count - 1) for i in range(self.count)]
         if self.scale == "log":
-            factor = math.log(self.stop / self.start)
-            inner = [self.start * math.exp(share * factor) for share in shares]
+            ratio = self.stop / self.start
+            if 0.0 < ratio < math.inf:
+                inner = [self.start * math.exp(share * math.log(ratio)) for share in shares]
+            else:  # ends further apart than any number is large
+                low, high = math.log(self.start), math.log(self.stop)
+                inner = [math.exp((1.0 - share) * low + share * high) for share in shares]
         else:
             inner = [self.start + share * (self.stop - self.start) for share in shares]
         return (self.start, *inner[1:-1], self.stop)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -105,3 +106,10 @@ def test_a_scene_that_the_system_cannot_look_up_is_refused_by_name(study: Study,
     for scene in ("9" * 1000 + ".yaml", "a.yaml"):
         with pytest.raises(ArgumentError, match="scene = "):
             scene_of(study.model_copy(update={"scene": scene}), tmp_path / "study.yaml")
+
+
+@pytest.mark.parametrize("ends", [(1e9, 1e-320), (1e-320, 1e9)])
+def test_a_range_by_factors_may_span_more_than_any_number(ends: tuple[float, float]) -> None:
+    first, middle, last = Range.model_validate({"from": ends[0], "to": ends[1], "count": 3, "scale": "log"}).values()
+    wanted = math.sqrt(1e9) * math.sqrt(1e-320)  # the product itself has lost digits
+    assert (first, last) == ends and middle == pytest.approx(wanted, rel=1e-10)  # rounding of logarithms of size 700
