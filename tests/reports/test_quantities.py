@@ -14,8 +14,8 @@ from verification.finding import REPRODUCED, Finding, Part, finding_of
 from verification.hard_cases.study import on_hard_cases
 
 SENTENCES = {
-    "impacts certified": ("10,846 impacts of the 1192 runs of the engine: 0 gained energy", "10,846"),
-    "adverse impacts certified": ("120000 adverse impacts: 0 gained energy (exact)", "120000"),
+    "impacts certified": ("0 of 10,846 impacts in 1,192 runs of the engine gained energy", "10,846"),
+    "adverse impacts certified": ("nor did 120,000 drawn to provoke a gain", "120,000"),
     "time of a peg step": ("as long as one of peg_corner (0.8 µs on this machine)", "0.8 µs"),
     "exponent of bodies": ("the time of a step of free bodies grows with exponent 1.24.", "1.24"),
     "hard cases of the engine": ("The engine is stable on 50 of 51 hard cases", "50 of 51"),
@@ -48,7 +48,7 @@ def test_a_peg_step_with_two_times_and_an_exponent_with_two_values_are_noticed()
 def test_the_studies_say_their_quantities_as_they_are_recognised() -> None:
     assert "stable on 0 of 0 hard cases" in on_hard_cases(()).answer
     source = exact_energy.__loader__.get_source(exact_energy.__name__)  # type: ignore[union-attr]
-    assert "runs of the engine" in source and "adverse impacts" in source
+    assert "impacts in {len(rows):,} runs of the engine" in source and "drawn to provoke a gain" in source
 
 
 def test_a_contradiction_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
