@@ -60,6 +60,8 @@ def store(
     """
     if not (where.is_file() or where.is_dir()):
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
+    if where.resolve() == Path(where.resolve().anchor):
+        raise ArgumentError("where", str(where), "a folder of results, not a whole file system")
     if where.is_file() and action in (Action.repair, Action.gc, Action.mark):
         raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")
     if delete and action is not Action.gc:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -219,6 +220,13 @@ def test_the_store_checks_a_file_that_is_named_and_cares_for_folders_only(iapb, 
     for action in ("gc", "repair"):
         status, _, err = iapb("store", action, path)
         assert status == 1 and f"a folder of results: {action} is not for one file" in err and path.is_file()
+
+
+@pytest.mark.parametrize("action", ["check", "repair", "gc", "again", "mark"])
+def test_the_store_does_not_care_for_a_whole_file_system(action, iapb):
+    root = Path.cwd().anchor
+    status, _, err = iapb("store", action, root)
+    assert status == 1 and "where" in err and root in err and "not a whole file system" in err
 
 
 def test_effects_lists_each_with_its_reason(iapb):
