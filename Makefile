@@ -89,9 +89,9 @@ deep: setup ## the test suite with long property searches
 format: setup ## let ruff repair what it can
 	@$(BIN)/ruff check --fix .
 
-.PHONY: wheel
-wheel: setup ## build dist/*.whl
-	@$(PIP) wheel --no-deps --no-build-isolation -w dist .
+.PHONY: packages
+packages: ## build wheel and sdist, use them in empty environments of Python 3.11 to 3.13; EXTRA=all with that extra
+	@$(PYTHON) -m tools.packages $(if $(EXTRA),--extra $(EXTRA))
 
 .PHONY: lock
 lock: ## resolve requirements.lock again from pyproject.toml (needs uv)

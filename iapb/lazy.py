@@ -6,9 +6,11 @@ import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
-from iapb.errors import MissingDependencyError, name_the_extra
+from iapb.errors import IapbError, MissingDependencyError, name_the_extra
 
 
 def lazy_names(
@@ -40,7 +42,12 @@ def lazy_names(
 
 
 def needed(module: str, purpose: str) -> Any:
-    """Return an optional module, imported now; who lacks it gets one sentence that says how to install it."""
+    """Return an optional module, imported now; who lacks it gets one sentence that says how to install it.
+
+    Where a package of the user's hides one of this project's, the error names both and the way out.
+    """
+    if hidden := hidden_package():
+        raise IapbError(hidden)
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
@@ -49,6 +56,19 @@ def needed(module: str, purpose: str) -> Any:
             raise named from error
         package = module.partition(".")[0]
         raise MissingDependencyError(package, purpose, f"pip install {package}") from error
+
+
+def hidden_package() -> str:
+    """Say which package of this project is hidden by one of the same name elsewhere; empty where none is."""
+    ours = Path(__file__).resolve().parents[1]
+    for name in ("reference", "verification", "reports"):
+        spec = find_spec(name)
+        places = [*(spec.submodule_search_locations or ()), spec.origin] if spec else []
+        found = [Path(place).resolve() for place in places if place]
+        if found and not any(place.is_relative_to(ours / name) for place in found):
+            return (f"{found[0]} hides the package {ours / name}, which has the same name. Rename yours, or take its "
+                    "folder off Python's import path.")  # fmt: skip
+    return ""
 
 
 def extension(group: str, name: str) -> Any:

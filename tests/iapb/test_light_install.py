@@ -7,6 +7,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from iapb.errors import EXTRAS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,16 +56,22 @@ def test_a_name_that_needs_an_extra_says_which() -> None:
 
 
 def test_the_command_without_its_packages_says_so_in_one_sentence() -> None:
-    done = run_without({"typer"}, "import reports; raise SystemExit(reports.main())")
+    done = run_without({"typer"}, "from iapb.__main__ import main; raise SystemExit(main())")
     assert done.returncode == 1
     assert done.stderr == ("iapb: The command needs typer, which is not installed. "
                            "Install it with: pip install 'iapb[report]'\n")  # fmt: skip
 
 
-def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
-    (tmp_path / "verification").mkdir()
-    (tmp_path / "verification" / "__init__.py").touch()
-    code = f"sys.path.insert(0, {str(tmp_path)!r}); import reports; raise SystemExit(reports.main())"
-    done = run_without(set(), code)
-    assert done.returncode == 1
-    assert f"{tmp_path / 'verification'} hides the package {ROOT / 'verification'}" in done.stderr
+@pytest.mark.parametrize("name", ["reference", "verification", "reports"])
+@pytest.mark.parametrize("own", ["{}/__init__.py", "{}.py"])
+def test_a_foreign_package_of_the_same_name_is_named(name: str, own: str, tmp_path: Path) -> None:
+    file = tmp_path / own.format(name)
+    file.parent.mkdir(exist_ok=True)
+    file.touch()
+    start = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
+    foreign = file.parent if file.name == "__init__.py" else file
+    for code in ("from iapb.__main__ import main; raise SystemExit(main())",
+                 "from iapb.lazy import needed; needed('verification.laws.kit', 'The fixture iapb_law')"):
+        done = run_without(set(), start + code)
+        assert done.returncode == 1
+        assert f"{foreign} hides the package {ROOT / name}" in done.stderr and "Rename yours" in done.stderr

@@ -1,0 +1,130 @@
+"""`make packages`: build the wheel and the sdist, and use each in empty environments of every Python at hand.
+
+An environment gets the newest packages that pip finds, or the lowest that pyproject.toml allows. In each one a process
+imports iapb, simulates a scene and resolves an impact; another does so from the cache. The numbers must be equal to the
+last bit in all of them. With --extra the environments get that extra, too, and judge an impact resolver.
+
+    python -m tools.packages --extra all        (a gigabyte for each Python)
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+
+ROOT = Path.cwd()
+PYTHONS = ("3.11", "3.12", "3.13")
+TRIAL = '''
+import hashlib, json, time
+start = time.perf_counter()
+import numba, numpy
+import iapb
+imported = time.perf_counter() - start
+run = iapb.simulate(iapb.find_scene("peg_corner"))
+simulated = time.perf_counter() - start
+after = iapb.resolve_impact(numpy.diag([2.0, 1.0, 0.5]), numpy.array([[1.0, 0.3, 0.1], [0.2, 1.0, 0.4]]),
+                            numpy.array([-1.0, -2.0, 0.5]), 0.5)
+bits = hashlib.sha256(run.q.tobytes() + run.u.tobytes() + numpy.asarray(after).tobytes()).hexdigest()[:16]
+print(json.dumps({"numpy": numpy.__version__, "numba": numba.__version__, "import": imported, "first run": simulated,
+                  "bits": bits}))
+'''
+VERDICT = '''
+import json, time
+start = time.perf_counter()
+from verification import check_passivity
+from iapb import resolve_impact
+passed = check_passivity(resolve_impact, impacts=50).passed
+print(json.dumps({"passed": bool(passed), "verdict": time.perf_counter() - start}))
+'''
+
+
+def main() -> int:
+    """Build, try each environment, print a table; 1 where one fails or gives other numbers."""
+    parser = argparse.ArgumentParser(prog="python -m tools.packages", description=__doc__.splitlines()[0])
+    parser.add_argument("--extra", default="", help="an extra of pyproject.toml to install, too: verify, report or all")
+    parser.add_argument("--pythons", nargs="+", metavar="COMMAND", default=[
+        path for path in (shutil.which(f"python{version}") for version in PYTHONS) if path],
+        help="Python commands to try; those of 3.11 to 3.13 that are found")  # fmt: skip
+    chosen = parser.parse_args()
+    if not chosen.pythons:
+        parser.error("none of python3.11, python3.12, python3.13 is found: name some by --pythons")
+    with tempfile.TemporaryDirectory() as folder:
+        wheel, sdist = build(Path(folder))
+        first = chosen.pythons[0]
+        wanted = [(python, wheel, False) for python in chosen.pythons] + [(first, sdist, False), (first, wheel, True)]
+        rows = [try_one(Path(folder) / f"env{number}", *one, chosen.extra) for number, one in enumerate(wanted)]
+    for row in rows:
+        print(", ".join(f"{name} {value:.1f}" if isinstance(value, float) else f"{name} {value}"
+                        for name, value in row.items()))  # fmt: skip
+    wrong = [row for row in rows if "failed" in row or row.get("passed") is False]
+    different = {row["bits"] for row in rows if "bits" in row}
+    print("The same bits in all environments." if len(different) == 1 else f"Different numbers: {sorted(different)}")
+    return 1 if wrong or len(different) != 1 else 0
+
+
+def build(folder: Path) -> tuple[Path, Path]:
+    """Build the wheel and the sdist; return their paths."""
+    subprocess.run([sys.executable, "-m", "venv", folder / "build"], check=True)
+    python = folder / "build/bin/python"
+    subprocess.run([python, "-m", "pip", "install", "-q", "build"], check=True)
+    subprocess.run([python, "-m", "build", "--outdir", folder / "dist", ROOT], check=True, stdout=subprocess.DEVNULL)
+    return next((folder / "dist").glob("*.whl")), next((folder / "dist").glob("*.tar.gz"))
+
+
+def lowest(extra: str) -> list[str]:
+    """Return the lowest versions that pyproject.toml allows, as requirements.
+
+    >>> lowest("")[0].startswith("numpy==")
+    True
+    """
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras, wanted, given = project["optional-dependencies"], list(project["dependencies"]), [extra]
+    while given:
+        for one in extras.get(given.pop(), []):
+            inner = re.match(r"iapb\[(.+)\]", one)
+            (given if inner else wanted).append(inner[1] if inner else one)
+    return [re.sub(r">=([\d.]+)(,<[\d.]+)?", r"==\1", one) for one in wanted]
+
+
+def try_one(folder: Path, python: str, archive: Path, low: bool, extra: str) -> dict[str, object]:
+    """Install `archive` into a new environment and use it twice; return what was seen, or "failed"."""
+    row: dict[str, object] = {"python": "", "from": "sdist" if archive.suffix == ".gz" else "wheel",
+                              "versions": "lowest" if low else "newest"}  # fmt: skip
+    print(f"trying {python}, {row['from']}, {row['versions']} ...", file=sys.stderr)
+    try:
+        told([python, "-m", "venv", folder])
+        inside = folder / "bin/python"
+        row["python"] = told([inside, "-c", "import platform; print(platform.python_version())"])
+        start = time.perf_counter()
+        told([inside, "-m", "pip", "install", "-q", f"{archive}[{extra}]" if extra else archive,
+              *(lowest(extra) if low else ())])  # fmt: skip
+        row["install [s]"] = time.perf_counter() - start
+        told([inside, "-m", "pip", "check"])
+        row["packages"] = len(told([inside, "-m", "pip", "list", "--format=freeze"]).splitlines())
+        row["megabytes"] = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) // 10**6
+        row |= json.loads(told([inside, "-c", TRIAL], folder))
+        row["next process's run"] = json.loads(told([inside, "-c", TRIAL], folder))["first run"]
+        if extra:
+            row |= json.loads(told([inside, "-c", VERDICT], folder))
+    except subprocess.CalledProcessError as error:
+        row["failed"] = (error.stderr.strip() or error.stdout.strip())[-400:]
+    shutil.rmtree(folder, ignore_errors=True)
+    return row
+
+
+def told(command: list[object], where: Path | None = None) -> str:
+    """Run a command and return what it prints."""
+    done = subprocess.run([str(part) for part in command], cwd=where, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
