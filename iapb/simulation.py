@@ -302,7 +302,8 @@ def _undone(*blocks: Any) -> Iterator[None]:
 
 def _checked_law(law: Any) -> Any:
     if isinstance(law, type) or not all(hasattr(law, name) for name in ("name", "settings", "advance")):
-        raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...)")
+        raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...); "
+                                        "the name of a world is given as world=...")  # fmt: skip
     return law
 
 
