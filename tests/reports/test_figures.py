@@ -42,7 +42,7 @@ def inputs() -> dict[str, object]:
     names = {name for recipe in RECIPES for name in recipe.needs}
     given: dict[str, object] = {name: run for name in names if name.startswith(("corner/", "device/"))}
     given |= {name: load_scene(find_scene(name[6:])).resolved() for name in names if name.startswith("scene/")}
-    return given | tables() | {"arm_energies": arm_energies(), "group/IAPB": group}
+    return given | tables() | {"arm_energies": arm_energies(), "group/IAPB": group, "machine": "a processor"}
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.key)
