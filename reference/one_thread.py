@@ -12,6 +12,8 @@ from contextvars import ContextVar
 from functools import cache
 from typing import Any
 
+from iapb.lazy import needed
+
 _limited: ContextVar[bool] = ContextVar("_limited", default=False)
 
 
@@ -19,10 +21,9 @@ _limited: ContextVar[bool] = ContextVar("_limited", default=False)
 def _controller() -> Any:
     """Made once: asking which BLAS libraries are loaded takes a millisecond, setting their limit 30 µs."""
     import numpy.linalg  # noqa: F401 - numpy and scipy bring a BLAS each, known only once it is loaded
-    import scipy.linalg  # noqa: F401
-    from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()
+    needed("scipy.linalg", "A reference")
+    return needed("threadpoolctl", "A reference").ThreadpoolController()
 
 
 @contextmanager

@@ -49,6 +49,12 @@ print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]],
 
 
 
+def test_a_rigid_world_without_its_packages_says_which_extra_brings_them() -> None:
+    done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)")
+    assert ("MissingDependencyError: A reference needs scipy, which is not installed. "
+            "Install it with: pip install 'iapb[reference]'") in done.stderr  # fmt: skip
+
+
 def test_a_name_that_needs_an_extra_says_which() -> None:
     done = run_without({"hypothesis"}, "from verification import check_passivity")
     assert ("MissingDependencyError: verification.check_passivity needs hypothesis, which is not installed. "
