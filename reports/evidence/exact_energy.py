@@ -52,11 +52,12 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
                       "cancelled": one.cancelled, "median price": _known(one.price[0]),
                       "largest price": _known(one.price[2]), HOLDS: one.holds})
     recorded = (f"{_sum(rows, 'gains')} of {_sum(rows, 'impacts'):,} impacts in {len(rows):,} runs of the engine "
-                "gained energy, judged by exact arithmetic")  # fmt: skip
+                "gained energy in exact arithmetic")  # fmt: skip
     least = min((one["moved"] for one in drawn), default=0.0)
-    adverse = (f"nor did {_sum(drawn, 'impacts'):,} drawn to provoke a gain" if not _sum(drawn, "gains") else
-               f"{_sum(drawn, 'gains')} of {_sum(drawn, 'impacts'):,} drawn to provoke a gain did")  # fmt: skip
-    moved = f"in {least:.1%} of these or more, for each way of drawing, the velocity changed"
+    adverse = (f"nor did {_sum(drawn, 'impacts'):,} random impacts drawn to provoke a gain"
+               if not _sum(drawn, "gains") else
+               f"{_sum(drawn, 'gains')} of {_sum(drawn, 'impacts'):,} random impacts drawn to provoke a gain did")
+    moved = f"in every family the impact changed the velocity in at least {least:.1%} of the cases"
     parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows)),
              Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn])))  # fmt: skip
     tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn)}

@@ -1,4 +1,4 @@
-"""Topic: runs that come out the same; the last result of what crashes, full disks, damaged files and wrong input do."""
+"""Topic: runs that repeat to the last bit; the last results of fault injection and fuzzing."""
 
 from __future__ import annotations
 
@@ -25,9 +25,8 @@ from verification.finding import (
 )
 
 LEAD = (
-    "A result that can be lost, or changed without a word, is no evidence. Each of these was done on purpose to a "
-    "store of runs; a fault is survived if every run that was finished is there and whole, and what is not whole says "
-    "so."
+    "Evidence must not be lost or changed silently. Each fault below was injected into a store of runs. A fault counts "
+    "as survived if every finished run is still there and intact, and every damaged file is reported as damaged."
 )
 
 
@@ -41,7 +40,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
             tables[part] = last[0]
             findings.append(finding(*last))
         else:
-            findings.append(Part(f"No result of {part} is kept here: `make fuzz` makes one.", NOT_COMPUTED))
+            findings.append(Part(f"No stored result for {part}: run `make fuzz`.", NOT_COMPUTED))
     verdict = " ".join(finding.sentence for finding in findings)
     return finding_of("survival", "Runs that survive", LEAD, verdict, findings, tables, failures)
 
@@ -71,23 +70,23 @@ def _of_table(table: Table, column: str) -> int:
 
 def _inputs(table: Table, made: str) -> Part:
     tried, broken = _of_table(table, "tried"), _of_table(table, "traceback or hang")
-    came = f"{broken} gave a traceback or hung" if broken else "none gave a traceback or hung"
-    return Part(f"Of {tried} wrong inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
-                   f"were refused by name, the others taken as valid ({made}).",
+    came = f"{broken} caused a traceback or a hang" if broken else "none caused a traceback or a hang"
+    return Part(f"Of {tried} damaged inputs of {len(table.rows)} kinds {came}: {_of_table(table, 'refused by name')} "
+                   f"raised a named error, and the others were still valid input ({made}).",
                    REFUTED if broken else REPRODUCED)  # fmt: skip
 
 
 def _faults(table: Table, made: str) -> Part:
     tried, survived, lost = (_of_table(table, column) for column in ("tried", "survived", "lost"))
     return Part(
-        f"Of {tried} faults of {len(table.rows)} kinds, {survived} were survived; {lost} finished results were lost "
-        f"({made}).", REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
+        f"The store survived {survived} of {tried} injected faults of {len(table.rows)} kinds; {lost} finished results "
+        f"were lost ({made}).", REPRODUCED if survived == tried and lost == 0 else REFUTED)  # fmt: skip
 
 
 def _repetitions(repeated: Any) -> Part:
     same = sum(repetition.same for _, repetition in repeated)
-    return Part(f"{same} of {len(repeated)} runs of the figures, simulated again from their own files alone, "
-                   "are the same to the last bit.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
+    return Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
+                   "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
 
 
 def _repeated_table(repeated: Any) -> Table:

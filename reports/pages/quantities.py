@@ -9,7 +9,7 @@ from functools import partial
 # name -> how sentences say it; the group is its value. To add a quantity: a line here.
 QUANTITIES: dict[str, re.Pattern[str]] = {
     "impacts certified": re.compile(r"of (\d[\d,]*) impacts in [\d,]+ runs of the engine"),
-    "adverse impacts certified": re.compile(r"(\d[\d,]*) drawn to provoke a gain"),
+    "adverse impacts certified": re.compile(r"(\d[\d,]*)(?: random impacts)? drawn to provoke a gain"),
     "time of a peg step": re.compile(r"peg(?:_corner| in the corner)(?:[^.;<]|\.\d){0,60}?(\d[\d.]*\s[µm]s)"),
     "exponent of bodies": re.compile(r"bodies(?:[^.;<]|\.\d){0,80}?exponent(?:[^.;<\d]){0,40}(\d[\d.]*\d)"),
     "hard cases of the engine": re.compile(r"stable on (\d+ of \d+) hard cases"),

@@ -15,7 +15,7 @@ from verification.hard_cases.study import on_hard_cases
 
 SENTENCES = {
     "impacts certified": ("0 of 10,846 impacts in 1,192 runs of the engine gained energy", "10,846"),
-    "adverse impacts certified": ("nor did 120,000 drawn to provoke a gain", "120,000"),
+    "adverse impacts certified": ("nor did 120,000 random impacts drawn to provoke a gain", "120,000"),
     "time of a peg step": ("as long as one of peg_corner (0.8 µs on this machine)", "0.8 µs"),
     "exponent of bodies": ("the time of a step of free bodies grows with exponent 1.24.", "1.24"),
     "hard cases of the engine": ("The engine is stable on 50 of 51 hard cases", "50 of 51"),

@@ -14,10 +14,11 @@ from verification.finding import REPRODUCED, Failure, Finding, Part, Table, find
 
 ID, TITLE = "complementarity", "Against complementarity"
 LEAD = (
-    "IAPB gives every colliding contact its reflected velocity and lets impulses pull; a complementarity solver lets "
-    "contacts only push, and decides which do. Both were tried on the same impacts: random families of known geometry, "
-    "every impact of the project's scenes, and problems that solvers find hard. A solution counts only when residuals, "
-    "recomputed from the problem, say so; motions are compared in the kinetic metric, as shares of |v⁻|."
+    "IAPB solves (21): every colliding contact separates with e times its approach velocity, and impulses may pull. A "
+    "linear complementarity problem (LCP) allows only pushing impulses and decides which contacts push. Both laws are "
+    "applied to the same impacts: random families of known geometry, every impact of the project's scenes, and "
+    "problems that solvers find hard. A solution counts only if its residuals, recomputed from the problem, are small. "
+    "Velocities after the impact are compared in the kinetic metric, relative to |v⁻|."
 )
 # Contact problems that others wrote, beside the project where somebody has put them; a clone has none and needs none.
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
@@ -66,5 +67,6 @@ def answer(study: ComparisonStudy, parts: Sequence[Part]) -> str:
     agree = sum(cell.agree * cell.cases for cell in cells) / cases
     against = sum(cell.contradictions for cell in cells)
     held = sum(part.verdict == REPRODUCED for part in parts)
-    return (f"IAPB moves as the Newton LCP in {agree:.0%} of {cases} impacts, and exactly where some p >= 0 gives its "
-            f"motion ({against} exceptions); {held} of {len(parts)} findings hold without limits.")
+    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree exactly "
+            f"where pushing impulses (p >= 0) can produce IAPB's velocity ({against} exceptions). {held} of "
+            f"{len(parts)} findings are reproduced without restriction.")

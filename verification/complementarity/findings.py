@@ -62,8 +62,9 @@ def single_contact(study: ComparisonStudy) -> Part | None:
     worst = max(c.distance for c in study.single)
     verdict = "reproduced" if worst <= C05_TOLERANCE else "refuted"
     return Part(
-        f"C05 {verdict}: at one contact IAPB and the Newton LCP give the same motion in all {len(study.single)} "
-        f"impacts, to {worst:.1e} of |v⁻| in the kinetic metric (asked: {C05_TOLERANCE:.0e}).",
+        f"C05 {verdict}: at one contact IAPB and the Newton LCP give the same velocity in all {len(study.single)} "
+        f"impacts; the largest difference is {worst:.1e} of |v⁻| in the kinetic metric (tolerance "
+        f"{C05_TOLERANCE:.0e}).",
         _all(c.distance <= C05_TOLERANCE for c in study.single), "single contact")  # fmt: skip
 
 
@@ -73,8 +74,9 @@ def wider_class(study: ComparisonStudy) -> Part | None:
     cases, against = sum(c.cases for c in cells), sum(c.contradictions for c in cells)
     whole = sorted({c.family for c in study.cells if _always(study.cells, c.family)})
     return Part(
-        f"The wider class: with one e the two agree if and only if some p >= 0 gives IAPB's motion; {against} of "
-        f"{cases} impacts speak against it. They always agreed for: {', '.join(whole)}.",
+        "Several contacts with equal e: the two laws agree if and only if some p >= 0 gives IAPB's velocity; "
+        f"{against} of {cases} impacts contradict this. They agreed in every impact of these families: "
+        f"{', '.join(whole)}.",
         _all(c.contradictions == 0 for c in cells), "wider class")  # fmt: skip
 
 
@@ -86,8 +88,8 @@ def two_contacts(study: ComparisonStudy) -> Part | None:
     """The border r = c."""
     right = sum(c.predicted == c.found for c in study.two_contacts)
     return Part(
-        f"Two contacts whose rows have the cosine c in the kinetic metric and close at speeds 1 and r agree "
-        f"exactly where r >= c: {right} of {len(study.two_contacts)} grid points.",
+        "Two contacts with approach speeds 1 and r, whose rows have the cosine c in the kinetic metric: the laws agree "
+        f"exactly where r >= c, as predicted, on {right} of {len(study.two_contacts)} grid points.",
         _all(c.predicted == c.found for c in study.two_contacts), "two contacts")  # fmt: skip
 
 
@@ -100,9 +102,9 @@ def difference(study: ComparisonStudy) -> Part | None:
     redundancies = sorted({c.redundancy for c in cells})
     apart = {r: 100.0 * (1.0 - np.mean([c.agree for c in cells if c.redundancy == r])) for r in redundancies}
     return Part(
-        f"Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses (defect at "
-        f"most {defect:.0e}), up to {farthest:.2g} |v⁻|. It grows with 1 + e, which moves no impact across the "
-        "border. Impacts that differ, by redundant rows, "
+        f"Where the laws differ, their distance equals that of IAPB's impulse from the cone of pushing impulses (to "
+        f"{defect:.0e}); it is at most {farthest:.2g} |v⁻|. The distance is proportional to 1 + e; whether an impact "
+        "differs does not depend on e. Share of impacts that differ, by number of redundant rows: "
         f"{', '.join(f'{r}: {share:.0f} %' for r, share in apart.items())}.",
         _all(c.defect <= CONE_TOLERANCE for c in study.cells + study.scenes), "difference")  # fmt: skip
 
@@ -112,9 +114,8 @@ def energy(study: ComparisonStudy) -> Part | None:
     cells = study.cells + study.scenes
     extra, momentum = 100 * max(c.extra_loss for c in cells), max(c.momentum for c in cells)
     return Part(
-        f"IAPB never keeps more energy than the LCP: it loses ½ (1−e)/(1+e) · distance² more, up to "
-        f"{extra:.0f} % of "
-        f"KE⁻, nothing at e = 1. Momentum changes lie in range(Jᵀ) to {momentum:.0e}.",
+        f"IAPB never keeps more energy than the LCP. It loses ½ (1−e)/(1+e) · distance² more, at most {extra:.0f} % of "
+        f"KE⁻, and nothing more at e = 1. The change of momentum lies in range(Jᵀ) to {momentum:.0e}.",
         _all(c.least_extra_loss >= -SAME and c.momentum <= MOMENTUM for c in cells), "energy")  # fmt: skip
 
 
@@ -126,10 +127,11 @@ def scenes(study: ComparisonStudy) -> Part | None:
     apart = sorted({c.family.removeprefix("scene ") for c in study.scenes if c.agree < 1.0})
     pulling = sum(round(c.adhesive * c.cases) for c in study.scenes)
     artefacts = sum(round(c.artefact * c.cases) for c in study.scenes)
-    where = f"they differ in {', '.join(apart)}" if apart else "they agree in all"
+    where = f"the laws differ in {', '.join(apart)}" if apart else "the laws agree in all"
     return Part(
-        f"Impacts of the project's scenes: {cases}; {where}. {pulling} pull truly (no p >= 0 gives their motion), "
-        f"{artefacts} only in the least-norm p; {study.left_out} are left out (per-body rows or device limits).",
+        f"Impacts of the project's scenes: {cases}; {where}. {pulling} impacts need a pulling impulse (no p >= 0 gives "
+        f"their velocity); {artefacts} have one only in the least-norm p. {study.left_out} impacts are left out "
+        "(per-body rows or device limits).",
         REPRODUCED if not apart else MIXED, "scenes")  # fmt: skip
 
 
@@ -141,9 +143,8 @@ def touching(study: ComparisonStudy) -> Part | None:
     ours = 100 * float(np.mean([c.left_approaching for c in cells]))
     theirs = 100 * float(np.mean([c.left_approaching_law for c in cells]))
     return Part(
-        f"A touching contact that is not given a row is left approaching in {ours:.0f} % of such "
-        f"impacts by IAPB and "
-        f"in {theirs:.0f} % by the LCP on the same rows.",
+        "A neighbouring contact that touches without approaching has no row in (19). After the impact it approaches in "
+        f"{ours:.0f} % of such impacts with IAPB, and in {theirs:.0f} % with the LCP on the same rows.",
         _by_share(1.0 - float(np.mean([c.left_approaching for c in cells]))), "touching")  # fmt: skip
 
 
@@ -158,13 +159,13 @@ def piles(study: ComparisonStudy) -> Part | None:
     against = sum(row.asked is not None and row.asked != row.agrees for row in study.piles)
     own = [row for row in study.piles if not row.name.startswith("recorded")]
     return Part(
-        f"Dense piles, every colliding row an equality: some p >= 0 gives the motion of (21) in {len(agree)} of "
-        f"{len(study.piles)} impacts, none of them with more than {limit} contacts: stop using (19) where more collide "
-        f"at once. There {pulling:.0f} % of the impulses pull, and the motion "
-        f"is {np.median([row.distance for row in beyond]):.2g} |v⁻| (median) from the LCP's. Non-negative least "
-        f"squares contradicts this in {against} impacts. Impulses that only push (method \"poisson\", world IAPB-push) "
-        f"are the LCP's to {max(row.lcp for row in own):.0e} on our own piles, to "
-        f"{max(row.lcp for row in study.piles):.0e} on all, and change the energy by at most "
+        "Dense piles, with every colliding contact as an equality: some p >= 0 gives the velocity of (21) in "
+        f"{len(agree)} of {len(study.piles)} impacts, and in none with more than {limit} contacts. Do not use (19) "
+        f"where more than {limit} contacts collide at once: there {pulling:.0f} % of the impulses pull, and the "
+        f"velocity differs from the LCP's by {np.median([row.distance for row in beyond]):.2g} |v⁻| (median). "
+        f"Non-negative least squares contradicts this in {against} impacts. With impulses that only push (method "
+        f"\"poisson\", world IAPB-push) the velocity equals the LCP's to {max(row.lcp for row in own):.0e} on the "
+        f"project's piles and to {max(row.lcp for row in study.piles):.0e} on all, and the energy changes by at most "
         f"{max(row.gain for row in study.piles):.0e} KE⁻.",
         verdict_of_trials([row.agrees for row in study.piles]), "piles",
         miss=f"beyond {limit} contacts at once {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
@@ -178,11 +179,11 @@ def references(study: ComparisonStudy) -> Part | None:
     mass, inner, gap = (max(rows, key=attrgetter(name)) for name in ("mass_matrix", "inner_forces", "gap"))
     apart = sum(row.apart for row in rows)
     return Part(
-        f"The references compute M and B + G by Pinocchio and contacts in closed form. On {len(rows)} scenes the "
-        f"engine's differ by at most {mass.mass_matrix:.0e} ({mass.scene}) and {inner.inner_forces:.0e} "
-        f"({inner.scene}) of the largest "
-        f"entry, gaps by {gap.gap:.0e} m ({gap.scene}); {apart} of {sum(row.configurations for row in rows)} "
-        "configurations have other contacts, as where two faces tie.",
+        f"The references compute M and B + G with Pinocchio and contacts in closed form. On {len(rows)} scenes the "
+        f"engine differs from them by at most {mass.mass_matrix:.0e} of the largest entry in M ({mass.scene}), "
+        f"{inner.inner_forces:.0e} in B + G ({inner.scene}) and {gap.gap:.0e} m in the gaps ({gap.scene}). In {apart} "
+        f"of {sum(row.configurations for row in rows)} configurations the sets of contacts differ, for example where "
+        "two faces are equally deep.",
         _all(max(row.mass_matrix, row.inner_forces, row.gap) <= SAME_MECHANICS for row in rows),
         "references")  # fmt: skip
 
@@ -195,11 +196,10 @@ def friction(study: ComparisonStudy) -> Part | None:
     bouncing = [c for c in cells if c.restitution > 0.0]
     share = 100 * sum(c.ncp_gains for c in bouncing) / max(1, sum(c.cases for c in bouncing))
     return Part(
-        f"Friction in the impact: where every contact pushes, IAPB's motion is Coulomb's NCP in {same} "
-        f"of {pushing} "
-        f"impacts. With e > 0 the NCP gains energy in {share:.0f} % (up to {ncp:.2g} KE⁻, the CCP up to "
-        f"{ccp:.2g}); "
-        f"IAPB never (largest change {ours:.0e} KE⁻).",
+        "Friction in the impact: where every contact pushes, IAPB's velocity equals that of Coulomb's law (nonlinear "
+        f"complementarity problem, NCP) in {same} of {pushing} impacts. With e > 0 the NCP gains energy in {share:.0f} "
+        f"% of the impacts, up to {ncp:.2g} KE⁻; its convex relaxation (CCP) gains up to {ccp:.2g} KE⁻. IAPB never "
+        f"gains energy (largest change {ours:.0e} KE⁻).",
         REFUTED if any(c.largest_gain > GAIN for c in cells) else _by_share(same / max(1, pushing)),
         "friction")  # fmt: skip
 
@@ -212,11 +212,10 @@ def unequal(study: ComparisonStudy) -> Part | None:
     )
     before, after = study.bar["newton_equality"], study.bar["IAPB, unequal restitution"]
     return Part(
-        f"Unequal restitution: the engine's two LCPs are the reference's to {distance:.0e} and gain at "
-        f"most {ours:.0e} "
-        f"KE⁻; equalities gain up to {equality:.2g}, the Newton LCP up to {newton:.2g} where some "
-        f"contacts separate. "
-        f"On the struck bar (0.5 J): equalities {before:.4g} J, IAPB {after:.4g} J.",
+        f"Unequal restitution: the engine's two LCPs agree with the reference's to {distance:.0e} and gain at most "
+        f"{ours:.0e} KE⁻. Equalities gain up to {equality:.2g} KE⁻, the Newton LCP up to {newton:.2g} KE⁻ where some "
+        f"contacts separate. The struck bar has 0.5 J before the impact, {before:.4g} J after it with equalities and "
+        f"{after:.4g} J with IAPB.",
         _all(c.distance <= SAME_LAW and c.gain <= GAIN for c in study.unequal), "unequal")  # fmt: skip
 
 
@@ -230,9 +229,9 @@ def ideal_world(study: ComparisonStudy) -> Part | None:
     more = f" ({len(CASES) - len(rows)} more with --full)" if len(rows) < len(CASES) else ""
     orders = [order for row in rows for order in (row.position_order, row.velocity_order) if np.isfinite(order)]
     return Part(
-        f"The rigid world meets event-driven truth at first order {place} of {len(rows)} scenes{more} (positions "
-        f"in the sup norm, velocities in L¹; measured orders {min(orders):.2f} to {max(orders):.2f}, median "
-        f"{np.median(orders):.2f}); without a truth: {', '.join(WITHOUT_TRUTH)}.",
+        f"The ideal world converges to the event-driven solution at first order {place} of {len(rows)} scenes{more}: "
+        f"measured orders {min(orders):.2f} to {max(orders):.2f}, median {np.median(orders):.2f} (positions in the sup "
+        f"norm, velocities in L¹). No event-driven solution exists for {', '.join(WITHOUT_TRUTH)}.",
         verdict_of_trials([row.first_order for row in rows]), "ideal world")  # fmt: skip
 
 
@@ -243,7 +242,8 @@ def cost(study: ComparisonStudy) -> Part | None:
         pairs = [pair for pair in rivals(study.impact_costs) if pair.called == called]
         decided = [pair for pair in pairs if pair.costs_more is not None]
         more = sum(bool(pair.costs_more) for pair in decided)
-        found.append(f"{called}, a solver costs more than IAPB in {more} of {len(decided)} pairs that differ clearly")
+        found.append(f"{called}, a solver takes longer than IAPB in {more} of the {len(decided)} pairs of solver and "
+                     "impact whose times differ clearly")
     costs = study.impact_costs
     sizes = costs.column("contacts")
     parts = [_cost_part(costs.where(impacts=family, contacts=contacts), family, contacts)
@@ -258,13 +258,14 @@ def _cost_part(costs: Table, family: str, contacts: int) -> str:
     times = {name: _seconds(1e-6 * row["median"]) for name, row in here.items() if row["median"] is not None}
     solved = [name for name in times if here[name]["outcome"] == "solved"]
     others = [name for name in solved if name not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL)]
-    text = f"{family} of {contacts}: IAPB {times[KERNEL]} compiled, {times[IAPB]} from Python"
+    noun = "contact" if contacts == 1 else "contacts"
+    text = f"{family} of {contacts} {noun}: IAPB {times[KERNEL]} compiled, {times[IAPB]} from Python"
     if LEMKE_KERNEL in solved:
         text += f", Lemke {times[LEMKE_KERNEL]} compiled"
     if not others:
-        return text + ", no LCP solver from Python solved it"
+        return text + ", no LCP solver called from Python solved it"
     best = min(others, key=lambda name: here[name]["median"])
-    return text + f", fastest from Python {best} {times[best]}"
+    return text + f", fastest solver from Python {best} {times[best]}"
 
 
 def steps(study: ComparisonStudy) -> Part | None:
@@ -276,7 +277,7 @@ def steps(study: ComparisonStudy) -> Part | None:
                                               row["world"] != COMPILED))
     if not parts:
         return None
-    return Part("C22, time per step, in times IAPB's in its compiled loop: " + "; ".join(parts) + ".",
+    return Part("C22, time per step as a multiple of IAPB's in its compiled loop: " + "; ".join(parts) + ".",
                 verdict_of_trials([costs_more(*pair) for pair in step_rivals(study.step_costs)]), "steps",
                 timed=True)  # fmt: skip
 
@@ -291,20 +292,20 @@ def problems(study: ProblemStudy) -> tuple[Part, ...]:
     unsolved = [line.problem for line in study.lines if all(verdict != "solved" for _, verdict in line.verdicts)]
     smooth, rough = _spread(study, 0), _spread(study, 1)
     found = [
-        f"{study.folder}: {len(study.lines)} problems read, {len(study.unread)} files not. Solved/refused/failed by "
-        f"recomputed residuals: {counts}." + _left_out(study),
-        f"Solved by nobody: {', '.join(unsolved) or 'none'}. Those who solve a frictionless problem agree on its "
-        f"contact velocities to {smooth:.0e} (impulses are not unique and not compared)"
-        + (f"; with friction, where Coulomb's law leaves even velocities open, to {rough:.0e}." if rough else "."),
+        f"{study.folder[:1].upper()}{study.folder[1:]}: {len(study.lines)} problems read, {len(study.unread)} files "
+        f"not readable. Problems solved/refused/failed, judged by recomputed residuals: {counts}." + _left_out(study),
+        f"Problems that no solver solves: {', '.join(unsolved) or 'none'}. The solvers that solve a frictionless "
+        f"problem agree on its contact velocities to {smooth:.0e} (impulses are not unique and not compared)"
+        + (f"; with friction, where Coulomb's law does not make velocities unique, to {rough:.0e}." if rough else "."),
     ]
     alone = [f"{line.problem} ({solved[0]})" for line in study.lines
              if len(solved := [name for name, verdict in line.verdicts if verdict == "solved"]) == 1]  # fmt: skip
     if alone:
-        found.append(f"Solved by one solver only: {', '.join(alone)}.")
+        found.append(f"Problems that only one solver solves: {', '.join(alone)}.")
     if study.unread:
-        found.append(f"Not read: {'; '.join(file.reason for file in study.unread)}.")
+        found.append(f"Files not readable: {'; '.join(file.reason for file in study.unread)}.")
     if skew:
-        found.append(f"W is asymmetric, relative to its largest entry, in: {', '.join(skew)}.")
+        found.append(f"Problems with an asymmetric W (asymmetry relative to the largest entry): {', '.join(skew)}.")
     # who is asked at all depends on how long he took before
     verdict = MIXED if unsolved or study.unread else REPRODUCED
     return tuple(Part(sentence, verdict, "problems", timed=True) for sentence in found)
@@ -319,7 +320,8 @@ def _spread(study: ProblemStudy, friction: int) -> float:
 def _left_out(study: ProblemStudy) -> str:
     """What a limit of time kept from being tried."""
     count = sum(row.verdict == "left out" for row in study.rows)
-    return f" {count} pairs were left out: that solver was too slow on a smaller problem." if count else ""
+    said = f" {count} pairs of solver and problem were left out: the solver was too slow on a smaller problem."
+    return said if count else ""
 
 
 def _seconds(value: float) -> str:

@@ -51,16 +51,16 @@ def agreement(study: ComparisonStudy) -> Table:
         ("impacts", "e", "redundant rows", "cases", "share that agrees", "share that truly pulls",
          "share that pulls as chosen", "negative share of p", "median distance where they differ", "largest distance",
          "largest extra loss of KE⁻", "left approaching by IAPB", "left approaching by the LCP"),
-        rows, 3, "IAPB and the Newton LCP; distances in the kinetic metric, of |v⁻|. A contact truly pulls where no "
-        "p >= 0 gives the motion; as chosen, where only the p of least norm does. Left approaching: share of impacts, "
-        "contacts that touch without a row included.")  # fmt: skip
+        rows, 3, "IAPB and the Newton LCP; distances in the kinetic metric, relative to |v⁻|. An impact truly pulls "
+        "where no p >= 0 gives its velocity; it pulls as chosen where only the least-norm p does. Left approaching: "
+        "share of impacts after which some contact approaches, touching contacts without a row included.")  # fmt: skip
 
 
 def two_contacts(study: ComparisonStudy) -> Table:
     """The exact border of two contacts."""
     rows = tuple((c.cosine, c.speed_ratio, c.predicted, c.found, c.distance) for c in study.two_contacts)
     return titled(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
-                   "Two contacts whose rows have this cosine in the kinetic metric, closing at speeds 1 and r.")
+                   "Two contacts with approach speeds 1 and r, whose rows have this cosine in the kinetic metric.")
 
 
 def profile(studies: Iterable[ProblemStudy]) -> Table:
@@ -87,7 +87,8 @@ def problems(study: ProblemStudy) -> Table:
         ("problem", "unknowns", "rank", "asymmetry of W", *names, "spread of velocities", "residual as stored",
          "why not read"),
         tuple(rows), 2, "Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. "
-        "Spread: of contact velocities among those who solved it.", timed=("spread of velocities",))  # fmt: skip
+        "Spread: largest difference of contact velocities among the solvers that solved it.",
+        timed=("spread of velocities",))  # fmt: skip
 
 
 def convergence(study: ComparisonStudy) -> Table:
@@ -102,8 +103,8 @@ def convergence(study: ComparisonStudy) -> Table:
     return titled(
         ("scene", "events", "step [ms]", "error of positions", "error of velocities", "order, positions",
          "order, velocities"), tuple(rows), 3,
-        "Largest of three steps near each; positions in the sup norm [m, rad], velocities in L¹ over time [m, rad]. "
-        "A dash: the error is rounding alone.")  # fmt: skip
+        "Each row shows the largest error of three steps near the one given; positions in the sup norm [m, rad], "
+        "velocities in L¹ over time [m, rad]. A dash: the error is rounding alone.")  # fmt: skip
 
 
 def friction(study: ComparisonStudy) -> Table:
@@ -116,7 +117,7 @@ def friction(study: ComparisonStudy) -> Table:
     return titled(
         ("e", "μ", "cases", "all contacts push", "of these as the NCP", "friction reduced", "unsolved", "NCP gains",
          "CCP gains", "largest change of KE, IAPB", "NCP", "CCP", "median distance from the NCP"), rows, 2,
-        "Changes of energy as shares of KE⁻: above zero a gain.")  # fmt: skip
+        "Changes of energy relative to KE⁻; positive values are gains.")  # fmt: skip
 
 
 def unequal(study: ComparisonStudy) -> Table:
@@ -152,8 +153,9 @@ def piles(study: ComparisonStudy) -> Table:
         ("pile", "rows", "piles", "contacts", "redundant", "share that agrees", "most contacts that agree",
          "share of impulses that pull", "negative share of p", "median distance from the LCP", "pushing from the LCP",
          *times), rows, 3,
-        "(21) on every row given, and impulses that only push (method \"poisson\"); e = 0; distances in the kinetic "
-        "metric, of |v⁻|. Agrees: some p >= 0 gives the motion of (21). Times from Python, checks included.",
+        "(21) with every row as an equality, beside impulses that only push (method \"poisson\"); e = 0; distances in "
+        "the kinetic metric, relative to |v⁻|. Agrees: some p >= 0 gives the velocity of (21). Times are of calls from "
+        "Python, checks included.",
         timed=times)  # fmt: skip
 
 
@@ -162,8 +164,8 @@ def references(study: ComparisonStudy) -> Table:
     rows = tuple((d.scene, d.configurations, d.apart, d.mass_matrix, d.inner_forces, d.frame_jacobian, d.contacts,
                   d.gap, d.normal, d.row) for d in study.differences)  # fmt: skip
     return titled(("scene", "configurations", "with other contacts", "M", "B + G", "frame Jacobians", "contacts",
-                   "gap [m]", "normal", "contact row"), rows, 2, "Largest differences: of M, B + G and Jacobians "
-                  "relative to the largest entry, of contacts as they are.")  # fmt: skip
+                   "gap [m]", "normal", "contact row"), rows, 2, "Largest differences between engine and reference: "
+                  "relative to the largest entry for M, B + G and Jacobians, absolute for contacts.")  # fmt: skip
 
 
 def laws() -> Table:
@@ -176,8 +178,8 @@ def solvers() -> Table:
     """Solvers by name."""
     takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
     rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
-    note = ("Siconos is a package of the machine, asked through the system's Python; its time is that of its compiled "
-            "solve, the others' that of their call.")  # fmt: skip
+    note = ("Siconos is a system package and is called through the system's Python. Its time is that of its compiled "
+            "solve; the times of all others are of a call from Python.")  # fmt: skip
     return titled(("solver", "method", "package", "takes"), rows, note=note)
 
 
@@ -193,7 +195,7 @@ def worlds(
             rows.append((world, done.law, _settings(done.law_settings), done.coupling,
                          _settings(done.coupling_settings)))  # fmt: skip
     return titled(("world", "contact law", "its settings", "coupling", "its gains"), tuple(rows), 4,
-                   f"Read from the file of the run of {WORLD_SCENE} in each world.")  # fmt: skip
+                   f"From the run file of {WORLD_SCENE} in each world.")  # fmt: skip
 
 
 def _settings(values: Any) -> str:

@@ -25,10 +25,11 @@ from verification.finding import (
 
 TITLE = "Other engines"
 QUESTION = (
-    "Eight scenes whose outcome is known, by energy, momentum and symmetry or because nothing may move, were given to "
-    "every engine that is installed: without friction, each at the settings that suit it best and then at a step "
-    "of 1 ms. Energy, momentum and overlap are computed from positions and velocities by one measure for all. MuJoCo "
-    "and Drake have no coefficient of restitution; springs with the right damping stand in for it."
+    "Every installed engine simulates eight frictionless scenes of known outcome: conservation of energy and momentum "
+    "with symmetry determine the outcome, or nothing may move. Each scene runs twice: with the settings that suit the "
+    "engine best, and with a time step of 1 ms. One program computes energy, momentum and overlap from the positions "
+    "and velocities of all engines. MuJoCo and Drake have no coefficient of restitution; springs with suitable damping "
+    "replace it."
 )
 COLUMNS = titled((
     "engine", "version", "scene", "settings", "law", "energy error", "largest rise of energy", "momentum error",
@@ -62,18 +63,18 @@ def sentence(records: Sequence[EngineRecord]) -> str:
     if first.missing:
         return f"{first.title} is not installed here: {first.missing}"
     met = [record for record in records if verdict(record) == MET]
-    at = "at its own settings" if first.choice == OWN else f"at a step of {1e3 * (first.step or 0.0):g} ms"
-    parts = [f"{first.title} {first.version}, {at}, meets the law of {len(met)} of {len(records)} scenes"]
+    at = "with its own settings" if first.choice == OWN else f"with a step of {1e3 * (first.step or 0.0):g} ms"
+    parts = [f"{first.title} {first.version}, {at}, gives the known outcome in {len(met)} of {len(records)} scenes"]
     missed = [f"{record.scene.replace('_', ' ')} ({_worst(record)})" for record in records if record not in met]
     if missed:
-        parts.append("it misses " + ", ".join(missed))
+        parts.append("it misses it in " + ", ".join(missed))
     gains = [record for record in records if (record.energy_gain or 0.0) > NEVER_RISES]
     if gains:
         most = max(gains, key=lambda record: record.energy_gain or 0.0)
-        parts.append(f"energy rises in {len(gains)}, most by {most.energy_gain:.2g} of it in "
-                     f"{most.scene.replace('_', ' ')}")  # fmt: skip
+        parts.append(f"energy rises in {len(gains)} scene{'s' * (len(gains) > 1)}, with a relative rise of at most "
+                     f"{most.energy_gain:.2g} ({most.scene.replace('_', ' ')})")  # fmt: skip
     else:
-        parts.append("energy never rises")
+        parts.append("energy rises in no scene")
     return "; ".join(parts) + "."
 
 
@@ -104,14 +105,14 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
              for group in groups.values()]  # fmt: skip
     absent = sorted({record.title for record in records if record.missing})
     if absent:
-        said = f"Not installed here, and so not compared: {', '.join(absent)}."
+        said = f"Not installed, hence not compared: {', '.join(absent)}."
         parts.append(Part(said, NOT_TESTABLE, optional=True))
     own = [record for record in present if record.choice == OWN]
     matched = [record for record in present if record.choice != OWN]
     answer = (
         f"{len({record.engine for record in present})} engines on {len({record.scene for record in present})} scenes "
-        f"of known outcome: the law is met in {_met(own)} of {len(own)} runs at their own settings and in "
-        f"{_met(matched)} of {len(matched)} at 1 ms. {_misses(present)}"
+        f"of known outcome: the outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and "
+        f"in {_met(matched)} of {len(matched)} with a step of 1 ms. {_misses(present)}"
     ).rstrip()
     tables = {"errors": errors_table(records), "settings": settings_table(records)}
     return finding_of("engines", TITLE, QUESTION, answer, parts, tables, failures)
@@ -139,8 +140,9 @@ def _met(records: Sequence[EngineRecord]) -> int:
 
 def errors_table(records: Sequence[EngineRecord]) -> Table:
     """A row per engine, scene and choice of settings; an engine that is not installed keeps its rows."""
-    note = ("Errors are shares of the start's kinetic energy, of the sum of m |v| and of the largest speed; at rest "
-            "the rise is a share of m g times the bodies' size. A law is met within 1 %, at rest within 1 mm.")
+    note = ("Errors are relative to the kinetic energy at the start, to the sum of m |v| and to the largest speed; in "
+            "resting scenes the rise of energy is relative to m g times the bodies' size. Law met: all errors are at "
+            "most 1 %, or, in resting scenes, nothing moves by more than 1 mm.")
     return table_of(COLUMNS, map(_row, records), digits=2, note=note)
 
 

@@ -68,10 +68,10 @@ def properties(run: Any, depth: str, progress: Progress) -> Finding:
         rows.append(row)
         progress(len(rows), total)
     kept, caught = [row["holds"] for row in rows], [row["fault caught"] for row in rows if row["fault"]]
-    parts = (Part(f"{sum(kept)} of {len(kept)} laws hold on random and nasty impacts.", verdict_of_law(kept)),
+    parts = (Part(f"{sum(kept)} of {len(kept)} laws hold on random and adverse inputs.", verdict_of_law(kept)),
              Part(f"{sum(caught)} of {len(caught)} planted faults are caught.", verdict_of_law(caught)))  # fmt: skip
     answer = f"{parts[0].sentence[:-1]}; {parts[1].sentence}"
-    question = "Do the laws hold for every input, and does each check notice a planted fault?"
+    question = "Do the laws hold on every input, and does each check detect a planted fault?"
     return finding_of("properties", "Properties", question, answer, parts, {"laws": table_of(COLUMNS, rows)}, failures)
 
 
@@ -197,8 +197,9 @@ def printed_formula() -> Finding:
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
     sentence = (
         f"The formula as printed gains {gain:.2g} of the kinetic energy, in exact rationals, on {case.contacts} rows "
-        f"of {case.coordinates} coordinates with e = {case.restitution:g}. The kit found and shrank it by itself; of "
-        f"{verdict.checked} impacts {verdict.failures} gained energy, the largest {verdict.largest:.2g}."
+        f"of {case.coordinates} coordinates with e = {case.restitution:g}. The passivity kit found and shrank this "
+        f"case by itself; {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
+        f"{verdict.largest:.2g} of it."
     )
     given = (*_arrays(case), ("v⁺ as computed", _text(answer)), ("v⁺ exact, rounded", _text(exact)))
     return counterexample("gram_pinv", verdict.statement, sentence, given, report.counterexample_test)
@@ -213,9 +214,9 @@ def restitution_per_contact() -> Finding:
         raise IapbError("the kit found no gain of one restitution per contact, which exact arithmetic says is there")
     answer = resolver(case.mass_matrix, case.contact_jacobian, case.velocity, case.given_restitution())
     sentence = (
-        f"One restitution per contact, as equalities J v⁺ = −E J v⁻, multiplies the kinetic energy by "
-        f"{1.0 + relative_gain(case, answer):.3g}. The kit found and shrank it; Poisson's law by two LCPs, which the "
-        "engine uses where restitutions differ, is passive."
+        f"Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
+        f"{1.0 + relative_gain(case, answer):.3g}. The passivity kit found and shrank this case. Where restitutions "
+        "differ, the engine uses Poisson's law (two LCPs), which is passive."
     )
     given = (*_arrays(case), ("v⁺ as computed", _text(answer)))
     return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence, given, report.counterexample_test)
@@ -228,8 +229,8 @@ def saturation() -> Finding:
     scaled = limits.limited_impulses_are_passive(case, limits.ours)
     _, force = limits.saturated(case.impulse, case.dt, case.force_limit)
     sentence = (
-        f"A device that clips an impulse component by component gains {clipped.value:.2%} of its kinetic energy where "
-        f"the tool loses some; with one factor for the whole impulse both lose {-scaled.value:.2%}."
+        f"A device that clips each component of an impulse by itself gains {clipped.value:.2%} of its kinetic energy, "
+        f"while the tool loses energy. With one factor for the whole impulse both lose {-scaled.value:.2%}."
     )
     given = (
         *_arrays(case.impact), ("impulse [N s]", _text(case.impulse)),

@@ -184,7 +184,8 @@ def invariance(table: Table) -> Part:
     moderate = [row["error"] for row, _ in rows if row["tolerance"] == AGREEMENT]
     beyond = [row["error"] / row["bound"] for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]
     return Part(
-        f"C06: the same impact in two parametrizations agrees to {max(moderate):.1e} in the {len(moderate)} cases of "
-        f"moderate condition (tolerance {AGREEMENT:g}); in {len(beyond)} worse ones, up to the singular pose, the "
-        f"error is at most {max(beyond):.1e} of its bound C ε κ/σ_min. In {sum(held is None for _, held in rows)} the "
-        "bound exceeds 1 and says nothing.", verdict_of_law(table.holds))  # fmt: skip
+        f"C06: the same impact, solved in two sets of coordinates, agrees to {max(moderate):.1e} in {len(moderate)} "
+        f"cases of moderate condition number (tolerance {AGREEMENT:g}). In {len(beyond)} worse conditioned cases, up "
+        f"to the singular pose, the error is at most {max(beyond):.1e} of the rounding bound C ε κ/σ_min. In "
+        f"{sum(held is None for _, held in rows)} cases this bound exceeds 1, so they cannot be judged.",
+        verdict_of_law(table.holds))  # fmt: skip

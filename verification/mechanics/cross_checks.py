@@ -52,14 +52,14 @@ def finding(checks: list[dict[str, Any]], failures: list[Failure]) -> Finding:
     """Return one part per comparison."""
     table = table_of(COLUMNS, checks, digits=2).judged(_agrees)
     parts = [
-        Part(f"{row['against']}, {row['quantity']}: the largest difference in {row['cases']} cases is "
-             f"{row['largest difference']:.2g} (tolerance {row['tolerance']:g}).",
+        Part(f"{row['quantity'][:1].upper()}{row['quantity'][1:]}, compared with {row['against']}: the largest "
+             f"difference in {row['cases']} cases is {row['largest difference']:.2g} (tolerance {row['tolerance']:g}).",
              REPRODUCED if _agrees(row) else REFUTED)
         for row in checks
     ]  # fmt: skip
     answer = (f"{sum(map(_agrees, checks))} of {len(checks)} comparisons with Pinocchio and with complementarity "
-              "solvers agree to the stated tolerance.")
-    question = "The same quantities from programs that share no algorithm with the engine."
+              "solvers agree within the stated tolerance.")
+    question = "The engine's quantities are compared with those of programs that share no algorithm with it."
     return finding_of("cross-checks", "Independent answers", question, answer, parts, {"comparisons": table}, failures)
 
 

@@ -119,7 +119,8 @@ def filters_table(found: Sequence[FalseCollisions]) -> Table:
                "steps off the facets", "energy lost [J]", "lost, of the fall")  # fmt: skip
     rows = [(f.setting, f.damping, f.collisions, f.new_contacts, f.doubled, f.lifted, f.energy_lost,
              f.energy_lost / f.potential_drop) for f in found]  # fmt: skip
-    return titled(columns, rows, digits=3, note="The ball rolls for two seconds; one contact per step is right.")
+    return titled(columns, rows, digits=3, note="The ball rolls for two seconds. In the round socket it has one "
+                  "contact in each step and no collision after the first.")
 
 
 def times_table(found: Sequence[FalseCollisions]) -> Table:
@@ -140,14 +141,16 @@ def filters(found: Sequence[FalseCollisions]) -> Part:
     counts = "; ".join(f"{name} {', '.join(str(run.collisions) for run in runs.values())}" for name, runs in of.items())
     both, none = of["both filters"], of["no filter"]
     left = {damping: run for damping, run in both.items() if run.collisions}
-    bounce = "".join(f" At {damping:g} N s/m the ball leaves the facets ({run.lifted} steps off them) and comes back "
-                     "as a new contact." for damping, run in left.items() if run.lifted)  # fmt: skip
+    bounce = "".join(f" At {damping:g} N s/m the ball bounces off the facets ({run.lifted} steps without contact), and "
+                     "each return is a new contact." for damping, run in left.items() if run.lifted)  # fmt: skip
     lost = max(run.energy_lost / run.potential_drop for run in none.values())
     doubled = [sum(run.doubled for run in runs.values()) for runs in (none, both)]
     return Part(
-        f"C18: a ball that rolls in the faceted socket, at damping {', '.join(f'{b:g}' for b in both)} N s/m and with "
-        f"distances beyond the {1e3 * EDGE_JUMP:.1f} mm of an edge, collides falsely: {counts}. Without filters up to "
-        f"{lost:.0%} of the fall's energy goes with them. Coherence removes them, clustering the doubled contacts "
-        f"({doubled[0]} without filters, {doubled[1]} with both).{bounce}",
+        "C18: false collisions of a ball that rolls in the faceted socket, at contact damping "
+        f"{', '.join(f'{b:g}' for b in both)} N s/m and with filter distances above the {1e3 * EDGE_JUMP:.1f} mm "
+        f"between contacts on neighbouring facets: {counts}. Without filters these collisions take up to {lost:.0%} of "
+        "the potential energy of the fall. Coherence removes false collisions; clustering removes duplicate contacts "
+        f"({doubled[0]} without filters, {doubled[1]} with both filters).{bounce}",
         REFUTED if len(left) == len(both) else MIXED if left else REPRODUCED,
-        miss=f"false collisions remain at {', '.join(f'{b:g}' for b in left)} N s/m" if left else "")  # fmt: skip
+        miss=f"false collisions remain at a damping of {', '.join(f'{b:g}' for b in left)} N s/m" if left else "",
+    )  # fmt: skip

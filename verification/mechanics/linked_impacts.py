@@ -175,9 +175,10 @@ def conserved(found: Sequence[LinkedOutcome]) -> Part:
     """What relative rows and sequences change."""
     energy, momentum = _changes([o for o in found if o.treatment != PER_BODY])
     return Part(
-        f"Cradles of 2 to 7 balls and Bernoulli's problem ({len({o.problem for o in found})}): with relative rows "
-        f"(12), and event by event, energy and momentum change by at most {energy:.1e} and {momentum:.1e} (tolerance "
-        f"{CONSERVED:g}).", REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
+        f"Newton's cradles of 2 to 7 balls and Bernoulli's three balls ({len({o.problem for o in found})} problems): "
+        f"with relative rows (12), solved at once or event by event, energy changes by at most {energy:.1e} and "
+        f"momentum by at most {momentum:.1e} (tolerance {CONSERVED:g}).",
+        REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
 
 
 def per_body(found: Sequence[LinkedOutcome]) -> Part:
@@ -185,8 +186,8 @@ def per_body(found: Sequence[LinkedOutcome]) -> Part:
     lost = [o for o in found if o.treatment == PER_BODY]
     energy, least = _changes(lost)[0], min(o.momentum_change for o in lost)
     return Part(
-        f"With the per-body rows of (13)-(14) energy changes by at most {energy:.1e}, but in all {len(lost)} cases "
-        f"momentum changes by {least:.2g} times its value or more: the striker comes back as from a wall (erratum 3).",
+        f"With the per-body rows (13)-(14) energy changes by at most {energy:.1e}, but momentum changes by at least "
+        f"{least:.2g} times its value in all {len(lost)} cases: the striking ball rebounds as from a wall (erratum 3).",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
 
 
@@ -198,8 +199,9 @@ def rows_decide(found: Sequence[LinkedOutcome]) -> Part:
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part(
-        f"Conservation does not decide the outcome, the rows do. Cradle of five, velocities after: {words} m/s. The "
-        "paper takes the rows that approach; only the sequence hands the blow to the last ball.",
+        "Conservation laws do not determine the outcome; it depends on which contacts enter the collision. Velocities "
+        f"of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only solving the "
+        "contacts one after the other passes the impulse to the last ball.",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
 
 
@@ -207,5 +209,5 @@ def linked_in_short(found: Sequence[LinkedOutcome]) -> str:
     """The words of the first page."""
     kept = max(_changes([o for o in found if o.treatment != PER_BODY]))
     least = min(o.momentum_change for o in found if o.treatment == PER_BODY)
-    return (f"linked impacts keep energy and momentum to {kept:.1e} with relative rows, while the paper's per-body "
-            f"rows change the total momentum by {least:.2g} times its value or more")  # fmt: skip
+    return (f"Impacts between touching balls conserve energy and momentum to {kept:.1e} with relative rows (12), while "
+            f"the paper's per-body rows (13)-(14) change the total momentum by at least {least:.2g} times its value")

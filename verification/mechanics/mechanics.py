@@ -33,9 +33,10 @@ from verification.mechanics.robots import (
 from verification.mechanics.tumbling import convergence, tumbling
 
 QUESTION = (
-    "Objects and linkages are points of one configuration space (1)-(3). Here its mechanics is held against Pinocchio, "
-    "against closed forms and against the laws of conservation; then it is used: linked impacts in which the rows "
-    "decide, the same impact in other coordinates, an arm led through its singular poses, a ball in a faceted socket."
+    "The engine describes free bodies and linkages by generalized coordinates (1)-(3). This page compares its "
+    "mechanics with Pinocchio, with closed forms and with conservation laws. It then shows four applications: impacts "
+    "between touching balls, the same impact in other coordinates, an arm led through its singular poses, and a ball "
+    "in a faceted socket."
 )
 # name: its study(depth, failures), which returns a Table with the outcome of every row
 AGAINST_PINOCCHIO: dict[str, Callable[..., Table]] = {
@@ -82,8 +83,9 @@ def mechanics(run: Callable[..., Run], depth: str, progress: Callable[[int, int]
     parts = [attempt(f"sentence on {name}", sentence, failures) for name, sentence in said.items()]
     worst = max((row["worst"] for table in compared.values() for row in table.records()), default=0.0)
     answer = attempt("answer", lambda: (
-        f"Trees, scenes and robots differ from Pinocchio by at most {worst:.1e}; {linked.linked_in_short(outcomes)}; "
-        "the filter removes false collisions only if it spans a facet and the ball does not bounce."
+        f"Linkages, scenes and robots differ from Pinocchio by at most {worst:.1e}. "
+        f"{linked.linked_in_short(outcomes)}. The contact filter removes false collisions only if it spans a facet and "
+        "the ball does not bounce."
     ), failures)  # fmt: skip
     if "operating" in tables:
         tables["operating"] = tables["operating"].without("fault")

@@ -71,11 +71,12 @@ def operating(depth: str = "quick", failures: list[Failure] | None = None) -> Ta
     """Lead the arm by every link and point along every path at every speed."""
     check_depth(depth)
     statement = (
-        "Led by any link and point, the arm passes its singular poses with finite motion and bounded energy."
+        "Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy."
     )
     tolerance = (
-        "every number finite; of the energy exchanged the integrator makes up at most the largest turn per step [rad], "
-        "as a first-order method may, and arm and spring hold at most so much more than the hand has put in"
+        "every number is finite; the energy residual, relative to the energy exchanged, is at most the largest joint "
+        "rotation per step [rad], the error of a first-order method; and arm and spring store at most that much more "
+        "than the hand has put in"
     )
     return judged(table_of(COLUMNS, _rows(depth, failures), note=f"{statement} Tolerance: {tolerance}."))
 
@@ -186,7 +187,7 @@ def led(table: Table) -> Part:
     share = max(abs(row["residual"]) / row["tolerance"] for row in whole)
     near = sum(row["steps near singular"] for row in whole)
     return Part(
-        f"Led by any link and point along {len(rows)} ways through its singular poses ({near:,} steps within a degree "
-        f"or so of straight or folded), the simulation breaks off in {len(rows) - len(whole)}; no joint turns faster "
-        f"than {max(row['largest joint speed'] for row in whole):.3g} rad/s, and the energy residual stays below "
+        f"An arm is led along {len(rows)} paths through its singular poses, with {near:,} steps within about a degree "
+        f"of straight or folded. {len(rows) - len(whole)} simulations break off. No joint turns faster than "
+        f"{max(row['largest joint speed'] for row in whole):.3g} rad/s, and the energy residual stays below "
         f"{share:.2g} of the first-order error estimate.", verdict_of_law(table.holds))  # fmt: skip

@@ -154,7 +154,7 @@ def positive_definite(
     check_depth(depth)
     rows = of_each(SIZES, lambda joints: [_definite(joints, 10 * TREES[depth], seed)], failures,
                    lambda joints: f"{joints} joints")  # fmt: skip
-    statement = "The mass matrix is positive definite wherever rounding leaves that to be judged."
+    statement = "The mass matrix is positive definite wherever rounding permits a judgement."
     tolerance = f"least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}"
     table = table_of(DEFINITE_COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}.")
     return table.judged(lambda row: bool(row["least eigenvalue × condition"] > 0.0))
@@ -180,8 +180,8 @@ def orders(table: Table) -> Part:
         f"{words(name)} {span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
         for (name,), rows in by(table.records(), "integrator").items()
     )
-    return Part("On random trees of 1 to 30 joints the energy changes by the work of the forces with the integrator's "
-                f"order: {found}.", verdict_of_law(table.holds))  # fmt: skip
+    return Part("Random linkages of 1 to 30 joints: the difference between change of energy and work of the forces "
+                f"falls with the order of the integrator. Measured: {found}.", verdict_of_law(table.holds))  # fmt: skip
 
 
 def definiteness(table: Table) -> Part:
@@ -191,11 +191,12 @@ def definiteness(table: Table) -> Part:
     least = min(row["least eigenvalue × condition"] for row in rows)
     verdict = verdict_of_law(table.holds)
     if not table.passed:
-        return Part("A random mass matrix of moderate condition is not positive definite.", verdict)
+        return Part("A random mass matrix with a moderate condition number is not positive definite.", verdict)
     return Part(
-        f"All {judged} of {sum(row['mass matrices'] for row in rows)} random mass matrices whose scaled condition is "
-        f"at most 1e12 (up to {max(row['largest condition judged'] for row in rows):.1e}) are positive definite: the "
-        f"least eigenvalue times the condition is never below {least:.2g}.", verdict)  # fmt: skip
+        f"Of {sum(row['mass matrices'] for row in rows)} random mass matrices, {judged} have a scaled condition number "
+        f"of at most 1e12 (largest {max(row['largest condition judged'] for row in rows):.1e}). All of these are "
+        f"positive definite: the least eigenvalue times the condition number is never below {least:.2g}.",
+        verdict)  # fmt: skip
 
 
 def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:

@@ -63,8 +63,8 @@ COLUMNS = (
     Column("worst", "relative difference"),
 )
 TOLERANCE = (
-    f"{AGREEMENT:g} of the reference's largest entry (a bias or potential energy that nearly vanishes: the size of "
-    "the terms that it sums): two algorithms, each exact to some 1e-14"
+    f"{AGREEMENT:g} of the reference's largest entry, for two algorithms that are each accurate to about 1e-14. A bias "
+    "or potential energy that nearly vanishes is compared with the size of the terms in its sum"
 )
 
 
@@ -227,11 +227,11 @@ def _row(
 
 
 _SETS = {
-    "random trees": "trees of 1 to 30 bodies, every joint kind and nearly singular inertias among them",
-    "joint kinds": "trees that have one kind of joint only",
-    "scenes": "mechanisms of the scenes that come along",
-    "URDF texts": "sets of URDF texts, our own robot and random ones with every joint type, each read by two parsers",
-    "robots": "robots of the folder beside the checkout, with a fixed and a floating base",
+    "random trees": "random trees of 1 to 30 bodies, with every joint type and nearly singular inertias",
+    "joint kinds": "trees with one joint type each",
+    "scenes": "mechanisms of the shipped scenes",
+    "URDF texts": "sets of URDF texts (the project's robot and random ones with every joint type), read by two parsers",
+    "robots": "robots of other projects, with a fixed and a floating base",
 }
 
 
@@ -239,14 +239,15 @@ def agreement(name: str, compared: Table) -> Part:
     """How far one set of mechanisms is from Pinocchio."""
     rows = compared.records()
     if not rows:
-        sentence = f"Robots beside the checkout: not there ({compared.note}), so not compared."
+        sentence = f"Robots of other projects are not compared: {compared.note}."
         return Part(sentence, NOT_TESTABLE, optional=True)
     states = sum(row["states"] for row in rows)
     count = states // STATES if name == "random trees" else len({row["mechanism"] for row in rows})
     most = max(QUANTITIES, key=lambda quantity: max(row[quantity] for row in rows)).replace("_", " ")
     return Part(
-        f"{count} {_SETS[name]}: at {states:,} random states everything differs from Pinocchio by at most "
-        f"{max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}), the {most} most.",
+        f"{count} {_SETS[name]}: in {states:,} random states no quantity differs from Pinocchio's by more than "
+        f"{max(row['worst'] for row in rows):.1e} of the largest entry (tolerance {AGREEMENT:g}). The {most} differs "
+        "most.",
         verdict_of_law(compared.holds))  # fmt: skip
 
 

@@ -197,5 +197,6 @@ def convergence(table: Table) -> Part:
         f"{words(name)}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
         for (name,), rows in by(judges, "integrator").items()
     )
-    return Part("A free tumbling body converges to the closed form with the declared order, and its energy and angular "
-                f"momentum converge no slower: {series}.", verdict_of_law(table.holds))  # fmt: skip
+    return Part("The motion of a free tumbling body converges to the closed form with the order that the integrator "
+                "declares; its energy and angular momentum converge at least as fast. Measured orders: "
+                f"{series}.", verdict_of_law(table.holds))  # fmt: skip

@@ -42,10 +42,11 @@ Measure = Mapping[str, Any]
 
 TITLE = "The scenes"
 QUESTION = (
-    "Every scene file of the project, run in the world IAPB at the scene's own step. The energy books say where each "
-    "joule came from and went; what they leave open is energy that the steps in time made up or swallowed, and must "
-    "fall with the integrator's declared order when the step is shortened. It is added by size, over the motion and "
-    "the contact springs: opposite signs do not cancel."
+    "Every scene file of the project is run in the world IAPB at its own time step. An energy balance accounts for "
+    "each run: the change of stored energy equals the work of hand and coupling minus the losses. The residual is the "
+    "error of time stepping; it must fall with the integrator's order when the step is shortened. Residuals are given "
+    "as shares of the energy exchanged. The absolute residuals of the motion and of the contact springs are added, so "
+    "opposite signs do not cancel."
 )
 WORLD = "IAPB"
 REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
@@ -109,10 +110,10 @@ def finding(
               "books over time": Table(over_time(()).columns, tuple(row for one in series for row in one.rows))}
     deepest, widest = _deepest(measures), max(measures, key=_open_share)
     answer = (
-        f"{len(measures)} scenes, {sum(m['dimensions'] == 3 for m in measures)} of them in space: at most "
-        f"{deepest['most penetration']:.2f} mm of overlap; the energy books close to rounding or to the integrator's "
-        f"order in {sum(each.falls_as_declared for each in books)}, and at the scene's own step leave "
-        f"{_open_share(widest):.1f} % open by size at worst ({widest['scene']})."
+        f"{len(measures)} scenes, {sum(m['dimensions'] == 3 for m in measures)} of them in space: bodies overlap by at "
+        f"most {deepest['most penetration']:.2f} mm. The residual of the energy balance is rounding or falls with the "
+        f"integrator's order in {sum(each.falls_as_declared for each in books)} scenes; at the scene's own time step "
+        f"it is at most {_open_share(widest):.1f} % of the energy exchanged ({widest['scene']})."
     )
     return finding_of("scene-ledger", TITLE, QUESTION, answer, [one for one in tried if one], tables, more)
 
@@ -163,11 +164,12 @@ def contacts(measures: Sequence[Measure]) -> Table:
 def ledger(measures: Sequence[Measure]) -> Table:
     """Every joule of each run."""
     note = (
-        "End − start = work of hand and coupling − losses + open. Open is energy that the steps in time made up (> 0) "
-        "or swallowed (< 0): by forces on the motion that are held over a step, and by springs that are felt once a "
-        "step; the share adds the sizes of both. A loss too is a force times a path, held over each step, and can so "
-        "come out a little below zero. Shares are of the energy turned over: the largest of kinetic energy, range of "
-        "the potential, work of hand and of coupling."
+        "End − start = work of hand and coupling − losses + open. Open is the residual: energy that time stepping "
+        "created (> 0) or lost (< 0). Its part in the motion comes from forces held constant over a step, its part in "
+        "the springs from evaluating them once a step; the share adds both absolute values. A loss is also a force "
+        "times a path with the force held over each step, so it can come out slightly negative. Shares are of the "
+        "energy exchanged (turned over): the largest of kinetic energy, range of the potential energy, work of the "
+        "hand and work of the coupling."
     )
     return table_of(LEDGER, measures, digits=3, note=note)
 
@@ -182,8 +184,9 @@ def left_open_table(books: Sequence[OpenBooks]) -> Table:
          _milliseconds(each))
         for each in books
     ]  # fmt: skip
-    note = ("By size, motion and springs added. No order: what is open is rounding, and no shorter step was tried. The "
-            f"step that leaves {WORTH_NAMING:g} % open is the longest that was tried, or follows from the order.")
+    note = ("Open: residual of the energy balance, absolute values of motion and springs added. No order: the residual "
+            f"is rounding, and no shorter step was tried. The step that leaves {WORTH_NAMING:g} % open is the longest "
+            "one tried that does, or is extrapolated with the measured order.")
     columns = ("scene", *headings, "order declared", "order measured", "the scene's step [ms]",
                f"step that leaves {WORTH_NAMING:g} % open [ms]")  # fmt: skip
     return titled(columns, rows, digits=3, note=note)
@@ -222,8 +225,8 @@ def _penetration(measures: Sequence[Measure]) -> Part:
     passes = "" if ratio >= DEEP else " Nothing passes through anything."
     return Part(
         f"Bodies overlap by at most {deepest['most penetration']:.2f} mm ({deepest['scene']}); the median of the "
-        f"{len(touching)} scenes with contacts is {median:.2f} mm. Measured by the thinnest moving shape of its "
-        f"scene, {scene} goes deepest: {ratio:.0%} of it.{passes}",
+        f"{len(touching)} scenes with contacts is {median:.2f} mm. Relative to the thinnest moving shape of the scene, "
+        f"the deepest overlap is {ratio:.0%} ({scene}).{passes}",
         REPRODUCED if ratio < DEEP else MIXED,
     )  # fmt: skip
 
@@ -232,9 +235,9 @@ def _impacts(measures: Sequence[Measure]) -> Part:
     gained, most = max(m[_ADDED] for m in measures), max(measures, key=lambda m: int(m["most rows in one impact"]))
     rounding = gained <= ROUNDING
     return Part(
-        f"Of {sum(m['impacts'] for m in measures)} impacts, with up to {most['most rows in one impact']} rows at once "
-        f"({most['scene']}), the one that adds most energy, summed in doubles, adds {gained:.0e} of what its scene "
-        + ("turns over: rounding of the sum." if rounding else "turns over."),
+        f"In {sum(m['impacts'] for m in measures)} impacts with up to {most['most rows in one impact']} rows at once "
+        f"({most['scene']}), the largest energy gain, summed in doubles, is {gained:.0e} of the energy exchanged"
+        + (", the rounding of that sum." if rounding else "."),
         REPRODUCED if rounding else REFUTED)  # fmt: skip
 
 
@@ -244,9 +247,10 @@ def _order(books: Sequence[OpenBooks]) -> Part:
     orders = sorted(float(each.order) for each in tried)  # type: ignore[arg-type]
     below = ", ".join(f"{each.scene} ({each.order:.2f})" for each in short)
     return Part(
-        f"What the books leave open is rounding in {len(books) - len(tried)} scenes. In the other {len(tried)} it "
-        f"falls as the step is shortened, at measured orders from {orders[0]:.2f} to {orders[-1]:.2f} (median "
-        f"{float(np.median(orders)):.2f}); the integrator declares {max(each.declared_order for each in tried)}."
+        f"The residual of the energy balance is rounding in {len(books) - len(tried)} scenes. In the other "
+        f"{len(tried)} it falls as the step is shortened, with measured orders from {orders[0]:.2f} to "
+        f"{orders[-1]:.2f} (median {float(np.median(orders)):.2f}); the integrator declares order "
+        f"{max(each.declared_order for each in tried)}."
         + (f" Below the declared order: {below}." if short else ""), MIXED if short else REPRODUCED)  # fmt: skip
 
 
@@ -254,16 +258,18 @@ def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
     """By size: where the two channels have opposite signs, their sum would hide both."""
     wide = sorted((m for m in measures if _open_share(m) > WORTH_NAMING), key=_open_share, reverse=True)
     if not wide:
-        return Part(f"No books leave more than {WORTH_NAMING:.0f} % open at the scene's own step.", REPRODUCED)
+        return Part(f"No residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged at the scene's own time step.",
+                    REPRODUCED)  # fmt: skip
     of = {each.scene: each for each in books}
     said = "; ".join(
         f"{m['scene']} {_open_share(m):.1f} % of {m['energy turned over']:.3g} J "
         f"({_channels(m)}{_gone(of[m['scene']])})" for m in wide
     )  # fmt: skip
     return Part(
-        f"At the scene's own step {len(wide)} of {len(measures)} books leave more than {WORTH_NAMING:.0f} % of the "
-        f"energy turned over open, the sizes of both channels added: {said}.", MIXED,
-        miss=f"up to {_open_share(wide[0]):.1f} % of a scene's energy is unaccounted for ({wide[0]['scene']})",
+        f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
+        f"{len(wide)} of {len(measures)} scenes (absolute values of motion and springs added): {said}.", MIXED,
+        miss=f"time stepping leaves up to {_open_share(wide[0]):.1f} % of a scene's energy unaccounted for "
+             f"({wide[0]['scene']})",
     )  # fmt: skip
 
 
@@ -272,16 +278,16 @@ def _channels(m: Measure) -> str:
     if _open_share(m) <= WIDE:
         return ""
     found = ((name, float(m[f"open: {name}"])) for name in ("motion", "springs"))
-    words = (f"{name} {abs(value):.2g} J {'made up' if value > 0 else 'swallowed'}" for name, value in found)
+    words = (f"{name} {abs(value):.2g} J {'created' if value > 0 else 'lost'}" for name, value in found)
     return f"{', '.join(words)}; "
 
 
 def _gone(books: OpenBooks) -> str:
     step = _milliseconds(books)
     if step is None or books.order is None:
-        return "it does not fall with the step"
+        return "the residual does not fall with the step"
     tried = min(books.open_shares) <= WORTH_NAMING / 100
-    return (f"order {books.order:.2f}, {'below' if tried else 'by that order'} {WORTH_NAMING:.0f} % at {step:.2g} ms "
+    return (f"order {books.order:.2f}, {'below' if tried else 'extrapolated to'} {WORTH_NAMING:.0f} % at {step:.2g} ms "
             f"instead of {1e3 * books.step:.3g} ms")  # fmt: skip
 
 
@@ -289,12 +295,13 @@ def _gains(measures: Sequence[Measure]) -> Part:
     made = sorted((m for m in measures if m[GAIN_SHARE] > 100 * max(ROUNDING, _floor(m))),
                   key=lambda m: float(m[GAIN_SHARE]), reverse=True)  # fmt: skip
     if not made:
-        return Part("No scene ever holds more energy than it started with and was given.", REPRODUCED)
+        return Part("In no scene does the stored energy ever exceed the energy at the start plus the work done on it.",
+                    REPRODUCED)  # fmt: skip
     words = ", ".join(f"{m['scene']} {m[GAIN_SHARE]:.1f} %" for m in made)
     return Part(
-        f"{len(measures) - len(made)} of {len(measures)} scenes never hold more energy than they started with and were "
-        f"given. The others do at some time, as a share of what they turn over: {words}. No impact adds it: the steps "
-        "in time do.", MIXED,
+        f"In {len(measures) - len(made)} of {len(measures)} scenes the stored energy never exceeds the energy at the "
+        f"start plus the work done on the scene. In the others it does at some instant, by these shares of the energy "
+        f"exchanged: {words}. Time stepping creates this energy, not the impacts.", MIXED,
     )  # fmt: skip
 
 
@@ -308,7 +315,7 @@ def _endings(measures: Sequence[Measure]) -> Part:
     ends = Counter(m["how it ends"] for m in measures)
     words = "; ".join(f"{count} {_plural(ending, count)}" for ending, count in sorted(ends.items()))
     complete = sum(not m["how it ends"].startswith(STOPPED) for m in measures)
-    return Part(f"{complete} of {len(measures)} runs go to their end: {words}.",
+    return Part(f"{complete} of {len(measures)} runs complete: {words}.",
                 REPRODUCED if complete == len(measures) else REFUTED)  # fmt: skip
 
 

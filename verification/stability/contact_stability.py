@@ -34,9 +34,10 @@ from verification.stability.maps import (
 from verification.stability.peg import peg, peg_contacts, pulses, waveforms
 
 QUESTION = (
-    "A wall in a sampled loop can feed the hand. A mass of 2 kg is pushed against walls of every stiffness and "
-    "damping, read and answered at 512 Hz or 1 kHz, its motion between the samples exact; then the peg of Figure 4 in "
-    "the engine's own loop. The line is Colgate's condition for passivity, b >= KT/2 + |B|: sufficient for any hand."
+    "A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 kg "
+    "against walls over a grid of stiffness and damping; the loop samples at 512 Hz or 1 kHz, and the motion between "
+    "samples is exact. Then the peg of Figure 4 runs in the engine's own loop. The dashed line is Colgate's condition "
+    "for passivity, b >= KT/2 + |B|, which is sufficient for any hand. A wall is stable if the mass comes to rest."
 )
 MARKS = {SETTLES: "+", BOUNCES_ON: "o", GROWS: "x"}
 
@@ -85,7 +86,8 @@ def maps_table(maps: Maps) -> Table:
             rows.append((*_loop(penalty), float(K), float(bound[i]), *marks))
     return titled(
         (*LOOP, "stiffness [N/m]", "passive up to [N s/m]", "penalties", "impulses"), rows, 3,
-        "A mark for each damping, small to large: + settles, o bounces on, x grows.")  # fmt: skip
+        "One mark per damping, from small to large: + the mass settles, o it keeps bouncing, x its motion "
+        "grows.")  # fmt: skip
 
 
 LOOP = ("rate [Hz]", "sensors", "device damping [N s/m]")
@@ -100,8 +102,9 @@ def held(maps: Maps) -> Part:
     theirs, ours = (np.array([pair[law].contact.settled for pair in _pairs(maps)]) for law in (0, 1))
     more, lost = ours.sum(axis=1) / theirs.sum(axis=1), int((theirs & ~ours).sum())
     return Part(
-        f"Of {theirs.size} walls, penalties hold {theirs.sum()} and impulses {ours.sum()}, {more.min():.2f} to "
-        f"{more.max():.2f} times as many per loop; {lost} walls are stable only with penalties.",
+        f"Of {theirs.size} walls, {theirs.sum()} are stable with penalties and {ours.sum()} with impulses: "
+        f"{more.min():.2f} to {more.max():.2f} times as many, depending on the loop. {lost} walls are stable only "
+        "with penalties.",
         REFUTED if more.min() < 1.0 else MIXED if lost else REPRODUCED,
         miss=f"{lost} of {theirs.size} walls are stable only without impulses" if lost else "")  # fmt: skip
 
@@ -113,8 +116,9 @@ def beyond(maps: Maps) -> Part:
     grown, settled = (np.array([getattr(one.contact, name) for one in chosen]) for name in ("grown", "settled"))
     gains = int((grown & passive).sum())
     return Part(
-        f"Within b >= KT/2 + |B| no wall may make the hand faster: {gains} of {passive.sum()} do. Under this hand "
-        f"{(settled & ~passive).sum()} walls beyond it settle too: it is a condition for every hand, not for this one.",
+        f"Where b >= KT/2 + |B| holds, no wall may accelerate the hand: {gains} of {passive.sum()} do. With this hand "
+        f"{(settled & ~passive).sum()} walls outside the condition settle as well, because the condition covers every "
+        "hand.",
         REFUTED if gains else REPRODUCED)  # fmt: skip
 
 
@@ -123,8 +127,8 @@ def undamped(maps: Maps) -> Part:
     bare = [one for one in maps if one.loop.device_damping == 0.0 and not one.loop.delay and one.law == "penalty"]
     shares = ", ".join(f"{100 * one.settled_share:.0f} % at {one.loop.rate:.0f} Hz" for one in bare)
     return Part(
-        "The paper's device has no damping, b = 0: by the condition no wall at all is passive for every hand. That "
-        f"penalties still hold {shares} of these walls rests on this hand, a constant push.", MIXED)  # fmt: skip
+        "The paper's device has no damping, b = 0. By the condition no wall is then passive for every hand. With this "
+        f"hand, a constant force, penalties are still stable on {shares} of these walls.", MIXED)  # fmt: skip
 
 
 def hard(maps: Maps) -> Part:
@@ -135,9 +139,10 @@ def hard(maps: Maps) -> Part:
         for name in ("rate_hardness", "penetration")
     )  # fmt: skip
     return Part(
-        f"At the paper's damping of {PAPER_DAMPING:g} N s/m an impulse feels {min(harder):.3g} to {max(harder):.3g} "
-        f"times as hard at first (rate-hardness, median over stiffnesses), and the hand goes {min(deeper):.2f} to "
-        f"{max(deeper):.2f} times as deep.", REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED,
+        f"At the paper's wall damping of {PAPER_DAMPING:g} N s/m the rate-hardness with impulses is {min(harder):.3g} "
+        f"to {max(harder):.3g} times that with penalties (median over stiffnesses), and the penetration "
+        f"{min(deeper):.2f} to "
+        f"{max(deeper):.2f} times.", REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED,
     )  # fmt: skip
 
 
@@ -163,5 +168,5 @@ def hardness(maps: Maps) -> Table:
                              settling if math.isfinite(settling) else None, 1e3 * depth, int(bounces), peak))
     return titled((*LOOP, "law", "stiffness [N/m]", "rate-hardness [N/m]", "settles after [s]", "penetration [mm]",
                    "bounces", "peak force [N]"), rows, 3,
-                  "At the paper's damping, 50 N s/m. Rate-hardness: the first rise of the force over one step, per "
-                  "speed on touching (Lawrence and others, 2000).")  # fmt: skip
+                  "Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
+                  "first step of contact, divided by the approach speed (Lawrence and others, 2000).")  # fmt: skip

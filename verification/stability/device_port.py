@@ -56,8 +56,9 @@ def device_port_leaks(depth: str = "quick", failures: list[Failure] | None = Non
         (world, K, B), sensors, kind = case
         return f"hand's port in {world}, K = {K:g} N/m, B = {B:g} N s/m, {sensors} sensors, the hand {kind}"
 
-    note = ("Whole device loops at 512 Hz, the hand moving 0.5 mm to and fro, worst over several speeds; stiffness and "
-            "damping of the coupler in CBuc, else of the wall, with the coordination of Table I.")
+    note = ("The complete device loop at 512 Hz. The hand moves to and fro by 0.5 mm; the worst of several speeds is "
+            "shown. Stiffness and damping are the coupler's in CBuc, else the wall's, with the coordination gains of "
+            "Table I. Leak: energy that the hand draws from the loop at b = KT/2 + |B|.")
     return table_of(COLUMNS, of_each(product(WALLS[depth], SENSORS, MOTIONS), leak, failures, name), note=note)
 
 
@@ -89,10 +90,10 @@ def coupled(ports: Table) -> Part:
 
     pressing = most(PRESSES, True)
     return Part(
-        f"A device coupled to a tool on a rigid wall, the hand pressing and the sensors ideal, leaks nothing from "
-        f"b = KT/2 + |B| of the coupler on: it needs {pressing:.4f} of that. Late or coarse sensors need up to "
-        f"{most(PRESSES, False):.3g} of it, and a hand that goes in and out of contact {most(CROSSES, True):.3g}: a "
-        "coupler that switches on stretched brings energy of its own.",
+        f"In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive once its "
+        f"damping reaches {pressing:.4f} times b = KT/2 + |B| of the coupler. Late or coarse sensors need up to "
+        f"{most(PRESSES, False):.3g} times that damping. A hand that moves in and out of contact needs up to "
+        f"{most(CROSSES, True):.3g} times, because the coupler is already stretched when it switches on.",
         MIXED if pressing <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -102,11 +103,12 @@ def coordinated(ports: Table) -> Part:
     needed = [row["damping needed"] for row in rows]
     whole = max(row["damping needed"] / row["with the coordination's gains"] for row in rows)
     return Part(
-        f"With the four-channel controller the wall's own KT/2 + |B| is not enough: up to "
-        f"{max(row['needed / bound'] for row in rows):.3g} of it is needed, {min(needed):.3g} to {max(needed):.3g} "
-        f"N s/m, for the coordination's damping of {COORDINATION[1]:g} N s/m is felt in the hand as well. The gains of "
-        f"both added, up to {whole:.3g} of the bound is needed: no bound here, for the tool moves. The paper's device "
-        "has no damping.", MIXED)  # fmt: skip
+        "With the four-channel controller the bound KT/2 + |B| of the wall alone is not enough: the device needs up to "
+        f"{max(row['needed / bound'] for row in rows):.3g} times as much damping, {min(needed):.3g} to "
+        f"{max(needed):.3g} N s/m, because the hand also feels the coordination's damping of {COORDINATION[1]:g} N "
+        f"s/m. The bound with the gains of wall and coordination added is not sufficient either: up to {whole:.3g} "
+        "times its value is needed. Colgate's bound does not apply here because the tool moves. The paper's device has "
+        "no damping.", MIXED)  # fmt: skip
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:

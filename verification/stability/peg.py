@@ -67,7 +67,7 @@ def peg_contacts(
         return [_contact(*case, run(changed, world, keep=False, partial=True)) for world in WORLDS]
 
     rows = of_each(chosen, both, failures, lambda case: "peg at {}, K = {:g} N/m, B = {:g} N s/m".format(*case))
-    return table_of(COLUMNS, rows, digits=3, note="A dash: it never came to rest.")
+    return table_of(COLUMNS, rows, digits=3, note="A dash: the peg never came to rest.")
 
 
 def _contact(device: str, stiffness: float, damping: float, run: Run) -> dict[str, Any]:
@@ -87,9 +87,9 @@ def peg(pegs: Table) -> Part:
     sooner = [None if np.isinf(min(pair)) else bool(pair[1] <= pair[0]) for pair in times]
     fewer = sum(ours["bounces"] <= theirs["bounces"] for theirs, ours in pairs)
     return Part(
-        f"The peg in the corner comes to rest no later with impulses in {sooner.count(True)} of "
-        f"{len(sooner) - sooner.count(None)} trials of device and wall where either does, and bounces no more often in "
-        f"{fewer} of {len(pairs)}.", verdict_of_trials(sooner))  # fmt: skip
+        f"With impulses the peg in the corner comes to rest no later than with penalties in {sooner.count(True)} of "
+        f"{len(sooner) - sooner.count(None)} combinations of device and wall in which it comes to rest at all, and "
+        f"bounces no more often in {fewer} of {len(pairs)}.", verdict_of_trials(sooner))  # fmt: skip
 
 
 def waveforms(run: Callable[..., Run], failures: list[Failure] | None = None) -> Table:
@@ -100,8 +100,9 @@ def waveforms(run: Callable[..., Run], failures: list[Failure] | None = None) ->
         return [_pulse(name, run(scene.with_values({"rate": WAVEFORM_RATE, "device.waveform": name}), "IAPB",
                                  keep=False))]  # fmt: skip
 
-    note = ("The peg in the corner at 1 kHz, the impulse given by its device in each way. Negative energy: the pulses "
-            "took it from the hand. Momentum not given is still on its way at the end.")
+    note = ("The peg in the corner at 1 kHz; its device renders the impulses with each waveform. Negative energy: the "
+            "pulses took energy from the hand. Momentum not given: the part of the computed impulse that the device "
+            "has not rendered when the run ends.")
     rows = of_each(WAVEFORMS, under, failures, lambda name: f"waveform {name}")
     return table_of(PULSE_COLUMNS, rows, digits=3, note=note)
 
@@ -131,8 +132,9 @@ def pulses(table: Table) -> Part:
     most = max(row["given to the hand"] - row["lost in collisions"] for row in rows)
     forces = {row["waveform"]: row["peak force"] for row in rows}
     brake = ("" if not {"step", "brake"} <= set(forces) else
-             f"; a brake asks for {forces['brake']:.3g} N at most where one step asks for {forces['step']:.3g} N")
+             f"; the peak force is {forces['brake']:.3g} N with a brake and {forces['step']:.3g} N with a one-step "
+             "pulse")
     return Part(
-        f"Every waveform gives the hand the computed momentum (all but "
+        f"Every waveform gives the hand the computed momentum (relative difference at most "
         f"{max(row['momentum not given'] for row in rows):.0e}) and no more energy than the collisions took{brake}.",
         REPRODUCED if most <= 0.0 else REFUTED)  # fmt: skip

@@ -63,7 +63,7 @@ def test_piles_say_where_to_stop_and_references_where_the_engine_differs() -> No
     pulls = replace(row, contacts=30, distance=0.2, pulling=0.25, asked=False)
     part = PARTS["piles"](SimpleNamespace(piles=(row, pulls, pulls)))  # type: ignore[arg-type]
     assert part is not None and part.verdict == REFUTED
-    assert "in 1 of 3 impacts, none of them with more than 5 contacts: stop using (19)" in part.sentence
+    assert "in 1 of 3 impacts, and in none with more than 5 contacts. Do not use (19)" in part.sentence
     assert "25 % of the impulses pull" in part.sentence and "contradicts this in 0 impacts" in part.sentence
     same = SceneDifference("peg_corner", 20, 0, 1e-15, 1e-15, 0.0, 0.0, 8, 0.0, 0.0, 1e-16, 0.0)
     assert verdict("references", differences=(same,)) == REPRODUCED

@@ -33,7 +33,8 @@ def test_the_sentences_say_what_is_needed(leaks) -> None:
     ports = table_of(device_port.COLUMNS, leaks)
     part = coupled(ports)
     assert part.verdict == MIXED
-    assert "needs 0.9000" in part.sentence and "up to 4 " in part.sentence and "contact 2:" in part.sentence
+    assert "reaches 0.9000 times" in part.sentence and "up to 4 times" in part.sentence
+    assert "out of contact needs up to 2 times" in part.sentence
     assert "70 to 70 N s/m" in coordinated(ports).sentence
 
 
