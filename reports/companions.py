@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from reports.codecheck import CODECHECK_NAME, write_codecheck
 from reports.crate import write_crate
+from reports.drafts import CODECHECK_NAME, RESCIENCE_NAME, write_codecheck, write_rescience
 from reports.figures.figure import Figure, NotComputed, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
@@ -29,6 +29,7 @@ _TEXTS = {
     MANIFEST_NAME: "every file behind the report: key, content hash, command, size and what was made from it",
     DIRTY_NAME: "how the sources differed from the commit",
     CODECHECK_NAME: "a draft for a CODECHECK",
+    RESCIENCE_NAME: "a draft of the metadata for ReScience C, with the verdict of each claim",
 }
 
 
@@ -64,10 +65,11 @@ def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure
     command = evidence.provenance.get("command", "iapb reproduce")
     outputs = {name: _TEXTS[name] for name in (FIRST_PAGE, NUMBERS_NAME, MANIFEST_NAME)}
     tables = {entry.file: f"table of {entry.name}" for entry in evidence.manifest if not entry.used_by}
-    draft = write_codecheck(out, outputs | tables, command)
+    drafts = (write_codecheck(out, outputs | tables, command),
+              write_rescience(out, {claim.key: claim.verdict for claim in evidence.claims}, command))  # fmt: skip
     beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
     crate = write_crate(out, beside, evidence.manifest, evidence.provenance)
-    return tuple(path for path in (numbers, listed, changed, draft, crate) if path)
+    return tuple(path for path in (numbers, listed, changed, *drafts, crate) if path)
 
 
 def _write_manifest(path: Path, evidence: Evidence) -> Path:

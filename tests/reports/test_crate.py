@@ -14,9 +14,9 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from reports import companions, provenance
-from reports.codecheck import CODECHECK_NAME
 from reports.companions import DIRTY_NAME, MANIFEST_NAME, remembering, write_companions
 from reports.crate import CRATE_NAME, PROFILE, sha256
+from reports.drafts import CODECHECK_NAME, RESCIENCE_NAME
 from reports.evidence import gather
 from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
@@ -139,11 +139,20 @@ def test_the_draft_of_the_codecheck_is_yaml_and_its_files_exist(out: Path) -> No
     assert draft["codechecker"] == [{"name": "", "ORCID": ""}]  # nobody has checked it yet
 
 
+def test_the_draft_for_rescience_has_the_verdict_of_each_claim(out: Path) -> None:
+    from ruamel.yaml import YAML
+
+    draft = YAML(typ="safe").load(out / RESCIENCE_NAME)
+    assert draft["title"].startswith("[Re] Haptic rendering") and draft["verdicts"] == {"C07": REPRODUCED}
+    assert f"1 {REPRODUCED}" in draft["abstract"] and "iapb reproduce" in draft["abstract"]
+    assert (out / draft["data"][0]["url"]).is_file()
+
+
 def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
     host = re.compile(rf"\b{re.escape(socket.gethostname())}\b")
     root = str(Path(__file__).resolve().parents[2])
     pages = [path.relative_to(out) for path in (out / "report").iterdir()]
-    for name in (FIRST_PAGE, *pages, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME):
+    for name in (FIRST_PAGE, *pages, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME, RESCIENCE_NAME):
         text = (out / name).read_text()
         assert str(out) not in text and root not in text and str(Path.home()) + "/" not in text
         assert not host.search(text) or len(socket.gethostname()) < 4, name  # "x86" would be found in any page
