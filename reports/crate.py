@@ -19,7 +19,7 @@ PAPER_TITLE = "Haptic rendering of rigid contacts using impulsive and penalty fo
 PAPER_AUTHORS = "D. Constantinescu, S. E. Salcudean, E. A. Croft"
 PAPER_PLACE = "IEEE Transactions on Robotics 21(3), 2005"
 _ACTION, _SOFTWARE, _MACHINE, _PAPER, _AUTHORS = "#reproduce", "#iapb", "#machine", "#paper", "#authors"
-_FORMATS = {".html": "text/html", ".json": "application/json", ".diff": "text/x-diff", ".yml": "application/yaml", 
+_FORMATS = {".html": "text/html", ".json": "application/json", ".diff": "text/x-diff", ".yml": "application/yaml",
             ".yaml": "application/yaml", ".h5": "application/x-hdf5", ".zip": "application/zip"}  # fmt: skip
 _MACHINE_FACTS = ("system", "cpu", "blas", "python")
 
