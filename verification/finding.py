@@ -503,7 +503,8 @@ def _confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[
     if False in drawn.holds:
         return None, f"no region confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    counts = f"{region.searched} trials of the search, {region.others} others and {region.fresh} fresh ones hold"
+    counts = (f"{region.searched} trials that found this region, {region.others} others and {region.fresh} fresh ones "
+              "hold")  # fmt: skip
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
         return None, f"no region confirmed: for {region} only {counts}"
     return region, f"where {region} ({region.share:.0%} of the tested range) all {counts}"

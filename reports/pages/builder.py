@@ -164,8 +164,8 @@ def counted(part: Part) -> str:
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
     cases = f" on {part.cases} cases" if part.cases else ""
     region = part.region
-    where = (f"; region {region.share:.0%} of the range, found on {region.searched}, confirmed on "
-             f"{region.others + region.fresh}") if region else ""  # fmt: skip
+    where = (f"; the region is {region.share:.0%} of the tested range, found with {region.searched} trials, confirmed "
+             f"by {region.others + region.fresh} more") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 

@@ -14,7 +14,7 @@ from verification.hard_cases.study import ENGINE, STABLE
 # verdict -> its mark and the class of its colour: shape as well as colour
 MARKS = {
     STABLE: ("●", "good"), "gains energy": ("✕", "bad"), "wrong motion": ("▲", "bad"), "failed": ("✶", "bad"),
-    "restitution unmet": ("■", "limited"), "hangs on rounding": ("□", "limited"), "refused": ("○", "open"),
+    "restitution unmet": ("■", "limited"), "depends on rounding": ("□", "limited"), "refused": ("○", "open"),
     "timed out": ("◇", "open"), "out of memory": ("◆", "open"),
 }  # fmt: skip
 KINDS = {"impact": "Impacts, by method", "motion": "Motions, by world"}

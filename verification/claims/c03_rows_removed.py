@@ -75,9 +75,9 @@ def _wrong_rows(batch: Batch) -> float:
 def finding(table: Table) -> str:
     """One sentence."""
     return (
-        f"Without rounding the states are equal, digit for digit: states that differ {summary(table, EXACT)}, and "
-        f"whichever rows are kept {summary(table, OTHER_ROWS)}. In doubles the printed formula differs "
-        f"{summary(table, PRINTED)}, the factored form {summary(table, FACTORED)}."
+        f"Number of states that differ in rational arithmetic: {summary(table, EXACT)}; with another choice of "
+        f"independent rows: {summary(table, OTHER_ROWS)}. Relative difference in doubles, printed formula: "
+        f"{summary(table, PRINTED)}; factored form: {summary(table, FACTORED)}."
     )
 
 
@@ -85,10 +85,10 @@ CLAIM = algebraic_claim(
     id="C03",
     statement="The pseudo-inverse gives the same state as first removing the redundant rows.",
     place="Section V-B, equations (25) and (33)",
-    quantity="Distance of the two outcomes in the kinetic metric, relative to the velocity before; in rationals the "
-    "number of impacts whose outcomes are not identical.",
-    tolerance="100 d ε times the larger of κ(M) and κ(W), W of the independent rows, in doubles: both ways solve with "
-    "them. In rationals none may differ.",
+    quantity="Distance of the two outcomes in the kinetic metric, relative to the velocity before; in rational "
+    "arithmetic the number of impacts whose outcomes are not identical.",
+    tolerance="In doubles 100 d ε times the larger of κ(M) and κ(W), because both methods solve with these matrices (W "
+    "is the Delassus matrix of the independent rows). In rational arithmetic zero.",
     families=FAMILIES,
     restitutions=(0.5,),
     impacts={"quick": 12, "full": 150},

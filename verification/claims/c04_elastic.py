@@ -40,8 +40,8 @@ def _exact_change(batch: Batch) -> float:
 def finding(table: Table) -> str:
     """One sentence."""
     return (
-        f"Relative change of energy {summary(table, DOUBLES)}; without rounding the change of energy [J] is "
-        f"{summary(table, EXACT)}."
+        f"Relative change of energy in doubles: {summary(table, DOUBLES)}. Change of energy [J] in rational "
+        f"arithmetic: {summary(table, EXACT)}."
     )
 
 
@@ -49,8 +49,9 @@ CLAIM = algebraic_claim(
     id="C04",
     statement="With e = 1 kinetic energy is conserved.",
     place="Sections V-A and V-B",
-    quantity="Worst relative change of kinetic energy, gains and losses alike.",
-    tolerance="100 d ε κ(M) in doubles (the factorization of M decides what is lost, never gained); in rationals none.",
+    quantity="Largest relative change of kinetic energy, gain or loss.",
+    tolerance="100 d ε κ(M) in doubles, the rounding of the factorization of M; it causes losses, never gains. In "
+    "rational arithmetic zero.",
     families=FAMILIES,
     restitutions=(1.0,),
     impacts={"quick": 12, "full": 200},

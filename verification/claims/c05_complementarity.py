@@ -30,7 +30,7 @@ def _of_one(case: ImpactCase, e: float, solver: str) -> float:
 def finding(table: Table) -> str:
     """One sentence."""
     parts = [f"{solver}: {summary(table, f'LCP by {solver}')}" for solver in SOLVERS]
-    return f"Relative difference of the impulses, by solver of the LCP, {'; '.join(parts)}."
+    return f"Relative difference of the impulses, for each LCP solver: {'; '.join(parts)}."
 
 
 CLAIM = algebraic_claim(
@@ -38,7 +38,7 @@ CLAIM = algebraic_claim(
     statement="At a single contact the impulse equals that of the complementarity formulation.",
     place="Section V-A, note to (19)",
     quantity="Relative difference between the impulse and the multiplier of 0 <= p ⟂ γ⁺ + eγ⁻ >= 0.",
-    tolerance="100 d ε κ(M): both divide by nᵀM⁻¹n, each with its own solve.",
+    tolerance="100 d ε κ(M): both methods divide by nᵀM⁻¹n, each with its own solve.",
     families=tuple(Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e1, 1e3, 1e5)),
     restitutions=(0.0, 0.3, 1.0),
     impacts={"quick": 8, "full": 100},

@@ -81,8 +81,8 @@ def _different(batch: Batch) -> float:
 def finding(table: Table) -> str:
     """One sentence."""
     return (
-        f"Outcomes brought back to the first coordinates differ, relative to the velocity, {summary(table, DOUBLES)}; "
-        f"without rounding the outcomes that differ are {summary(table, EXACT)}."
+        f"Relative difference of the outcomes after transforming back: {summary(table, DOUBLES)}. Number of outcomes "
+        f"that differ in rational arithmetic: {summary(table, EXACT)}."
     )
 
 
@@ -91,8 +91,9 @@ CLAIM = algebraic_claim(
     statement="The outcome of a collision does not depend on the coordinates chosen.",
     place="Section V-A",
     quantity="Distance in the kinetic metric between the outcome and the one computed in other coordinates and "
-    "brought back; in rationals the number of outcomes that differ.",
-    tolerance="100 d ε κ(M) κ(T)²: the new mass matrix TᵀMT is that much worse conditioned. In rationals none.",
+    "transformed back; in rational arithmetic the number of outcomes that differ.",
+    tolerance="100 d ε κ(M) κ(T)², because the transformation T gives the mass matrix TᵀMT, worse conditioned by "
+    "κ(T)². In rational arithmetic zero.",
     families=FAMILIES,
     restitutions=(0.0, 0.7),
     impacts={"quick": 12, "full": 150},

@@ -94,7 +94,7 @@ def finding(table: Table) -> str:
         )
     shares = table.column("share lost")
     span = f"{min(shares):.3f} to {max(shares):.3f}"
-    return f"As {'; as '.join(texts)}. Over all places and angles the share lost goes from {span}."
+    return f"With {'; with '.join(texts)}. Over all contact places and joint angles the share of energy lost is {span}."
 
 
 CLAIM = Claim(
@@ -102,7 +102,7 @@ CLAIM = Claim(
     statement="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
     place="Section V-A, Fig. 2 and 3",
     quantity="Share of kinetic energy lost by the two-link arm in one frictionless collision with e = 0.",
-    tolerance="1e-12 of the energy counts as all or nothing: the rounding of one 2 x 2 factorization.",
+    tolerance="All or none of the energy, to 1e-12 of it: the rounding of one 2 x 2 factorization.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 RESOLVER = "velocity after an impact with e = -1"
 TRAJECTORY = "trajectory with e = -1"
-ALMOST = "trajectory with e one rounding above -1"
+ALMOST = "trajectory at the next double above e = -1"
 COLUMNS = (
     Column("part", part=True),
     Column("coordinate", part=True),
@@ -74,11 +74,11 @@ def finding(table: Table) -> str:
     impacts, exactly, almost = (table.where(part=part) for part in (RESOLVER, TRAJECTORY, ALMOST))
     once = almost.where(coordinate="x")
     return (
-        f"An impact with e = -1 changes no velocity in {sum(impacts.column('impacts'))} impacts (largest change "
-        f"{max(impacts.column('error')):.0e}); {len(once.rows)} trajectories with e = -1 differ from PB by at most "
-        f"{max(exactly.column('error')):.0e}; one rounding above -1, with {sum(once.column('impacts'))} collisions "
-        f"resolved on the way, by up to {max(almost.column('error')):.0e} m or rad: colliding steps have no penalty "
-        f"force."
+        f"{sum(impacts.column('impacts'))} impacts with e = -1 change no velocity (largest change "
+        f"{max(impacts.column('error')):.0e}). {len(once.rows)} trajectories with e = -1 differ from PB by at most "
+        f"{max(exactly.column('error')):.0e}. With the next double above e = -1 the {len(once.rows)} trajectories "
+        f"resolve {sum(once.column('impacts'))} collisions and differ from PB by up to "
+        f"{max(almost.column('error')):.0e} m or rad, because colliding steps have no penalty force."
     )
 
 
@@ -88,7 +88,8 @@ CLAIM = Claim(
     place="Section VI",
     quantity="Largest change of velocity by an impact with e = -1; largest distance between the trajectories of "
     "device and tool and those of PB, by coordinate.",
-    tolerance="None at e = -1. One rounding above it 1e-11 m or rad: 1e-16 of every impulse, magnified by contacts.",
+    tolerance="Zero at e = -1. At the next double above it 1e-11 m or rad: impulses change by 1e-16 of their size, and "
+    "contacts amplify this.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

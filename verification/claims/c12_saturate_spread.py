@@ -58,7 +58,7 @@ def finding(table: Table) -> str:
         trials = table.where(part=f"{coordinate}: {MOST}")
         medians = " / ".join(f"{factor * float(np.median(trials.column(name))):.3g}" for name in RENDERINGS)
         texts.append(f"{coordinate}: {medians} {unit}")
-    return f"Median distance to the unlimited device (saturated / scaled / spread) in {'; '.join(texts)}."
+    return f"Median distance to the unlimited device (saturated / scaled / spread): {'; '.join(texts)}."
 
 
 CLAIM = peg_claim(
@@ -66,8 +66,8 @@ CLAIM = peg_claim(
     statement="Saturating the impulses at the device loses most performance, spreading them over steps loses least.",
     place="Section VI, Fig. 9",
     quantity="RMS distance of the device trajectory from that of a device without limits, per coordinate.",
-    tolerance="Strictly the largest, strictly the smallest of the three. Trials in which no impulse reached the limit, "
-    "or all are within 1e-7 of the unlimited device, cannot tell.",
+    tolerance="Saturating: strictly the largest distance of the three. Spreading: strictly the smallest. A trial "
+    "cannot tell if no impulse reaches the limit or all three are within 1e-7 of the unlimited device.",
     columns=COLUMNS,
     trials=trials,
     holds=holds,

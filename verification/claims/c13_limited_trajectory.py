@@ -44,8 +44,8 @@ def finding(table: Table) -> str:
     ratios = ", ".join(f"{median_ratio(table, name, 'PB'):.2f} in {name}" for name in COORDINATES)
     medians = [1e3 * float(np.median(depths.column(world))) for world in ("IAPB", "PB")]
     return (
-        f"With limits the distance of IAPB to ideal is, in the median, this multiple of PB's: {ratios}. It penetrates "
-        f"by {medians[0]:.2f} mm, PB by {medians[1]:.2f} mm in the median."
+        f"With limits the distance of IAPB to ideal, divided by that of PB, has these medians: {ratios}. The median "
+        f"penetration is {medians[0]:.2f} mm with IAPB and {medians[1]:.2f} mm with PB."
     )
 
 
@@ -55,7 +55,7 @@ CLAIM = peg_claim(
     place="Section VI, Fig. 10",
     quantity="As C10, with the impulses spread over steps at 1 and 0.3 times the paper's limits; deepest overlap of "
     "tool and walls.",
-    tolerance="Strictly the smallest. Where all three are within 1e-7 of ideal the trial cannot tell.",
+    tolerance="IAPB's value is strictly the smallest. A trial cannot tell if all three are within 1e-7 of ideal.",
     columns=COLUMNS,
     trials=trials,
     holds=holds,

@@ -49,8 +49,8 @@ def finding(table: Table) -> str:
         trials = table.where(coordinate=coordinate)
         felt = [row for row, held in zip(trials.records(), trials.holds, strict=True) if held is not None]
         ratios = [row["IAPB"] / row["PB"] for row in felt if row["PB"] > 0.0]
-        texts.append(f"{coordinate} {np.median(ratios):.2g} times, least {min(ratios):.2g}")
-    return f"Limited peak force as a multiple of PB's: {'; '.join(texts)}."
+        texts.append(f"{coordinate} median {np.median(ratios):.2g}, least {min(ratios):.2g}")
+    return f"Peak force of IAPB with device limits, divided by PB's peak force: {'; '.join(texts)}."
 
 
 CLAIM = peg_claim(
@@ -58,7 +58,8 @@ CLAIM = peg_claim(
     statement="Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
     place="Section VI, Fig. 11",
     quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
-    tolerance="Strictly larger. Coordinates in which neither reaches a hundredth of what can be felt do not count.",
+    tolerance="IAPB's peak is strictly larger. A coordinate does not count if neither peak reaches a hundredth of the "
+    "smallest force that can be felt.",
     columns=COLUMNS,
     trials=trials,
     holds=holds,

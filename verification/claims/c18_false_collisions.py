@@ -106,11 +106,12 @@ def finding(table: Table) -> str:
     failures = table.where(part=REACHES).that(False)
     clustering = table.where(part=CLUSTERING)
     return (
-        f"Coherence must reach the contact on the next facet, {1e3 * EDGE_JUMP:.1f} mm away{_bouncing(failures)}. "
-        "With clustering alone, the one contact that is left jumps from facet to facet and is new each time: "
-        f"{_median(clustering, 'false collisions')} false collisions in the median, "
-        f"{_median(clustering, 'false collisions without filters')} without any filter. What clustering removes is "
-        f"doubled contacts: {_median(clustering, 'doubled contacts')} in the median, "
+        "Temporal coherence removes false collisions only if its distance reaches the contact on the next facet, "
+        f"{1e3 * EDGE_JUMP:.1f} mm away{_bouncing(failures)}. With clustering alone the remaining contact jumps from "
+        "facet to facet and is new each time: the median is "
+        f"{_median(clustering, 'false collisions')} false collisions, against "
+        f"{_median(clustering, 'false collisions without filters')} without any filter. Clustering removes duplicate "
+        f"contacts: the median is {_median(clustering, 'doubled contacts')}, against "
         f"{_median(clustering, 'doubled contacts without filters')} without it."
     )
 
@@ -121,8 +122,8 @@ def _bouncing(failures: Table) -> str:
         return ""
     off = sum(steps > 0 for steps in failures.column("steps off the facets"))
     where = ", ".join(f"{value:g}" for value in sorted(set(failures.column("damping"))))
-    return (f"; of the {len(failures.rows)} trials where that does not help (damping {where} N s/m) the ball leaves "
-            f"the facets at the edges in {off}, and comes back as a new contact")  # fmt: skip
+    return (f". Even then it fails in {len(failures.rows)} trials (contact damping {where} N s/m): in {off} of them "
+            "the ball bounces off the facets at the edges, and each return is a new contact")  # fmt: skip
 
 
 def _median(table: Table, name: str) -> str:
@@ -134,9 +135,10 @@ CLAIM = Claim(
     id="C18",
     statement="Clustering and temporal coherence remove false collisions.",
     place="Section III",
-    quantity="Collisions after the first contact of a ball that rolls in a faceted socket: in the round one that the "
-    "facets stand for there are none.",
-    tolerance="None is left. Trials whose coherence distance is below speed × step, as the paper asks, cannot tell.",
+    quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. In the round "
+    "socket that the facets approximate there are none, so each is false.",
+    tolerance="No false collision remains. A trial cannot tell if its coherence distance is not above speed × step, "
+    "because the paper requires this.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

@@ -67,18 +67,19 @@ def finding(table: Table) -> str:
     fed = sum(e > ROUNDING * t for e, t in zip(undamped.column("energy from the wall"),
                                                undamped.column("wall's turnover"), strict=True))  # fmt: skip
     worst = max(row["energy from the wall"] / row["wall's turnover"] for row in within)
-    return (f"Within b >= KT/2 + B the hand draws at most {worst:.0e} of the turnover from a wall, beyond it draws "
-            f"energy without end. A device without damping, the paper's, is fed by {fed} of {len(undamped.rows)} walls "
-            f"(up to {most:.2g} J in {_STEPS} samples): what keeps its contacts stable is the hand and the coupling.")
+    return (f"If b >= KT/2 + B, the hand draws at most {worst:.0e} of the energy exchanged from a wall; otherwise it "
+            f"can draw energy without limit. The paper's device has no damping: it gains energy at {fed} of "
+            f"{len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples), so its contacts are stable only "
+            "because of the hand and the coupling.")
 
 
 CLAIM = Claim(
     id="C20",
     statement="Virtual damping is bounded by physical damping, stiffness and step: b > KT/2 + |B|.",
     place="Section VII, after Colgate and Schenkel",
-    quantity="Energy that the hand draws from the engine's penalty (5), read every T and held, by the motion that "
-    "draws most: forth and back at half the sampling rate, well inside the wall.",
-    tolerance="1e-11 of the energy turned over: the rounding of the sums.",
+    quantity="Energy that the hand draws from the engine's penalty force (5), sampled with period T and held, by the "
+    "motion that draws most: to and fro at half the sampling rate, entirely inside the wall.",
+    tolerance="1e-11 of the energy exchanged (the wall's turnover): the rounding of the sums.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

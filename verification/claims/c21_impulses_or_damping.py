@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from verification.claims.study import Study
     from verification.stability.maps import StabilityMap
 
-SAME, EQUAL_GAIN, BEST = "the same wall without", "sustained damping of equal gain", "the best larger damping"
+SAME, EQUAL_GAIN, BEST = (
+    "penalties, same damping", "penalties, damping with the impulse's force", "penalties, best larger damping"
+)  # fmt: skip
 
 FRESH = 5  # walls of each loop that confirm a region
 
@@ -88,18 +90,21 @@ def finding(table: Table) -> str:
     texts = []
     for rival in (SAME, EQUAL_GAIN, BEST):
         decided = [row for row in table.where(against=rival).records() if holds(row) is not None]
-        texts.append(f"{sum(np.isinf(row['penalty settles after']) for row in decided)} that {rival} does not")
-    return f"Impulses at the paper's 50 N s/m hold, of the walls that either holds, {'; '.join(texts)}."
+        count = sum(np.isinf(row["penalty settles after"]) for row in decided)
+        texts.append(f"{count} of {len(decided)} with {rival}")
+    return ("Walls at which the mass settles with impulses at the paper's damping of 50 N s/m but never with the "
+            f"rival, of those at which it settles at all: {'; '.join(texts)}.")  # fmt: skip
 
 
 CLAIM = Claim(
     id="C21",
     statement="Impulse forces make contact more stable than raising the damping does.",
     place="Section VII",
-    quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall, exact between the samples: "
-    "impulses at the paper's damping against penalties at the same damping, at the one whose force on touching is the "
-    "impulse's, (1 + e) m/T, and at the best of all larger ones, chosen afterwards for each wall.",
-    tolerance="None: the smaller time wins; walls that neither holds cannot tell.",
+    quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall; its motion between samples "
+    "is exact. Impulses at the paper's damping are compared with penalties at the same damping, at the damping (1 + e) "
+    "m/T whose force at first contact equals the impulse's, and at the best of all larger dampings, chosen afterwards "
+    "for each wall.",
+    tolerance="None: the law with the smaller time wins. A wall cannot tell if the mass settles with neither.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

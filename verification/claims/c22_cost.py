@@ -81,20 +81,20 @@ def finding(table: Table) -> str:
         ratios = [ratio for ratio in trials.column("ratio") if ratio is not None]
         decided = [held for held in trials.holds if held is not None]
         texts.append(f"{part}: {min(ratios):.2g} to {max(ratios):.2g}, median {np.median(ratios):.2g}, "
-                     f"more in {sum(decided)} of {len(decided)} that differ clearly, "
+                     f"above 1 in {sum(decided)} of the {len(decided)} sizes that differ clearly, "
                      f"{len(trials.rows) - len(decided)} of {len(trials.rows)} sizes cannot tell")  # fmt: skip
-    return f"Time of one impact by Lemke's method over time by IAPB, both compiled: {'; '.join(texts)}."
+    return f"Time of one impact by Lemke's method, divided by that of IAPB, both compiled: {'; '.join(texts)}."
 
 
 CLAIM = Claim(
     id="C22",
     statement="Complementarity time-stepping costs more per step than impulses and penalties.",
     place="Section II",
-    quantity="Ratio of processor times, complementarity over IAPB, round by round in one run, in random order: of "
-    "impacts of 1 to 300 contacts on a patch (all but three redundant) and in a pile (none). Both are compiled; what "
-    "is called from Python is no part of the claim.",
-    tolerance="A trial holds where the lower quartile of the ratios is at least 1.1, and fails where the upper one is "
-    "at most 1/1.1; in between it cannot tell. A busy machine moves the median of the ratios by up to 7 %.",
+    quantity="CPU time of an impact by complementarity, divided by that of IAPB. Both are compiled and timed in turns "
+    "in one run, in random order. The impacts have 1 to 300 contacts on a patch (all but three redundant) or in a pile "
+    "(none redundant). Calls from Python are not part of the claim.",
+    tolerance="A trial holds if the lower quartile of the ratios is at least 1.1, and fails if the upper quartile is "
+    "at most 1/1.1; in between it cannot tell. Other load on the machine moves the median ratio by up to 7 %.",
     columns=COLUMNS,
     cases=cases,
     trials=trials,

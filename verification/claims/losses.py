@@ -39,16 +39,17 @@ def loss_claim(id: str, statement: str, place: str, families: Sequence[Family], 
 
     def finding(table: Table) -> str:
         return (
-            f"Relative energy gain {summary(table, PASSIVE)}. The loss is half of the form printed in {place}: misfit "
-            f"with the ½ {summary(table, WITH_HALF)}, without it {summary(table, AS_PRINTED)}; in rationals the misfit "
-            f"with the ½ is {summary(table, EXACT)}."
+            f"Relative energy gain: {summary(table, PASSIVE)}. The loss is half of the quadratic form printed in "
+            f"{place}. Difference between loss and form with the factor ½: {summary(table, WITH_HALF)}; without it: "
+            f"{summary(table, AS_PRINTED)}; with it, in rational arithmetic: {summary(table, EXACT)}."
         )
 
     return algebraic_claim(
         id=id, statement=statement, place=place, families=families, restitutions=RESTITUTIONS, impacts=impacts,
-        quantity="Worst relative energy gain; worst misfit between loss and form, relative to the energy before.",
-        tolerance="Gain: 10 d ε √κ(M), the rounding of the velocities returned. Misfit: 100 d ε κ(M), one solve with "
-        "M. In rationals: none.",
+        quantity="Largest relative energy gain; largest difference between the loss and the quadratic form, relative "
+        "to the energy before.",
+        tolerance="Gain: 10 d ε √κ(M), the rounding of the returned velocities. Difference: 100 d ε κ(M), the rounding "
+        "of one solve with M. In rational arithmetic: zero.",
         parts={
             PASSIVE: Measure(lambda batch: max(float(_gains(batch).max()), 0.0), energy_bound),
             WITH_HALF: Measure(lambda batch: worst(np.abs(_gains(batch) + 0.5 * _shares(batch))), solve_bound),

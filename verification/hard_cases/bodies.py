@@ -19,7 +19,7 @@ def touching_cradle_impact() -> HardCase:
     return HardCase(
         "Newton's cradle, all contacts at once",
         "textbook; paper (12) with assumption (i)",
-        "three contacts do not approach: equalities hold them at rest against each other",
+        "three contacts do not approach; as equalities their relative velocities stay zero",
         "the first ball returns with 3/5, the other four leave together with 2/5",
         np.eye(5), cradle_rows(5), np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 1.0,
     )  # fmt: skip
@@ -32,7 +32,7 @@ def break_shot() -> HardCase:
     return HardCase(
         "Three-ball break shot",
         "billiards: Coriolis, Théorie mathématique des effets du jeu de billard (1835)",
-        "two contacts share one ball: resolved one after the other, the outcome depends on the order",
+        "two contacts share one ball; if they are resolved one after the other, the outcome depends on the order",
         "symmetric: the striker keeps 1 − 4 n² / (1 + 2 n²) of its speed, n the cosine of the normals",
         np.eye(6), exact.astype(float), np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 1.0, exact_jacobian=exact,
     )  # fmt: skip
@@ -46,8 +46,9 @@ def rocking_block() -> HardCase:
     return HardCase(
         "Rocking block, one rock",
         "Housner, Bull. Seismological Society of America 53 (1963)",
-        "the struck corner holds in both directions, the other one leaves: energy goes by geometry alone",
-        "angular momentum about the struck corner is kept: ω⁺ = ω⁻ (1 − 3/2 sin² α), α the block's slenderness",
+        "the struck corner stops in both directions and the other corner lifts off; the geometry alone determines the "
+        "energy loss",
+        "angular momentum about the struck corner is conserved: ω⁺ = ω⁻ (1 − 3/2 sin² α), α the block's slenderness",
         np.diag([1.0, 1.0, inertia]), np.array([[0.0, 1.0, half], [1.0, 0.0, high]]), turning, 0.0,
     )  # fmt: skip
 
@@ -58,8 +59,8 @@ def superball() -> HardCase:
     return HardCase(
         "Superball with grip",
         "Garwin, American J. of Physics 37 (1969)",
-        "the tangential row is elastic as well: spin and sliding trade energy without loss",
-        "both velocities of the point are reversed, energy kept",
+        "the tangential row is elastic as well: spin and sliding exchange energy without loss",
+        "both velocity components of the contact point are reversed, energy is conserved",
         np.diag([1.0, 1.0, 0.4 * radius**2]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, radius]]),
         np.array([2.0, -1.0, 3.0]), 1.0,
     )  # fmt: skip
@@ -71,8 +72,8 @@ def stack_of_mass_ratio() -> HardCase:
     return HardCase(
         "Stack of eight bodies, mass ratio 1e6",
         "stacks are where penalties and iterative solvers fail first: Acary and Brogliato (2008), chapter 1",
-        "light bodies carry the blow between heavy ones: W couples 1 and 1e6",
-        "one velocity for all, that of the momentum",
+        "light bodies transmit the impulse between heavy ones: W has entries of size 1 and 1e6",
+        "all bodies move with the velocity that conserves momentum",
         np.diag(masses), cradle_rows(8), np.array([-1.0, 0.5, 0.0, 0.0, 0.25, 0.0, 0.0, 2.0]), 0.0,
     )  # fmt: skip
 
@@ -85,8 +86,8 @@ def wedge() -> HardCase:
     return HardCase(
         "Wedging between walls 4e-6 apart in angle",
         "a wedge: friction cones and normals nearly opposite",
-        "the rows are nearly opposite: what pushes out is a millionth of what presses",
-        "both speeds reversed, to rounding over the angle",
+        "the rows are nearly opposite: the net impulse is a millionth of the contact impulses",
+        "both approach speeds are reversed, to an error of ε divided by the angle",
         np.eye(2), exact.astype(float), np.array([0.5, -1.0]), 0.5, exact_jacobian=exact,
     )  # fmt: skip
 
@@ -97,8 +98,9 @@ def painleve_impact() -> FrictionalCase:
     return FrictionalCase(
         "Painlevé's rod, its impact",
         "Painlevé (1895); Génot and Brogliato (1999)",
-        "sliding friction alone would press the end harder than it holds it: the slip stops within the impact",
-        "restitution met, no gain: tangential impulse up to sticking, reduced to what the impact can pay for",
+        "sliding friction presses the end into the floor more than it slows it: the slip stops during the impact",
+        "restitution met, no energy gain: the tangential impulse is limited by sticking and by the energy lost in the "
+        "impact",
         np.diag([1.0, 1.0, 1.0 / 12.0]), np.array([[0.0, 1.0, -0.5 * cosine]]), np.array([-1.0, -0.1, 0.0]), 0.0,
         methods=("factored", "Newton with Coulomb"), tangent=np.array([[1.0, 0.0, 0.5 * sine]]), friction=2.0,
     )  # fmt: skip
@@ -116,8 +118,8 @@ def sleeping_top() -> HardCase:
     return HardCase(
         "Sleeping top set on its tip",
         "Klein and Sommerfeld, Über die Theorie des Kreisels (1897-1910); numbers ours",
-        "all but a part in 1e9 of the energy is spin, in which no row has a share",
-        "the spin is kept; the tip is stopped in all three directions, and the axis starts to turn with it",
+        "nearly all of the energy (all but 1e-9) is spin, which no contact row changes",
+        "the spin is unchanged; the tip stops in all three directions, and the axis starts to turn",
         np.diag([2.0, 2.0, 2.0, 0.75, 0.75, 0.5]), exact.astype(float),
         np.array([0.125, 0.0, -0.01, 0.0, 0.0, 1000.0]), 0.0, exact_jacobian=exact,
     )  # fmt: skip
@@ -131,8 +133,8 @@ def rolling_coin() -> HardCase:
     return HardCase(
         "Coin that starts to roll",
         "Appell, Traité de mécanique rationnelle (1900); numbers ours",
-        "sliding, falling and spin are coupled through a full inertia: the grip changes the axis of the spin",
-        "it rolls: the rim's point rests, the angular momentum about that point is kept",
+        "a full inertia matrix couples sliding, falling and spin: sticking changes the axis of the spin",
+        "it rolls: the contact point of the rim is at rest, and angular momentum about that point is conserved",
         mass, exact.astype(float), np.array([0.0, 2.0, -1.0, -4.0, 0.0, -3.0]), 0.0, exact_jacobian=exact,
     )  # fmt: skip
 
@@ -145,7 +147,7 @@ def rattleback() -> HardCase:
     return HardCase(
         "Rattleback tapped on its end",
         "Walker, Quarterly J. of Pure and Applied Mathematics 28 (1896); numbers ours",
-        "a fall without any spin makes spin, through one entry of the inertia that is not on its diagonal",
-        "it spins to the side that the product of inertia says, and not at all without one",
+        "a fall without spin creates spin through one product of inertia",
+        "the sign of the product of inertia decides the sense of the spin; without it there is no spin",
         mass, exact.astype(float), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]), 0.0, exact_jacobian=exact,
     )  # fmt: skip

@@ -25,7 +25,7 @@ NEWTON_COULOMB = "Newton with Coulomb"  # friction at an impact as Kane and Levi
 COULOMB = "ideal with friction"  # the rigid world with Coulomb's law; the paper's rigid worlds have no friction
 RESTITUTION_TOLERANCE = 1e-8  # as the kit asks of anybody's resolver
 NO_GAIN = 1e-12  # rounding of the ledger's sums over the run's steps
-HANGS_ON_ROUNDING = "hangs on rounding"
+DEPENDS_ON_ROUNDING = "depends on rounding"
 _NONE = float("nan")
 
 
@@ -194,7 +194,7 @@ class HardCaseVerdict:
     Attributes
     ----------
     verdict : "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of memory",
-        "failed", or HANGS_ON_ROUNDING: a method that goes through LAPACK leaves a residual within a factor of ten of
+        "failed", or DEPENDS_ON_ROUNDING: a method that goes through LAPACK leaves a residual within a factor of ten of
         the tolerance, or moves wrong by more than half of |v⁻|: another BLAS would change what is wrong first.
     note : the error's words where there is no answer.
     energy_gain : impacts (KE⁺ − KE⁻)/KE⁻ exactly, trajectories the largest gain at any instant, as a share of what

@@ -46,7 +46,7 @@ def double_pendulum_without_friction() -> HardCase:
     return HardCase(
         "Kane and Levinson's double pendulum, frictionless impact",
         _SOURCE,
-        "the two rods turn each other: the tip's effective mass is a fifth of a rod's",
+        "the motions of the two rods are coupled: the effective mass of the tip is a fifth of a rod's",
         "½ (1 − e²) γ²/W is lost, as Theorem 1 says",
         _MASS,
         _NORMAL,
@@ -60,8 +60,8 @@ def double_pendulum_with_friction() -> HardCase:
     return FrictionalCase(
         "Kane and Levinson's double pendulum, impact with friction",
         _SOURCE,
-        "friction reverses the slip: with Newton's and Coulomb's laws as they stand the energy triples",
-        "restitution is met and no energy gained: friction is reduced to what the impact can pay for",
+        "friction reverses the slip: with Newton's and Coulomb's laws unchanged the energy triples",
+        "restitution is met and no energy is gained: friction is reduced until it creates none",
         _MASS,
         _NORMAL,
         _VELOCITY,
@@ -113,10 +113,11 @@ def double_pendulum_motion() -> TrajectoryCase:
     return TrajectoryCase(
         "Kane and Levinson's double pendulum, its motion",
         _SOURCE,
-        "a bounce with friction may throw it higher than it fell",
-        "never more energy than it fell with; Newton's and Coulomb's laws step by step do not promise that",
-        "energy balance: kinetic and potential energy never exceed those of the start; until the tip touches, the "
-        "equations of two rods, integrated to twelve digits",
+        "a bounce with friction may throw the tip higher than the height from which it fell",
+        "the energy never exceeds that at the start; Newton's and Coulomb's laws, applied step by step, do not "
+        "guarantee this",
+        "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "
+        "the equations of two rods, integrated to twelve digits",
         scene_from_text(_SCENE),
         _measure_pendulum,
         worlds=("IAPB", "PB", "ideal", COULOMB),
@@ -208,7 +209,7 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
 
     return TrajectoryCase(
         "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
-        "the printed law never sticks: it must creep exactly as it says, no faster",
+        "the printed law never sticks: the block must creep at the speed that the law gives, no faster",
         "0.99 v_threshold after a few steps",
         "(6) for one coordinate, step by step", _block(0.99, "regularised"), measure, ("IAPB", "PB"),
     )  # fmt: skip
@@ -240,7 +241,7 @@ def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Coulomb's law",
-        "one per cent of the force decides whether it moves", expected,
+        "a change of one per cent in the force decides whether it moves", expected,
         f"Coulomb's law in closed form: {slide * 1e3:.4g} mm after {_DURATION:g} s",
         _block(share), measure, _WORLDS,
     )  # fmt: skip
@@ -282,8 +283,9 @@ def painleve_rod() -> TrajectoryCase:
     return TrajectoryCase(
         "Painlevé's rod: sliding without a finite answer",
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
-        "the contact's inertia is negative while it slides: rigid bodies have no acceleration, springs blow up",
-        "it jams: a rigid contact at once, a spring after the time in which its force has grown enough",
+        "the effective inertia of the sliding contact is negative: rigid bodies have no acceleration, spring forces "
+        "diverge",
+        "it jams: a rigid contact at once, a spring once its force has grown large enough",
         f"springs: the slip of the rod's own equations, stopped after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
         scene_from_text(_ROD),
         _measure_rod,

@@ -26,8 +26,8 @@ from iapb.errors import IapbError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.hard_cases.case import (
+    DEPENDS_ON_ROUNDING,
     EPS,
-    HANGS_ON_ROUNDING,
     NEWTON_COULOMB,
     RESTITUTION_TOLERANCE,
     Floats,
@@ -102,7 +102,7 @@ def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
     undecided = verdict != "gains energy" and _near_tolerance(found.residual)
     noise = verdict in ("gains energy", "restitution unmet") and found.distance > _ALL_NOISE
     if method in _THROUGH_LAPACK and (undecided or noise):
-        verdict = HANGS_ON_ROUNDING
+        verdict = DEPENDS_ON_ROUNDING
     if verdict == "stable":
         fault = max(smallest_fault(partial(_is_seen, case, word, answer.velocity, wrong))
                     for wrong in faulty_answers(case, answer.velocity))  # fmt: skip

@@ -15,7 +15,7 @@ def mass_ratio() -> HardCase:
         "Mass ratio 1e12",
         "a grain between a body and a wall; bad scaling: Higham, Accuracy and Stability (2002)",
         "κ(M) = 1e12; the light body's speed is a thousandfold the heavy one's error",
-        "exact bounce of both, no gain",
+        "both bodies bounce exactly, no energy gain",
         np.diag([1.0, 1e-12]),
         np.array([[1.0, -1.0], [0.0, 1.0]]),
         np.array([-1.0, -1e3]),
@@ -27,7 +27,7 @@ def tiny_lever_arm() -> HardCase:
     """Two points of a face 1e-9 m apart."""
     return HardCase(
         "Lever arms of 1e-9 m",
-        "contact points that a detector reports on one spot",
+        "contact points that a detector reports at nearly the same place",
         "two rows whose difference is 1e-9: a real rotation constraint, close to noise",
         "rank 2: the rotation is stopped",
         np.diag([1.0, 1.0, 1.0]),
@@ -75,8 +75,8 @@ def face_at_three_points() -> HardCase:
     return HardCase(
         "Face struck at three points in a rotated frame",
         "hyperstatic contact of flat faces; the triangle 3-4-5 makes the rotation exact",
-        "rank 2 in geometry, rank 3 in doubles: noise taken for a row brakes the sliding",
-        "the tangential speed is kept",
+        "rank 2 in exact geometry, rank 3 in doubles: a row of rounding noise would brake the sliding",
+        "the tangential speed is unchanged",
         np.diag([2.0, 2.0, 0.1]),
         exact.astype(float),
         np.array([2.4 + 0.6, 1.8 - 0.8, 0.0]),
@@ -91,8 +91,9 @@ def grazing() -> HardCase:
     return HardCase(
         "Grazing impact",
         "a fast tool brushing a wall; Nordmark, J. Sound and Vibration 145 (1991), on grazing",
-        "the approach is ten digits below the speed",
-        "the sliding keeps every digit, the approach is reversed to ε of the speed",
+        "the approach velocity is 1e-10 of the speed",
+        "the sliding velocity keeps all its digits; the approach velocity is reversed with an error of ε times the "
+        "speed",
         np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.25], [0.0, 0.25, 3.0]]),
         np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.5]]),
         np.array([100.0, -1e-8, 0.0]),
@@ -104,9 +105,9 @@ def subnormal_speeds() -> HardCase:
     """Speeds near 1e-312 m/s."""
     return HardCase(
         "Subnormal speeds",
-        "a body that halves its speed for ever; Demmel, Underflow and reliability (1984)",
+        "a body whose speed halves again and again; Demmel, Underflow and reliability (1984)",
         "squares underflow: energies of 1e-624 J",
-        "scaled, so solved as any other; the result is rounded to subnormals",
+        "solved as any other impact after scaling; the result is rounded to subnormal numbers",
         np.array([[2.0, 0.5], [0.5, 1.0]]),
         np.array([[1.0, 0.0]]),
         np.array([-3e-312, 1e-312]),
@@ -140,8 +141,8 @@ def bar_with_unequal_restitution() -> HardCase:
     return HardCase(
         "Bar struck at two points, e = (1, 0)",
         "docs/theory.md; the kind of gain of Kane and Levinson (1985)",
-        "equalities with unequal e create energy: 0.5 J becomes 12.167 J",
-        "Poisson's law by two LCPs: passive, pushing, separating",
+        "equalities with unequal e create energy: 0.5 J become 12.167 J",
+        "Poisson's law by two LCPs is passive, contacts only push, and none approaches afterwards",
         mass,
         rows,
         np.array([-1.0, 0.0]),
@@ -161,7 +162,7 @@ def wedged_peg() -> HardCase:
     return HardCase(
         "A peg wedged in its hole",
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
-        "six rows of rank three, a fiftieth of whose approach is along the peg: the sides pull where they should push",
+        "six rows of rank three; the normals of the sides are nearly perpendicular to the motion, and the sides pull",
         "stopped in all three coordinates at once",
         np.diag([2.0, 2.0, 0.005]),
         exact.astype(float),

@@ -42,8 +42,9 @@ def chatter() -> TrajectoryCase:
     return TrajectoryCase(
         "Contact chatter: infinitely many bounces in 0.43 s",
         "Zeno's bouncing ball; textbook",
-        "the bounces accumulate: an event-driven method never gets past their end, one that steps may ring on",
-        "the parabolas as far as a step can follow them, then rest",
+        "the bounces accumulate: an event-driven method never passes that instant, and a time-stepping method may keep "
+        "bouncing",
+        "the parabolas as far as the time step resolves them, then rest",
         f"parabolas of heights h e²ᵏ in closed form, at rest from {_end():.4f} s on",
         scene_from_text(_SCENE),
         _measure_chatter,
@@ -87,19 +88,19 @@ _SAME_NUMBERS = 1e-6
 
 def wall_at_the_bound() -> TrajectoryCase:
     """K = 2 b / T exactly."""
-    return _wall(1, "the last stiffness for which passivity is proved", "no energy from the wall in any world")
+    return _wall(1, "the largest stiffness for which passivity is proved", "in no world does the wall give energy")
 
 
 def wall_beyond_the_bound() -> TrajectoryCase:
     """Five hundred times that."""
-    return _wall(500, "a penalty wall bounces the handle back faster than it came",
-                 "an impulse takes the speed before the spring sees it: no energy from the wall")  # fmt: skip
+    return _wall(500, "a penalty wall throws the handle back faster than it arrived",
+                 "an impulse stops the handle before the spring is compressed: the wall gives no energy")  # fmt: skip
 
 
 def wall_far_beyond_the_bound() -> TrajectoryCase:
     """Two thousand times that: T² K / m = 1.95, half of where the step itself diverges."""
-    return _wall(2000, "the spring alone carries lasting contact, and one step of it is as long as a bounce",
-                 "impulses do not save a spring this stiff: only the rigid wall is passive")  # fmt: skip
+    return _wall(2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
+                 "impulses do not make a spring this stiff passive; only the rigid wall is")  # fmt: skip
 
 
 def _wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
@@ -155,7 +156,7 @@ def wedged_peg_motion() -> TrajectoryCase:
     return TrajectoryCase(
         "A peg wedged in its hole, its motion",
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
-        "six gaps close in the same step; then a spring system of six contacts carries the hand's force",
+        "six gaps close in the same step; then the springs of six contacts carry the hand force",
         "at rest at the end of the hole, no deeper than six springs allow",
         "statics: 2 K δ + 4 K s² δ = F, s the sine of the draft; a rigid wall has δ = 0",
         load_scene(find_scene("peg_hole")),
@@ -229,8 +230,8 @@ def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
 
     return TrajectoryCase(
         f"Newton's cradle, {words}", "textbook; paper (12) for the rows",
-        "which rows collide decides the outcome: the blow is passed on by impulses or by springs",
-        "momentum kept and no energy made, whichever ball leaves",
+        "the outcome depends on which contacts collide: impulses or springs transmit the momentum",
+        "momentum is conserved and no energy created, whichever ball leaves",
         "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
         scene_from_text(_CRADLE.format(balls="\n".join(balls), stiffness=_CRADLE_STIFFNESS)), measure,
     )  # fmt: skip

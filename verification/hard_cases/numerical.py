@@ -13,7 +13,7 @@ def thousand_copies() -> HardCase:
         "1,000 copies of one contact",
         "collision detectors on flat faces",
         "the Delassus matrix is 1000 × 1000 of rank one; p is not unique",
-        "the outcome of the single contact; every method that allows redundancy",
+        "the outcome of a single contact, with every method that allows redundant rows",
         np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]),
         np.tile([0.6, 0.8, -0.25], (1000, 1)),
         np.array([-1.0, -2.0, 0.5]),
@@ -24,25 +24,26 @@ def thousand_copies() -> HardCase:
 
 def no_contact() -> HardCase:
     """c = 0."""
-    return _contacts(0, "No contact at all", "empty matrices: a shape that libraries disagree about",
+    return _contacts(0, "No contact at all", "empty matrices, which libraries treat differently",
                      "nothing happens, and no error")  # fmt: skip
 
 
 def one_contact() -> HardCase:
     """c = 1."""
-    return _contacts(1, "One contact", "nothing: the case that every method must get right", "(19) to rounding")
+    return _contacts(1, "One contact", "it is not: every method must solve this case", "(19) to rounding")
 
 
 def hundred_contacts() -> HardCase:
     """c = 100, rank three."""
     return _contacts(100, "100 contacts of rank three", "97 redundant rows, each exact in doubles",
-                     "exact rank, the motion of three contacts")  # fmt: skip
+                     "exact rank, and the velocity that three contacts give")  # fmt: skip
 
 
 def ten_thousand_contacts() -> HardCase:
     """c = 10,000, rank three."""
     return _contacts(10_000, "10,000 contacts of rank three", "time and memory: the Delassus matrix has 1e8 entries",
-                     "linear time, exact rank; what forms the Delassus matrix is cut")  # fmt: skip
+                     "linear time and exact rank; "
+                     "methods that form the Delassus matrix exceed the limit on time")  # fmt: skip
 
 
 def _contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
@@ -104,7 +105,7 @@ def hilbert_rows() -> HardCase:
         "Hilbert rows, n = 8",
         "Hilbert (1894); the classical rank decision",
         "full rank exactly, condition 1.5e10: singular values on both sides of any tolerance",
-        "restitution met and no gain; which of the last directions count is a choice",
+        "restitution met and no energy gain; how many of the smallest directions count is a choice",
         np.eye(n),
         rows,
         np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),
@@ -122,7 +123,7 @@ def kahan_rows() -> HardCase:
         "Kahan rows, n = 24",
         "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
         "smallest singular value far below every pivot",
-        "restitution met and no gain",
+        "restitution met and no energy gain",
         np.eye(n),
         rows,
         np.cos(np.arange(n)),

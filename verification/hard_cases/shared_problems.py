@@ -29,7 +29,7 @@ def bowl_of_low_rank() -> HardCase:
     mass, rows, velocity = _mechanics("lcp/bowl.5.dynamics.lcp.gz")
     return HardCase(
         "Pile in a bowl, 35 contacts of rank 5", "lcpy (Tournier), bowl.5.dynamics",
-        "35 contacts, five motions, and the singular values of the five from 0.003 to 2", "rank 5, exactly plastic",
+        "35 contacts have rank 5; the five singular values range from 0.003 to 2", "rank 5, exactly plastic",
         mass, rows, velocity, 0.0,
     )  # fmt: skip
 
@@ -39,7 +39,8 @@ def bowl_of_mixed_scales() -> HardCase:
     mass, rows, velocity = _mechanics("lcp/bowl.21.dynamics.lcp.gz")
     return HardCase(
         "Pile in a bowl, 43 contacts of mixed scales", "lcpy (Tournier), bowl.21.dynamics",
-        "one direction is a million times lighter than the others: they drown in its rounding", "all of them found",
+        "one direction is a "
+        "million times lighter than the others, so its rounding hides them", "all directions are found",
         mass, rows, velocity, 0.5,
     )  # fmt: skip
 

@@ -66,9 +66,9 @@ def nudged_box() -> TrajectoryCase:
         return Measured(largest_gain(run), NO_GAIN, float(np.abs(x - way).max()) / way, speed * run.dt / way)
 
     return TrajectoryCase(
-        "Nudged box", "Coulomb's law; the box of a first scene of one's own",
-        "a friction force that is held over a step turns the motion round, and drives the box across the floor",
-        "it stops where Coulomb's law says, and stays there",
+        "Nudged box", "Coulomb's law; a box on a floor",
+        "a friction force that is held over a step reverses the motion and drives the box across the floor",
+        "it stops where Coulomb's law predicts and stays there",
         f"Coulomb's law in closed form: v²/(2 μ g) = {1e3 * way:.4g} mm",
         _boxes("nudged_box", "A nudged box", 1, _BOX, 0.0, speed), measure, _ENGINE,
     )  # fmt: skip
@@ -95,9 +95,10 @@ def _sticking(title: str, name: str, count: int, sort: tuple[float, float, float
 
     return TrajectoryCase(
         title, "Coulomb's law; springs of (5)",
-        "a contact that sticks must not creep; normal and friction forces are coupled by levers",
-        f"it leans on its springs by {1e6 * leans:.3g} μm, and stays",
-        "no contact slips: tan 20° < μ; the springs of each pair of faces turn by the moment that they carry",
+        "a sticking contact must not creep; lever arms couple normal and friction forces",
+        f"it moves by {1e6 * leans:.3g} μm as its springs deflect, and then stays",
+        "no contact slips because tan 20° < μ; the springs between two faces deflect by the force and moment that they "
+        "carry",
         _boxes(name, title, count, sort, slope, 0.0), measure, _ENGINE,
     )  # fmt: skip
 

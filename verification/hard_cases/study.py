@@ -35,14 +35,17 @@ COLUMNS = (
 OF_CASE = (Column("case"), Column("kind"))
 ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
 _NOTES = {
-    "impact": "Stable: gain at most 10 d ε √κ(M), restitution to 1e-8, error within what is allowed. Gain exact, "
-              "(KE⁺ − KE⁻)/KE⁻; error |v⁺ − truth| / |v⁻| in the kinetic metric, allowed 10 n ε √κ (√κ + κ(A)), "
-              "n = max(c, d), κ of M scaled to a unit diagonal. Smallest fault: the least relative error of impulse or "
-              "velocity, planted in the answer, that is not stable any more. Median time of a call.",
-    "motion": "Stable: no energy made, restitution to 1e-8, error within what the step excuses. Gain: the most energy "
-              "ever made, as a share of what was there or was fed in; error: distance from the law as a share of the "
-              "answer; restitution of its collisions, weighted by the impulses. Smallest fault: all displacements and "
-              "changes of velocity too large, or too small, by that share. Median time of a step.",
+    "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
+              "The gain (KE⁺ − KE⁻)/KE⁻ is computed exactly. The error is |v⁺ − truth| / |v⁻| in the kinetic metric; "
+              "allowed is 10 n ε √κ (√κ + κ(A)), n = max(c, d), with κ of M scaled to a unit diagonal. Smallest fault "
+              "seen: the smallest relative error which, planted in the impulse or velocity of the answer, makes the "
+              "verdict unstable. Time: median of a call.",
+    "motion": "Stable: no energy created, restitution residual at most 1e-8, error within the discretisation error of "
+              "the step. Gain: the largest amount of energy created, relative to the energy at the start or the work "
+              "done on the scene. Error: distance from the exact law, relative to its answer. Restitution residual: of "
+              "the collisions, weighted by their impulses. Smallest fault seen: the smallest share which, added to or "
+              "taken from all displacements and changes of velocity, makes the verdict unstable. Time: median of a "
+              "step.",
 }  # fmt: skip
 
 
@@ -59,11 +62,11 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     ours = {case.title: _outcome(case) for case in tried}
     failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
-    sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases with certain answers."
-                + (f" Not on: {'; '.join(failing)}." if failing else "")
-                + (f" {skipped} were skipped: their files are absent." if skipped else ""))  # fmt: skip
+    sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases whose answer is known."
+                + (f" It fails on: {'; '.join(failing)}." if failing else "")
+                + (f" {skipped} were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
-    question = "Is the engine stable on problems on which methods have been seen to fail?"
+    question = "Is the engine stable on problems on which other methods fail?"
     rows = [{"case": case.title, "kind": case.details["kind"], **row}
             for case in tried for row in case.tables[case.key].records()]  # fmt: skip
     table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all but the notes

@@ -50,7 +50,7 @@ SEED = 20050601
 COLUMNS = (
     Column("law"), Column("cases"), Column("worst", prose=True), Column("bound"), Column("holds"), Column("fault"),
     Column("fault caught"),
-)  # the worst of random cases hangs on rounding: it is shown, not compared
+)  # the worst of random cases depends on rounding: it is shown, not compared
 BULK = (
     "method", "condition of M from", "impacts", "largest relative energy gain", "gain / (10 d ε √κ)", "gain / (d ε κ)",
     "above 10 d ε √κ", "largest restitution residual",
