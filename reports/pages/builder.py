@@ -165,7 +165,7 @@ def counted(part: Part) -> str:
     cases = f" on {part.cases} cases" if part.cases else ""
     region = part.region
     where = (f"; the region is {region.share:.0%} of the tested range, found with {region.searched} trials, confirmed "
-             f"by {region.others + region.fresh} more") if region else ""  # fmt: skip
+             f"by {region.others + region.fresh} others") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 
