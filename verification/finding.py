@@ -43,6 +43,11 @@ DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
 FAILED_CASES = "not computed"  # name of the table of cases that failed
+# Quantities that sentences of several pages quote: in a report each has one value and one verdict. To add one: a name
+# here; the Part or Finding whose sentence says it names it with its value, as printed.
+QUANTITIES = ("impacts certified", "adverse impacts certified", "time of a peg step", "exponent of bodies",
+              "hard cases of the engine", "speed targets")  # fmt: skip
+Quantities = tuple[tuple[str, str], ...]  # names and values
 _UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
 
 
@@ -227,7 +232,9 @@ class Part:
     region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
     timed : measured times are in it
     optional : about what does not come with the project, as another engine: absent, it leaves the verdict to others
-    miss : where ours falls short, in a clause for the first page; "" where it does not, or another falls short
+    miss : where ours falls short, in a clause of one short line for the first page; "" where it does not, or another
+        falls short
+    quantities : those of QUANTITIES that the sentence says, each with its value as it stands there
     """
 
     sentence: str
@@ -242,6 +249,10 @@ class Part:
     optional: bool = False
     cases: int = 0
     miss: str = ""
+    quantities: Quantities = ()
+
+    def __post_init__(self) -> None:
+        check_quantities(self.quantities, self.sentence)
 
     @property
     def outcome(self) -> str:
@@ -276,6 +287,7 @@ class Finding:
     axes : keys of the columns over which the outcome is best drawn: across, up, and what splits the maps
     failures : the cases that raised; their rows are missing from the tables
     timed : the verdict or the answer rests on measured times
+    quantities : those of QUANTITIES that the answer says, each with its value as it stands there
     """
 
     key: str
@@ -289,6 +301,10 @@ class Finding:
     axes: tuple[str, ...] = ()
     failures: tuple[Failure, ...] = ()
     timed: bool = False
+    quantities: Quantities = ()
+
+    def __post_init__(self) -> None:
+        check_quantities(self.quantities, self.answer)
 
     @property
     def computed(self) -> bool:
@@ -299,6 +315,20 @@ class Finding:
     def miss(self) -> str:
         """Where ours falls short, the clauses of all parts; "" where none says so."""
         return "; ".join(part.miss for part in self.parts if part.miss)
+
+
+def check_quantities(quantities: Quantities, sentence: str) -> None:
+    """Raise ArgumentError unless each quantity is one of QUANTITIES and the sentence says its value."""
+    for name, value in quantities:
+        if name not in QUANTITIES:
+            raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
+        if not said_as(value).search(sentence):
+            raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that stands in: {sentence}")
+
+
+def said_as(value: str) -> re.Pattern[str]:
+    """Return what finds a value in a sentence as a number of its own, not as a piece of a longer one."""
+    return re.compile(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)")
 
 
 def check_depth(depth: str) -> None:
@@ -394,12 +424,13 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
 
 def finding_of(
     key: str, title: str, question: str, answer: str, parts: Iterable[Part],
-    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (),
+    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (), quantities: Quantities = (),
 ) -> Finding:  # fmt: skip
     """Return the finding that parts make: the verdict of the worst of them, timed where one is, with what failed."""
     parts = tuple(parts)
     timed = any(part.timed for part in parts)
-    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed)
+    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed,
+                   quantities=quantities)
     return with_failures(made, failures)
 
 

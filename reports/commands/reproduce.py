@@ -26,7 +26,7 @@ from reports.figures.figure import Figure, draw
 from reports.figures.standalone import standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
-from reports.pages.quantities import contradictions
+from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import FailedCases
 from reports.report import write_report
 from reports.runner import Runner
@@ -79,15 +79,18 @@ def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
                  answers={topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics})
     facts["contradictions"] = print_contradictions(pages)
     _end_where_something_failed(failed, facts)
-    if facts["contradictions"]:
+    facts["unsaid"] = unsaid(pages)
+    if facts["unsaid"]:
+        print(f"No page of the report says: {', '.join(facts['unsaid'])}.")
+    if facts["contradictions"] or facts["unsaid"]:
         raise typer.Exit(1)
 
 
 def print_contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Name the quantities for which the pages give more than one number, and return them."""
+    """Name the quantities for which the pages give more than one value or verdict, and return them."""
     found = contradictions(pages)
     for name, texts in found.items():
-        print(f"More than one number for one quantity in the report. {name}: {', '.join(texts)}.")
+        print(f"More than one value in the report. {name}: {', '.join(texts)}.")
     return found
 
 

@@ -51,18 +51,21 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
                       "cancelled": one.cancelled, "median price": _known(one.price[0]),
                       "largest price": _known(one.price[2]), HOLDS: one.holds})
-    recorded = (f"{_sum(rows, 'gains')} of {_sum(rows, 'impacts'):,} impacts in {len(rows):,} runs of the engine "
+    certified = ("impacts certified", f"{_sum(rows, 'impacts'):,}")
+    provoked = ("adverse impacts certified", f"{_sum(drawn, 'impacts'):,}")
+    recorded = (f"{_sum(rows, 'gains')} of {certified[1]} impacts in {len(rows):,} runs of the engine "
                 "gained energy in exact arithmetic")  # fmt: skip
     least = min((one["moved"] for one in drawn), default=0.0)
-    adverse = (f"nor did {_sum(drawn, 'impacts'):,} random impacts drawn to provoke a gain"
-               if not _sum(drawn, "gains") else
-               f"{_sum(drawn, 'gains')} of {_sum(drawn, 'impacts'):,} random impacts drawn to provoke a gain did")
+    adverse = (f"nor did {provoked[1]} random impacts drawn to provoke a gain" if not _sum(drawn, "gains") else
+               f"{_sum(drawn, 'gains')} of {provoked[1]} random impacts drawn to provoke a gain did")  # fmt: skip
     moved = f"in every family the impact changed the velocity in at least {least:.1%} of the cases"
-    parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows)),
-             Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn])))  # fmt: skip
+    parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows), quantities=(certified,)),
+             Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn]),
+                  quantities=(provoked,)))  # fmt: skip
     tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn)}
     question = "Does any impact gain energy, even in the last bit?"
-    return finding_of("exact-energy", "Exact energy", question, f"{recorded}; {adverse}.", parts, tables, failures)
+    return finding_of("exact-energy", "Exact energy", question, f"{recorded}; {adverse}.", parts, tables, failures,
+                      (certified, provoked))
 
 
 def verdict_of_families(holds: list[bool | None]) -> str:

@@ -20,6 +20,7 @@ from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
 from reports.pages.matrix import matrices, worst_first
+from reports.pages.quantities import judged, marks
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.uses import anchor, runs_by_user
@@ -184,7 +185,7 @@ def _environment() -> Environment:
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled, film=_film,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
-        runs_by_user=runs_by_user, anchor=anchor,
+        runs_by_user=runs_by_user, anchor=anchor, marks=marks, judged=judged,
         matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals["rows_shown"] = ROWS_SHOWN

@@ -6,88 +6,129 @@ Each sentence is made from findings; what was not computed is left out.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import degrees
 from statistics import median
 
+from reports.pages.quantities import Mark, marks
 from reports.pages.records import Evidence
 from verification.claims.c11_forces import LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 
 ERRATA = (
-    "The energy lost in a collision, (18) and (24), lacks a factor ½ (C01, C02). The inverse in the proof, (37), is "
-    "not the pseudo-inverse. Impulses by (13) and (14) do not keep momentum. The printed formula can gain energy by "
-    "rounding."
+    "The energy lost, (18) and (24), lacks a factor ½. The inverse in (37) is not the pseudo-inverse. Impulses by (13) "
+    "and (14) do not keep momentum. The printed formula can gain energy by rounding."
 )
-
-
-LIMIT = "This holds for impacts; springs and steps in time are not exact: see what we miss."
+LIMIT = "Springs and time steps are not exact: see what we miss."
+MISSES_SHOWN = 5
+# Topics whose misses come first: what gains energy or moves wrongly, then what differs, then what is slow.
+GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
+PEG_STEP = "peg_corner"  # the scene whose step stands for the time of a step
 
 
 @dataclass(frozen=True)
 class Fact:
-    """A line beside the answer; `id` is where the report says more."""
+    """A line beside the answer; `id` is where the report says more, `marks` the quantities in it.
+
+    items : lines of a list, each with the id that says more of it
+    """
 
     label: str
     text: str
     id: str
+    marks: tuple[Mark, ...] = ()
+    items: tuple[tuple[str, str], ...] = ()
 
 
-def answer(evidence: Evidence) -> str:
-    """Say in two or three sentences whether an impulse makes a wall feel rigid; "" where nothing is known."""
+@dataclass(frozen=True)
+class Answer:
+    """What holds and what fails of the paper's promise, in sentences; "" where nothing is known."""
+
+    holds: str
+    fails: str
+
+
+def answer(evidence: Evidence) -> Answer:
+    """Say whether an impulse makes a wall feel rigid, and whether one ever gained energy."""
     claims = {claim.key: claim for claim in evidence.claims}
-    said = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
+    found = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
     if any(topic.key == "exact-energy" and topic.verdict == REPRODUCED for topic in evidence.topics):
-        said.append("No impact of the engine ever gained energy.")
-    return " ".join(said)
+        found.append((True, "No impact of the engine ever gained energy."))
+    holds, fails = (" ".join(text for held, text in found if held is wanted) for wanted in (True, False))
+    return Answer(holds, fails)
 
 
-def _forces(claim: Finding | None) -> Iterator[str]:
+def _forces(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     table = claim.tables.get("C11") if claim else None
     if table is None or "part" not in table.keys:
         return
     rows = [row for row in table.where(part=LARGE).records() if row["coordinate"] != "theta" and row["PB"]]
     if rows:
         ratio = median(row["IAPB"] / row["PB"] for row in rows)
-        yield (f"At a new contact, impulses push the hand {ratio:.2g} times as hard as springs alone do "
-               f"(median of {len(rows)} cases).")  # fmt: skip
+        yield ratio > 1.0, (f"At a new contact, impulses push the hand {ratio:.2g} times as hard as springs alone do "
+                            f"(median of {len(rows)} cases).")  # fmt: skip
 
 
-def _path(claim: Finding | None) -> Iterator[str]:
+def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     if claim is None:
         return
     tilts = [bound for part in claim.parts if part.region and not part.name.startswith("theta")
              for name, _, _, bound in part.region.bounds if name == "tilt" and bound is not None]  # fmt: skip
     if tilts:
-        yield (f"The path of the hand then comes closest to that at a rigid wall, if the peg starts nearly flat: up to "
-               f"{degrees(min(tilts)):.1f}° of tilt. Beyond, springs alone often come as close or closer.")  # fmt: skip
+        yield True, (f"The path of the hand then comes closest to that at a rigid wall, if the peg starts nearly flat: "
+                     f"up to {degrees(min(tilts)):.1f}° of tilt.")  # fmt: skip
+        yield False, "Beyond that tilt, springs alone often come as close or closer."
     elif claim.parts:
-        yield "No range of starts was found in which the path of the hand is the closest to that at a rigid wall."
+        yield False, "In no range of starts was the path of the hand found to be the closest to that at a rigid wall."
     if any(part.verdict == REFUTED and part.name.startswith("theta") for part in claim.parts):
-        yield "In rotation, impulses usually do not come closest."
+        yield False, "In rotation, impulses usually do not come closest."
 
 
 def facts(evidence: Evidence) -> tuple[Fact, ...]:
     """Return the lines: energy, time, the paper's errors, what we miss ourselves, and what made the report."""
-    topics = {topic.key: topic for topic in evidence.topics}
-    found = [Fact(label, topics[key].answer, key) for label, key in (("Is it safe?", "exact-energy"),
-                                                                     ("Is it fast?", "haptic-rate"))
-             if key in topics and topics[key].computed]  # fmt: skip
-    if found and found[0].id == "exact-energy":
-        found[0] = replace(found[0], text=f"{found[0].text} {LIMIT}")
+    topics = {topic.key: topic for topic in evidence.topics if topic.computed}
+    found = []
+    if (energy := topics.get("exact-energy")) is not None:
+        found.append(Fact("Is it safe?", f"{energy.answer} {LIMIT}", energy.key, marks(energy)))
+    if (rate := topics.get("haptic-rate")) is not None:
+        step = _step(evidence)
+        said = f"A step of {PEG_STEP} takes {step.value}. " if step else ""
+        found.append(Fact("Is it fast?", said + rate.answer, rate.key, (*([step] if step else ()), *marks(rate))))
     if evidence.claims:
         found.append(Fact("Errors in the paper", ERRATA, "claims"))
-    answered = [topic for topic in evidence.topics if topic.answer]
-    missed = [f"{topic.title} ({topic.miss})" if topic.miss else topic.title
-              for topic in answered if topic.verdict in (MIXED, REFUTED)]  # fmt: skip
-    lacking = [topic.title for topic in answered if topic.verdict == NOT_COMPUTED]
-    if answered:
-        text = f"{'. '.join(missed)}." if missed else "Every finding of ours holds."
-        absent = f" Not computed: {', '.join(lacking)}." if lacking else ""
-        found.append(Fact("What we miss", text + absent, "verdict"))
+    if any(topic.answer for topic in evidence.topics):
+        found.append(_misses(evidence.topics))
     made = [evidence.provenance[name] for name in ("date", "cpu", "blas") if name in evidence.provenance]
     if "commit" in evidence.provenance:
         made.insert(0, f"commit {evidence.provenance['commit'][:12]}")
     if made:
         found.append(Fact("Made from", ", ".join(made), "provenance"))
     return tuple(found)
+
+
+def _step(evidence: Evidence) -> Mark | None:
+    """The time of a step of the scene that stands for all."""
+    table = evidence.inputs.get("effect_steps")
+    times = table.where(scene=PEG_STEP).column("step") if table is not None and table.rows else []
+    return Mark("time of a peg step", f"{times[0]:.2g} µs") if times else None
+
+
+def _misses(topics: tuple[Finding, ...]) -> Fact:
+    """The gravest misses, a line each; the others stand with their topics, further down the page."""
+    answered = [topic for topic in topics if topic.answer]
+    missed = sorted((topic for topic in answered if topic.verdict in (MIXED, REFUTED)), key=_gravity)
+    lines = [(_capital(topic.miss) or f"{topic.title}: {topic.verdict}", topic.key) for topic in missed]
+    rest = len(lines) - MISSES_SHOWN
+    shown = (*lines[:MISSES_SHOWN], *([(f"and {rest} more", "asked")] if rest > 0 else ()))
+    lacking = [topic.title for topic in answered if topic.verdict == NOT_COMPUTED]
+    said = ["Every finding of ours holds."] if not missed and not lacking else []
+    said += [f"Not computed: {', '.join(lacking)}."] if lacking else []
+    return Fact("What we miss", " ".join(said), "asked", items=shown)
+
+
+def _gravity(topic: Finding) -> int:
+    return GRAVEST.index(topic.key) if topic.key in GRAVEST else len(GRAVEST)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

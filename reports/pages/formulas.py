@@ -6,7 +6,7 @@ import re
 
 from markupsafe import Markup, escape
 
-from reports.pages.quantities import marked
+from reports.pages.quantities import Mark, marked
 
 _INLINE = re.compile(r"\$([^$]+)\$")
 _REFERENCE = re.compile(r"&#x([0-9A-Fa-f]+);")
@@ -29,18 +29,21 @@ def _shortened(mathml: str) -> str:
     return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
 
 
-def prose(text: str) -> Markup:
-    """Return text with its ``$...$`` formulas as MathML, powers of ten as people write them, the rest escaped."""
+def prose(text: str, marks: tuple[Mark, ...] = ()) -> Markup:
+    """Return text with its ``$...$`` formulas as MathML, powers of ten as people write them, the rest escaped.
+
+    marks : the quantities that it says
+    """
     pieces = _INLINE.split(text)
     return Markup("").join(
-        formula(piece, "inline") if number % 2 else _powers(piece) for number, piece in enumerate(pieces)
+        formula(piece, "inline") if number % 2 else _powers(piece, marks) for number, piece in enumerate(pieces)
     )
 
 
-def _powers(text: str) -> Markup:
+def _powers(text: str, marks: tuple[Mark, ...]) -> Markup:
     """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶, -1 has a true minus sign and >= is one sign."""
     signs = text.replace(">=", "≥").replace("<=", "≤")
-    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, marked(str(escape(signs))))))
+    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, marked(str(escape(signs)), marks))))
 
 
 def _power(match: re.Match[str]) -> str:

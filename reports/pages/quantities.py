@@ -1,40 +1,69 @@
-"""Quantities that sentences of several pages quote: each is marked where it is said, and has one text in the report."""
+"""Quantities that several pages quote: each is marked where it is said, with its verdict, and has one of both.
+
+A Part or Finding names the quantities that its sentence says; nothing here recognises words. So are the verdicts of
+findings and of their parts marked, which stand on more than one page.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import partial
+from typing import NamedTuple
 
-# name -> how sentences say it; the group is its value. To add a quantity: a line here.
-QUANTITIES: dict[str, re.Pattern[str]] = {
-    "impacts certified": re.compile(r"of (\d[\d,]*) impacts in [\d,]+ runs of the engine"),
-    "adverse impacts certified": re.compile(r"(\d[\d,]*)(?: random impacts)? drawn to provoke a gain"),
-    "time of a peg step": re.compile(r"peg(?:_corner| in the corner)(?:[^.;<]|\.\d){0,60}?(\d[\d.]*\s[µm]s)"),
-    "exponent of bodies": re.compile(r"bodies(?:[^.;<]|\.\d){0,80}?exponent(?:[^.;<\d]){0,40}(\d[\d.]*\d)"),
-    "hard cases of the engine": re.compile(r"stable on (\d+ of \d+) hard cases"),
-    "speed targets": re.compile(r"(\d+ of \d+) speed targets"),
-}
-_MARKED = re.compile(r'<data value="([^"]+)">([^<]*)</data>')
+from markupsafe import Markup, escape
+
+from verification.finding import QUANTITIES, Finding, Part, said_as
+
+_MARKED = re.compile(r'<data value="([^"]+)"(?: data-verdict="([^"]*)")?>([^<]*)</data>')
+_JUDGED = re.compile(r'data-of="([^"]+)" data-verdict="([^"]+)"')
 
 
-def marked(text: str) -> str:
-    """Return escaped text in which every quantity carries its name: ``<data value="impacts certified">12</data>``."""
-    for name, pattern in QUANTITIES.items():
-        text = pattern.sub(partial(_named, name), text)
+class Mark(NamedTuple):
+    """A quantity in a sentence: its name, its value as said there, and its verdict; "" where none is given."""
+
+    name: str
+    value: str
+    verdict: str = ""
+
+
+def marks(said: Part | Finding) -> tuple[Mark, ...]:
+    """Return what to mark in the sentence of a part, or in the answer of a finding.
+
+    The verdict is that of the part, and in an answer that of the part which has the quantity, else the finding's.
+    """
+    if isinstance(said, Part):
+        return tuple(Mark(name, value, said.verdict) for name, value in said.quantities)
+    judged = {name: part.verdict for part in said.parts for name, _ in part.quantities}
+    return tuple(Mark(name, value, judged.get(name, said.verdict)) for name, value in said.quantities)
+
+
+def marked(text: str, given: tuple[Mark, ...]) -> str:
+    """Return escaped text with its quantities: ``<data value="impacts certified" data-verdict="mixed">12</data>``."""
+    for name, value, verdict in given:
+        verdict = f' data-verdict="{verdict}"' if verdict else ""
+        text = said_as(str(escape(value))).sub(rf'<data value="{name}"{verdict}>\g<0></data>', text)
     return text
 
 
-def _named(name: str, found: re.Match[str]) -> str:
-    start, end = (edge - found.start() for edge in found.span(1))
-    said = found.group()
-    return f'{said[:start]}<data value="{name}">{said[start:end]}</data>{said[end:]}'
+def judged(key: str, verdict: str) -> Markup:
+    """Return the attributes that say whose verdict an element shows."""
+    return Markup('data-of="{}" data-verdict="{}"').format(key, verdict)
 
 
 def contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities that the pages quote with more than one text, with all of their texts."""
+    """Return what the pages give more than one value or verdict, with all of them."""
     said: dict[str, set[str]] = {}
     for page in pages.values():
-        for name, text in _MARKED.findall(page):
+        for name, verdict, text in _MARKED.findall(page):
             said.setdefault(name, set()).add(" ".join(text.split()))
+            if verdict:
+                said.setdefault(f"verdict on {name}", set()).add(verdict)
+        for name, verdict in _JUDGED.findall(page):
+            said.setdefault(f"verdict on {name}", set()).add(verdict)
     return {name: tuple(sorted(texts)) for name, texts in said.items() if len(texts) > 1}
+
+
+def unsaid(pages: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the quantities that no page says: a check of them would see nothing."""
+    said = {name for page in pages.values() for name, _, _ in _MARKED.findall(page)}
+    return tuple(name for name in QUANTITIES if name not in said)

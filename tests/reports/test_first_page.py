@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from reports.pages.first import LIMIT, answer, facts
+from reports.pages.first import LIMIT, MISSES_SHOWN, Answer, answer, facts
 from reports.pages.records import Evidence
 from verification.claims.c11_forces import LARGE
 from verification.finding import (
@@ -37,27 +37,41 @@ def topic(key: str, title: str, verdict: str, miss: str = "") -> Finding:
 
 def test_the_answer_is_made_from_the_claims() -> None:
     said = answer(Evidence(claims=(PATH, FORCES)))
-    assert "8 times as hard" in said and "median of 3 cases" in said  # 10, 3 and 8
-    assert "up to 0.9° of tilt" in said and "In rotation, impulses usually do not" in said and "gained" not in said
+    assert "8 times as hard" in said.holds and "median of 3 cases" in said.holds  # 10, 3 and 8
+    assert "up to 0.9° of tilt" in said.holds and "gained" not in said.holds
+    assert "Beyond that tilt" in said.fails and "In rotation, impulses usually do not" in said.fails
 
 
 def test_without_a_region_the_answer_says_that_there_is_none() -> None:
     parts = tuple(replace(part, region=None, verdict=REPRODUCED) for part in PATH.parts)
     said = answer(Evidence(claims=(replace(PATH, parts=parts),)))
-    assert "No range of starts" in said and "rotation" not in said and "times as hard" not in said
+    assert said.fails.startswith("In no range of starts") and "rotation" not in said.fails and said.holds == ""
 
 
 def test_nothing_is_said_of_what_was_not_computed() -> None:
-    assert answer(Evidence()) == "" and facts(Evidence()) == ()
+    assert answer(Evidence()) == Answer("", "") and facts(Evidence()) == ()
 
 
 def test_the_facts_name_our_own_misses() -> None:
     topics = (topic("exact-energy", "Energy", REPRODUCED), topic("engines", "Engines", MIXED, "a stack moves"),
               topic("haptic-rate", "The haptic rate", NOT_COMPUTED))
     made = {"commit": "c" * 40, "cpu": "P"}
-    said = {fact.label: fact.text for fact in facts(Evidence(topics=topics, provenance=made))}
-    assert "No impact of the engine ever gained energy." in answer(Evidence(topics=topics))
+    found = {fact.label: fact for fact in facts(Evidence(topics=topics, provenance=made))}
+    said = {label: fact.text for label, fact in found.items()}
+    assert answer(Evidence(topics=topics)).holds == "No impact of the engine ever gained energy."
     assert said["Is it safe?"] == f"answer of exact-energy {LIMIT}" and "Is it fast?" not in said
-    assert said["What we miss"] == "Engines (a stack moves). Not computed: The haptic rate."
+    assert found["What we miss"].items == (("A stack moves", "engines"),)
+    assert said["What we miss"] == "Not computed: The haptic rate."
     assert said["Made from"] == "commit cccccccccccc, P" and "Errors in the paper" not in said
     assert "Every finding of ours holds." in {fact.text for fact in facts(Evidence(topics=topics[:1]))}
+
+
+def test_the_gravest_misses_come_first_and_the_rest_are_counted() -> None:
+    """What gains energy before what is slow, whatever the order of the topics; no clause: the title."""
+    given = ("haptic-rate", "mechanics", "stability", "complementarity", "scene-ledger", "engines", "hard-cases")
+    topics = tuple(topic(key, f"Title of {key}", MIXED, "" if key == "engines" else f"miss of {key}") for key in given)
+    (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "What we miss")
+    assert len(fact.items) == MISSES_SHOWN + 1
+    assert fact.items[:3] == (("Miss of hard-cases", "hard-cases"), ("Title of engines: mixed", "engines"),
+                              ("Miss of scene-ledger", "scene-ledger"))  # fmt: skip
+    assert fact.items[-1] == ("and 2 more", "asked") and fact.text == ""

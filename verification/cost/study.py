@@ -43,6 +43,7 @@ from verification.finding import (
     Failure,
     Finding,
     Part,
+    Quantities,
     Row,
     Table,
     attempt,
@@ -146,14 +147,15 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
         subject = say.__name__.removeprefix("_say_")
         parts += attempt(f"sentences on {subject}", lambda say=say: list(say(tables)), failures) or []  # type: ignore[misc]
     met = sum(part.verdict == REPRODUCED for part in parts)
-    answer = f"{met} of {len(parts)} speed targets met"
+    targets = ("speed targets", f"{met} of {len(parts)}")
+    answer = f"{targets[1]} speed targets met"
     for contacts, _, _, ratio in list(_printed_over_factored(tables))[-1:]:
         answer += f"; with {contacts} contacts the factored impact is {ratio:.0f} times as fast as the printed formula"
-    return finding_of(KEY, TITLE, QUESTION, f"{answer}.", parts, tables, failures)
+    return finding_of(KEY, TITLE, QUESTION, f"{answer}.", parts, tables, failures, (targets,))
 
 
-def _part(sentence: str, met: bool, timed: bool = True) -> Part:
-    return Part(sentence, REPRODUCED if met else MIXED, timed=timed)
+def _part(sentence: str, met: bool, timed: bool = True, quantities: Quantities = ()) -> Part:
+    return Part(sentence, REPRODUCED if met else MIXED, timed=timed, quantities=quantities)
 
 
 def _missing(sentence: str) -> Part:
@@ -269,7 +271,7 @@ def _say_bodies(tables: Tables) -> Iterator[Part]:
     yield _part(
         f"A step of {last['bodies']} free bodies takes {last['step']:.3g} µs; from {LEAST_BODIES} bodies on its time "
         f"grows as their number to the power {power:.2f}. Asked for: at most {LARGEST_EXPONENT['bodies']:g}.",
-        power <= LARGEST_EXPONENT["bodies"])  # fmt: skip
+        power <= LARGEST_EXPONENT["bodies"], quantities=(("exponent of bodies", f"{power:.2f}"),))  # fmt: skip
     tested = power_law([row["bodies"] for row in rows], [row["pairs tested"] for row in rows])
     yield _part(
         f"With the broad phase the pairs tested grow as the number of bodies to the power {tested:.2f}: "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from iapb.run import Run
@@ -101,8 +101,10 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
     groups: dict[tuple[str, str], list[EngineRecord]] = {}
     for record in present:
         groups.setdefault((record.engine, record.choice), []).append(record)
-    parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED, miss=_our_misses(group))
-             for group in groups.values()]  # fmt: skip
+    parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED) for group in groups.values()]
+    ours = [k for k, group in enumerate(groups.values()) if _our_misses(group)]
+    if ours:  # one clause on both settings
+        parts[ours[0]] = replace(parts[ours[0]], miss=_our_misses(present))
     absent = sorted({record.title for record in records if record.missing})
     if absent:
         said = f"Not installed, hence not compared: {', '.join(absent)}."
@@ -123,15 +125,23 @@ def _misses(records: Sequence[EngineRecord]) -> str:
     missed: dict[str, list[str]] = {}
     for record in sorted(records, key=lambda record: (not record.title.endswith("(ours)"), record.title)):
         if verdict(record) != MET:
-            at = "own settings" if record.choice == OWN else "1 ms"
-            missed.setdefault(record.title, []).append(f"{record.scene.replace('_', ' ')} at {at} ({_worst(record)})")
+            missed.setdefault(record.title, []).append(
+                f"{record.scene.replace('_', ' ')} {_at(record)} ({_worst(record)})")
     said = "; by ".join(f"{title}: {', '.join(each)}" for title, each in missed.items())
     return f"Missed by {said}." if missed else ""
 
 
 def _our_misses(records: Sequence[EngineRecord]) -> str:
-    ours = [record for record in records if record.title.endswith("(ours)")]
-    return _misses(ours).removeprefix("Missed by ").removesuffix(".")
+    """What ours misses, a clause per scene; "" where it misses nothing."""
+    missed: dict[str, list[str]] = {}
+    for record in records:
+        if record.title.endswith("(ours)") and verdict(record) != MET:
+            missed.setdefault(record.scene.replace("_", " "), []).append(f"{_worst(record)} {_at(record)}")
+    return "; ".join(f"{scene} {', '.join(each)}" for scene, each in missed.items())
+
+
+def _at(record: EngineRecord) -> str:
+    return "at own settings" if record.choice == OWN else "at 1 ms"
 
 
 def _met(records: Sequence[EngineRecord]) -> int:

@@ -62,7 +62,8 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     ours = {case.title: _outcome(case) for case in tried}
     failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
-    sentence = (f"The engine is stable on {len(ours) - len(failing)} of {len(ours)} hard cases whose answer is known."
+    stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
+    sentence = (f"The engine is stable on {stable[1]} hard cases whose answer is known."
                 + (f" It fails on: {'; '.join(failing)}." if failing else "")
                 + (f" {skipped} were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
@@ -70,8 +71,10 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     rows = [{"case": case.title, "kind": case.details["kind"], **row}
             for case in tried for row in case.tables[case.key].records()]  # fmt: skip
     table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all but the notes
-    parts = (Part(sentence, verdict, miss="; ".join(failing)),)
-    return finding_of("hard-cases", "Hard cases", question, sentence, parts, {"every method": table}, failures)
+    others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
+    parts = (Part(sentence, verdict, miss="".join(failing[:1]) + others, quantities=(stable,)),)
+    tables = {"every method": table}
+    return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))
 
 
 def _outcome(case: Finding) -> str:
