@@ -75,7 +75,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count():
     assert "reproduced where tilt ≤ 0.015 rad" in first and "30 of 40; the region is 5% of the tested range" in first
     line = first.split("the one that fails")[1].split("</li>")[0]
     assert "refuted" in line and "1 of 40, 7 cannot tell" in line
-    assert "1 refuted" in first.split("their 11 parts")[1].split("</p>")[0]
+    assert "1 refuted" in page.split("11 parts:")[1].split("</p>")[0]
     assert "more" not in first.split('<ul class="parts">')[1]
 
 
