@@ -84,35 +84,34 @@ class Shown:
 FIGURES = (
     Shown(7, "Hand trajectories of the four worlds", UNLIMITED, False,
           "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
-          "line (“ideal”) is the rigid world. Look at which curve leaves it at the first contact, and which come "
-          "back to it. The device can apply any force here. Of the axes that the paper printed we know one range, "
-          "0 to −2.5; its unit, the other axis and the start of the peg are lost. Our axes are therefore in mm and "
-          "degrees. The fifth and sixth panel show the distance from ideal at the same time, in position and in angle. "
-          "The last panel uses the printed range, in mm, for the depth of the hand past the place where the rigid "
-          "world stops it."),
+          "line is the ideal world, with rigid contact. Look at which curves leave it at the first contact and which "
+          "return to it. The device can apply any force. Of the paper's axes one range is known, 0 to −2.5; its unit, "
+          "the other axis and the start of the peg are not. Our axes are therefore in mm and degrees. The fifth and "
+          "sixth panel show the distance from ideal at each instant, in position and in angle. The last panel uses the "
+          "printed range, in mm, for the depth of the hand beyond the place where the ideal world stops it."),
     Shown(8, "Forces that the hand feels", UNLIMITED, True,
-          "At the first contact: the worlds with impulses answer with blows of one step each, penalties with a rise "
-          "over many. Then the whole run, and what remains between blows, to be compared with the 0.32 N that balances "
-          f"the hand. {_LOST_AXES}"),
-    Shown(9, "Three ways to live with a weak device", STRATEGIES, False,
-          "The device can apply 15 N and 1 N m only. Saturating clips what the device gets, so that tool and device "
-          "come apart; scaling weakens the blow for both; spreading repeats the scaled blow in the next steps. The "
-          f"fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
+          "At the first contact the worlds with impulses render pulses of one step each, while the penalty force rises "
+          "over many steps. Further panels show the whole run, and the small forces between the pulses, to be compared "
+          f"with the 0.32 N that balance the hand. {_LOST_AXES}"),
+    Shown(9, "Three ways to respect the limits of the device", STRATEGIES, False,
+          "The device can apply at most 15 N and 1 N m. Saturating clips the impulse for the device only, so tool and "
+          "device separate. Scaling reduces the impulse for both. Spreading repeats the scaled impulse in the next "
+          f"steps. The fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
     Shown(10, "Hand trajectories with a limited device", LIMITED, False,
-          "As Figure 7, but IAPB spreads its impulses over as many steps as the 15 N and 1 N m of the device ask "
-          "for. The fifth and sixth panel show the distance from ideal, the last how deep the virtual peg sinks into "
-          f"the walls; rigid worlds do not. {_LOST_AXES}"),
+          "As Figure 7, but IAPB spreads each impulse over as many steps as the limits of 15 N and 1 N m require. The "
+          "fifth and sixth panel show the distance from ideal, the last the penetration of the virtual peg, which is "
+          f"zero in the ideal world and in CBuc. {_LOST_AXES}"),
     Shown(11, "Forces with a limited device", LIMITED, True,
           "As Figure 8 with spread impulses. At the first contact IAPB now takes several steps of at most 15 N; "
           f"compare them with the slow rise of the penalty force. {_LOST_AXES}"),
     Shown(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
-          "The paper measured these on hardware; here the device is emulated at 512 Hz with the delay, quantisation "
-          "and damping that the scene states. Look at how often each curve bounces, and when it comes to rest. "
-          f"{_LOST_AXES}"),
+          "The paper measured these trajectories on hardware. Here the device is emulated at 512 Hz, with the delay, "
+          "quantisation and damping given in the scene. Look at how often each curve bounces and when it comes to "
+          f"rest. {_LOST_AXES}"),
     Shown(13, "Emulated device at 512 Hz: forces", DEVICE, True,
           "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
-          "within the limits of the device. The fine chatter is the resolution of the encoders, felt through the "
-          f"damping of the position channel. {_LOST_AXES}"),
+          "within the limits of the device. The fine chatter comes from the resolution of the encoders, amplified by "
+          f"the damping of the position channel. {_LOST_AXES}"),
 )  # fmt: skip
 
 
@@ -290,7 +289,7 @@ def _force_panels(key: str, runs: Mapping[str, Run], k: int, title: str, label: 
     unit = label[label.index("[") + 1 : -1]
     views: dict[str, dict[str, Any]] = {
         f"at the first contact: {sum(_AT_CONTACT):g} s": {"first": start, "last": start + round(sum(_AT_CONTACT) / dt)},
-        "the whole run": {}, f"what remains between blows: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
+        "the whole run": {}, f"between impulses: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
     }  # fmt: skip
     for number, (view, shown) in enumerate(views.items()):
         svg = _over_time(f"{key}-{k}{'cam'[number]}", runs, lambda run: run.device_force[:, k], label,
@@ -316,11 +315,11 @@ _SIZE = (4.5, 3.8)  # inches
 
 @recipe(
     "hero", "Four worlds in one corner", *UNLIMITED.values(), section="hero",
-    caption="A constant force pushes a tilted peg into a corner; first picture: its outlines in the rigid world, from "
-    "start to end. Second picture, magnified: where the hand goes, from shortly before the first contact. The closer a "
-    "curve is to the ideal one, the more the wall feels like a rigid wall. This start, tilted by 0.015 rad, sits at "
-    "the edge: up to there IAPB is the closest in x and y, beyond it often not, and in the angle rarely. The map of "
-    "claim C10 below shows every start.",
+    caption="A constant force pushes a tilted peg into a corner. First picture: outlines of the peg in the ideal world "
+    "(rigid contact), from start to end. Second picture, magnified: the path of the hand from shortly before the first "
+    "contact. The closer a path is to the ideal one, the more the wall feels rigid. The peg starts with a tilt of "
+    "0.015 rad. Up to this tilt IAPB is closest to ideal in x and y; for larger tilts often not, and in the angle "
+    "rarely. The map of claim C10 below shows every start.",
 )  # fmt: skip
 def hero(*given: Run) -> Drawn:
     """Draw the picture from the runs named in UNLIMITED."""

@@ -16,8 +16,9 @@ METHOD, CONDITION, GAIN, SHARE = "method", "condition of M from", "largest relat
 
 @recipe(
     "energy-gains", "Does rounding make energy?", "energy-gains/impacts", section="properties",
-    caption="The worst of all random impacts in each decade of κ(M). First picture: the gain itself; second: the gain "
-    "as a share of the bound 10 d ε √κ that the factored form promises. Above the dashed line the promise is broken.",
+    caption="The largest energy gain of all random impacts in each decade of the condition number κ(M). First picture: "
+    "the relative gain. Second picture: the gain divided by the bound 10 d ε √κ of the factored form; above the dashed "
+    "line a method exceeds this bound.",
 )  # fmt: skip
 def energy_gains(numbers: Table) -> Drawn:
     """Draw both panels from the table of the bulk study."""

@@ -19,11 +19,11 @@ PANELS = (("energy error", "energy error"), ("momentum error", "momentum error")
 
 @recipe(
     "engine-errors", "Energy, momentum and overlap, by engine", "engines/errors", section="engines",
-    caption="A row for each engine and choice of settings, a column for each scene. First picture: by how much the "
-    "energy at the end is off, as a share of the start's (resting scenes: how far it rose). Second: the momentum at "
-    "the end, as a share of all m |v|; a scene at rest has none. Third: the deepest overlap, as a share of the bodies' "
-    "size. The numbers are powers of ten; ε is rounding or nothing. A cross is a run that failed, hatching an engine "
-    "that is not installed.",
+    caption="One row per engine and choice of settings, one column per scene. First picture: error of the energy at "
+    "the end, relative to the energy at the start (resting scenes: its largest rise). Second: error of the momentum at "
+    "the end, relative to the sum of m |v|; resting scenes have none. Third: the deepest overlap, relative to the "
+    "bodies' size. The numbers are powers of ten; ε means rounding or zero. A cross: the run failed. Hatching: the "
+    "engine is not installed.",
 )  # fmt: skip
 def engine_errors(numbers: Table) -> Drawn:
     """Draw the three tables."""

@@ -17,9 +17,9 @@ _BOARD = np.zeros(2), np.array([8.2, 5.2])  # corners, in arbitrary units
 
 @recipe(
     "fig05", "Two ways to hold the tool, and Table I", "scene/peg_corner", number="Figure 5", section="couplings",
-    caption="The four-channel controller sends both forces straight across (red) and lets a spring and damper keep the "
-    "two positions together (blue). The unilateral coupler is a spring and damper only (green), and only while the "
-    "tool is in contact: the hand feels the wall through it, never the wall itself.",
+    caption="The four-channel controller transmits both forces directly (red); a spring and damper keep the positions "
+    "of device and tool together (blue). The unilateral coupler is only a spring and damper (green), active while the "
+    "tool is in contact: the hand feels the wall through it, never directly.",
 )  # fmt: skip
 def couplings(scene: Mapping[str, Any]) -> Drawn:
     """Draw both diagrams; the table repeats the scene's gains."""

@@ -38,21 +38,23 @@ class Playback:
 FILMS = {
     "film-corner": Playback(
         "The corner, played back", UNLIMITED,
-        "The peg of Figure 7 in four worlds at once, slowed down. The rigid world stops at the walls in blows; IAPB "
-        "does so at each new contact, then gives a little; penalties alone let a corner dive into the wall.",
+        "The peg of Figure 7 in four worlds, slowed down. In the ideal world impulses stop the peg at the walls. In "
+        "IAPB an impulse stops it at each new contact, and the springs then yield slightly. With penalties alone (PB) "
+        "a corner penetrates the wall.",
         "hero"),
     "film-hole": Playback(
         "The tight hole, played back", {"IAPB": "hole/IAPB"},
-        "The peg is in the hole with little air on either side; it meets both sides and the end."),
+        "The peg is in the hole with little clearance. It touches both sides and the end."),
     "film-two-link-arm": Playback(
         "Two-link arm against an obstacle, played back", {"IAPB": "plane/two_link_arm"},
-        "The arm of Figure 2, case A: it turns into the disc at its left, and is struck once, at the start."),
+        "The arm of Figure 2, case A: it turns into the disc at its left and collides once, at the start."),
     "film-cradle": Playback(
         "A row of touching balls, played back", {"IAPB": "plane/cradle"},
-        "One ball strikes four that stand 1 mm apart: the blow is handed on, and the last ball leaves alone."),
+        "One ball strikes a row of four with gaps of 1 mm. Each ball passes its momentum on, and the last ball leaves "
+        "alone."),
     "film-pushing": Playback(
         "An arm pushes what it holds, played back", {"IAPB": "group/IAPB"},
-        "A linkage and loose bodies that touch one another answer an impact as one group."),
+        "A linkage and free bodies that touch one another form one contact group and resolve an impact together."),
     "film-peg-hole-space": Playback(
         "Peg and plate in space, played back", {"IAPB": "space/peg_hole"},
         "A peg with a collar goes into a square hole among loose boxes and balls."),
@@ -61,7 +63,7 @@ FILMS = {
         "The arm meets a post, a knob and a table, and knocks the loose block away."),
     "film-tumbling": Playback(
         "A tumbling body, played back", {"IAPB": "space/tumbling_body"},
-        "Spun about its middle axis, it turns over again and again; nothing touches it."),
+        "The body spins about its axis of middle inertia and turns over again and again. Nothing touches it."),
 }  # fmt: skip
 
 

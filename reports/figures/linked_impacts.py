@@ -54,11 +54,12 @@ def outcomes(numbers: Table, problem: str) -> list[Outcome]:
 
 
 @recipe(
-    "linked-impacts", "A blow to balls that touch", "mechanics/linked impacts", section="mechanics",
-    caption="Arrows are velocities after an elastic blow of 1 m/s from the left. With relative rows (12), and event by "
-    "event, energy and momentum are kept, and yet the outcomes differ: which contacts are taken to collide decides. "
-    "With per-body rows, (13) and (14), the striker comes back as from a wall and the others never learn of it: the "
-    "energy is right, the momentum is not. The last panel has the cradles of two to seven balls.",
+    "linked-impacts", "An impact on touching balls", "mechanics/linked impacts", section="mechanics",
+    caption="A ball strikes from the left at 1 m/s, elastically; arrows are velocities after the impact. With relative "
+    "rows (12), solved at once or event by event, energy and momentum are conserved, yet the outcomes differ: they "
+    "depend on which contacts enter the collision. With per-body rows (13)-(14) the striking ball rebounds as from a "
+    "wall and the other balls stay at rest: energy is conserved, momentum is not. The last panel shows cradles of two "
+    "to seven balls.",
 )  # fmt: skip
 def linked_impacts(numbers: Table) -> Drawn:
     """Draw both problems, and what the last ball of a cradle gets."""
@@ -89,7 +90,7 @@ def _cradle(found: Sequence[Outcome]) -> str:
         axes.set(xlim=(-8.6, 12.4), ylim=(-step * len(found) + 0.4, 2.5))
         for x, text in ((-8.4, "rows taken, or order"), (9.0, "energy"), (11.0, "momentum")):
             note(axes, (x, 2.2), text, ha="left" if x < 0 else "center", color=MUTED, fontsize=8.5)
-        note(axes, (-8.4, step), "before the blow", ha="left")
+        note(axes, (-8.4, step), "before the impact", ha="left")
         before = tuple((1.0 if ball == 0 else 0.0, 0.0) for ball in range(len(found[0].velocity)))
         _balls(axes, [(pitch * k, step) for k in range(len(before))], before, INK, 1.7)
         for number, outcome in enumerate(found):
@@ -172,5 +173,5 @@ def _last_ball(numbers: Table) -> str:
 
 def _words(found: Sequence[Outcome]) -> str:
     lost = [outcome for outcome in found if abs(outcome.momentum) > ROUNDING]
-    return (f"{len(found)} outcomes of one blow; {len(found) - len(lost)} keep energy and momentum, "
-            f"{len(lost)} by per-body rows keep the energy only.")  # fmt: skip
+    return (f"{len(found)} outcomes of one impact; {len(found) - len(lost)} conserve energy and momentum, "
+            f"{len(lost)} by per-body rows conserve energy only.")  # fmt: skip

@@ -22,11 +22,11 @@ _SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditio
 @recipe(
     "coordinate-invariance", "The same impact in other coordinates", "mechanics/coordinate invariance",
     section="mechanics",
-    caption="An arm is struck; the outcome in joint angles is compared with the one computed in other coordinates and "
-    "brought back. First panel: the elbow straightens from left to right. At the singular pose the place of the "
-    "hand is no coordinate any more: bound (dashed) and error climb on the way. Absolute angles pass through it "
-    "unharmed; their last mark is the straight arm itself. Second panel: every case, nearly dependent rows among "
-    "them; below the dashed line the bound C ε κ/σ_min is kept.",
+    caption="An impact on an arm is solved in joint angles and in other coordinates; the error is the difference after "
+    "transforming back. First panel: the elbow straightens from left to right. At the singular pose the position of "
+    "the hand is no valid coordinate, and on the way there bound (dashed) and error grow. Absolute angles stay "
+    "accurate; their last mark is the straight arm itself. Second panel: every case, including nearly dependent rows; "
+    "below the dashed line the error is below the bound C ε κ/σ_min.",
 )  # fmt: skip
 def coordinate_invariance(numbers: Table) -> Drawn:
     """Draw the way through the singular pose, and every case against its bound."""
@@ -91,10 +91,10 @@ _INTEGRATORS = {
 
 @recipe(
     "tumbling-drift", "A free body tumbles", "mechanics/tumbling", section="mechanics",
-    caption="A body turns over and over near its middle axis, with no force on it; its motion is known in closed form. "
-    "Each mark is a run of two seconds; the dashed lines have the slope that the integrator declares. Runge-Kutta 4 "
-    "adds up its stages in one displacement and declares order 2 on rotations for that. Its energy needs no attitude: "
-    "it falls as fast as by the commutator-free method, which keeps order 4 (the marks coincide).",
+    caption="A free body tumbles about its axis of middle inertia; its motion is known in closed form. Each mark is a "
+    "run of two seconds. The dashed lines have the slope of the order that the integrator declares. Runge-Kutta 4 adds "
+    "its stages as one rotation vector, so it declares order 2 for rotations. Its energy drift does not depend on the "
+    "attitude and coincides with that of the commutator-free method, which has order 4.",
 )  # fmt: skip
 def tumbling_drift(numbers: Table) -> Drawn:
     """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
@@ -125,10 +125,10 @@ _DURATION = 2.0  # [s]
 @recipe(
     "socket-collisions", "A ball rolls in a faceted socket", "mechanics/false collisions in time",
     "mechanics/false collisions", section="mechanics",
-    caption="In the round socket that the facets stand for, the ball touches once and never collides again: every "
-    "further collision is false. Coherence keeps the contact of the next facet from being new; clustering alone leaves "
-    "one contact that jumps, new each time. Last panel: at low damping the ball bounces off the edges, and what comes "
-    "back is new to both filters.",
+    caption="The facets approximate a round socket, in which the ball collides once and then rolls. Every further "
+    "collision is false. With temporal coherence the contact on the next facet is not new. Clustering alone leaves one "
+    "contact, which jumps from facet to facet and is new each time. Last panel: at low damping the ball bounces off "
+    "the edges, and its next contact is new to both filters.",
 )  # fmt: skip
 def socket_collisions(times: Table, counts: Table) -> Drawn:
     """Draw counts and losses in time, and the counts over damping."""

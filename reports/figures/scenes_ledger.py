@@ -80,11 +80,11 @@ def _strip(name: str, numbers: Table) -> Strip:
 @recipe(
     "every-scene", "Every scene at a glance", "scene-ledger/contact", "scene-ledger/books over time",
     section="scene-ledger",
-    caption="A row per scene, time from left to right. The outline is all energy so far: at the start, and put in by "
-    "the hand and the coupling. Under it lies where that energy is: still in motion, in height and springs, or lost in "
-    "impacts, contact damping and friction. Where the colours do not reach the line the steps in time swallowed "
-    "energy; where they stand above it they made some up. Ticks under a strip are impacts. Right: the deepest overlap, "
-    "on a logarithmic scale.",
+    caption="One row per scene, time from left to right. The outline is the energy at the start plus the work of hand "
+    "and coupling so far. The colours show where this energy is: kinetic, potential and in springs, or lost in "
+    "impacts, contact damping and friction. Where the colours stay below the outline, time stepping lost energy; where "
+    "they exceed it, time stepping created energy. Ticks under a strip are impacts. Right: the deepest overlap, on a "
+    "logarithmic scale.",
 )  # fmt: skip
 def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
     """Draw every row."""

@@ -22,7 +22,7 @@ _LONGEST = 0.22  # arrow length, as a share of the picture
     "fig01", "What acts on a contact group", "group/IAPB", number="Figure 1", section="idea",
     caption="An arm pushes a block against a wall: one contact group, two instants of one run. When a contact is new, "
     "all approaching contacts of the group share one collision (blue: impulses). While contacts last, springs and "
-    "dampers (blue: forces) pass the hand's push (red) on. The longest blue arrow of a picture sets its scale.",
+    "dampers (blue: forces) transmit the hand force (red). The longest blue arrow of a picture sets its scale.",
 )  # fmt: skip
 def contact_forces(run: Run) -> Drawn:
     """Draw the hardest collision and the last resting instant of the run."""
@@ -90,8 +90,8 @@ _WALL = 0.008  # [m], thickness of the walls shown
 
 @recipe(
     "fig04", "The peg before the corner", "scene/peg_corner", number="Figure 4", section="idea",
-    caption="Drawn from the scene file, to scale. The paper's frame has x to the left and y down. It gives size, mass "
-    "and force; where the peg starts, and how it is tilted, is ours and is varied in the claims.",
+    caption="Drawn from the scene file, to scale. The paper's frame has x to the left and y down. The paper gives "
+    "size, mass and force of the peg. Its start and tilt are our choice and vary in the claims.",
 )  # fmt: skip
 def peg_corner(scene: Mapping[str, Any]) -> Drawn:
     """Draw the peg at its start, from the resolved scene."""
@@ -140,9 +140,8 @@ def _list(values: Iterable[float]) -> str:
 
 @recipe(
     "scenes", "The other scenes", "scene/peg_hole", "scene/wall_1d", section="idea",
-    caption="The tight hole, where the peg meets both sides and the end at once: six collisions, three of them "
-    "redundant. And a mass before a wall, the one-dimensional case on which the stability of haptic walls is usually "
-    "studied.",
+    caption="The tight hole, in which the peg touches both sides and the end at once: six collisions, three of them "
+    "redundant. Beside it a mass before a wall, the usual one-dimensional model for the stability of haptic walls.",
 )  # fmt: skip
 def gallery(*scenes: Mapping[str, Any]) -> Drawn:
     """Draw every scene at its start."""

@@ -61,11 +61,11 @@ class Piece:
 
 @recipe(
     "scenes-space", "The scenes in space", *(sight.run for sight in SIGHTS), section="scene-ledger",
-    caption="Each scene at its start, under way and at its end; bodies and walls are drawn see-through. First a peg "
-    "with a collar goes into a square hole in a plate, and strikes the loose boxes and balls about the mouth. Then a "
-    "six-axis arm, pulled at its tool along the red arrow, meets a post, a knob and a table, and knocks a loose block "
-    "away (no gravity: it flies on). Last a free body spins about its middle axis and turns over again and again; it "
-    "has no shape, so the even box of its mass and inertia is drawn, with the same corner marked in every picture.",
+    caption="Each scene at its start, midway and at its end; bodies and walls are transparent. First: a peg with a "
+    "collar goes into a square hole in a plate and strikes loose boxes and balls around it. Second: a six-axis arm is "
+    "pulled at its tool along the red arrow, touches a post, a knob and a table, and pushes a loose block away (there "
+    "is no gravity). Third: a free body spins about its axis of middle inertia and turns over again and again. It has "
+    "no shape; the picture shows the uniform box with its mass and inertia, with one corner marked.",
 )  # fmt: skip
 def scenes_space(*runs: Run) -> Drawn:
     """Draw every scene at its moments."""

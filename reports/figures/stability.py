@@ -23,9 +23,10 @@ _SETTLES = "+"
 
 @recipe(
     "stability-map", "Walls that come to rest", "stability/maps", "stability/dampings", section="stability",
-    caption="Each place is a wall, stiffer to the right, more damped upwards; the lowest row has no damping. Look for "
-    "the blue rings: walls that only come to rest with impulses, mostly stiff ones with little damping. No mark: "
-    "neither law holds it. Walls under the dashed line are passive for every hand; a device without damping has none.",
+    caption="Each mark is a wall: stiffness grows to the right, damping upwards, and the lowest row has no damping. "
+    "Look for the blue rings: walls that are stable only with impulses, mostly stiff ones with little damping. No "
+    "mark: the wall is stable with neither law. Walls under the dashed line are passive for every hand; with an "
+    "undamped device no wall is.",
 )  # fmt: skip
 def stability_map(table: Table, dampings: Table) -> Drawn:
     """One panel per loop."""
@@ -60,9 +61,9 @@ _FELT = ("rate-hardness", "settles after", "penetration")
 
 @recipe(
     "hardness", "How hard a wall feels", "stability/hardness", section="stability",
-    caption="A device without damping at 512 Hz with ideal sensors, walls with the paper's damping of 50 N s/m. The "
-    "first rise of the force is what feels hard: with impulses it does not depend on the wall's stiffness. Where a "
-    "curve ends, the contact never comes to rest.",
+    caption="A device without damping at 512 Hz with ideal sensors; walls with the paper's damping of 50 N s/m. "
+    "Perceived hardness depends on the first rise of the force (rate-hardness). With impulses it does not depend on "
+    "the wall's stiffness. Where a curve ends, the mass never comes to rest.",
 )  # fmt: skip
 def hardness(table: Table) -> Drawn:
     """Three panels over the stiffness."""

@@ -64,7 +64,7 @@ def arm_energies() -> dict[str, Floats]:
 @recipe(
     "fig02", "The two-link arm", "scene/two_link_arm_a", "scene/two_link_arm_b", number="Figure 2", section="idea",
     caption="Drawn from the scene files: two uniform links of 1 m and 1 kg, straight, both joints turning at 1 rad/s. "
-    "The blow comes at A or at B, perpendicular to the second link and without friction.",
+    "The collision is at A or at B, perpendicular to the second link and without friction.",
 )  # fmt: skip
 def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
     """Draw the arm from the resolved scene; the two differ in where it is struck."""
@@ -110,9 +110,9 @@ def _blow(axes: Any, frame: Placement, name: str, distance: float) -> None:
 
 @recipe(
     "fig03", "What one collision takes from the two-link arm", "arm_energies", number="Figure 3",
-    caption="The same blow takes part of the energy at A and, for uniform rods, all of it at B: there the contact "
-    "point is the centre of percussion of the motion. Towards e = 1 every curve returns to its KE₀. The paper "
-    "prints neither the mass distribution nor values; its axis (0 to 6) leaves both readings open.",
+    caption="The same plastic collision takes part of the energy at A and, for uniform rods, all of it at B, because B "
+    "is the centre of percussion of the motion. At e = 1 no energy is lost. The paper gives neither the mass "
+    "distribution nor values; its energy axis (0 to 6) fits uniform rods and point masses.",
 )  # fmt: skip
 def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
     """Draw the figure from the table of `arm_energies`."""

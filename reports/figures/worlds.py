@@ -24,10 +24,10 @@ _PANELS = {
 
 @recipe(
     "worlds", "One scene in several worlds", "worlds", "over time",
-    caption="Distances from the reference world in the kinetic metric, for the whole mass: root mean square "
-    "displacement and velocity of its particles, and the impulse of all contacts so far: their resultant where the "
-    "mass matrix is constant, else the sum of their generalized impulses. Then the energy, the deepest penetration "
-    "since the instant before, and the processor time of a step.",
+    caption="Distances from the world to compare with, in the kinetic metric: root mean square displacement and "
+    "velocity over the whole mass, and the impulse of all contacts so far (their resultant if the mass matrix is "
+    "constant, else the sum of their generalized impulses). Further panels: energy, deepest penetration since the "
+    "previous instant, and CPU time of a step.",
 )  # fmt: skip
 def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""
