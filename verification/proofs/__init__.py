@@ -107,9 +107,9 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
     columns = "statement", "holds", "own kernel", "SymPy", "Coq", "wrong twins"
     table = table_of(tuple(map(Column, columns)), rows)
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
-    sentence = (f"{proved} of {len(rows)} statements are proved by certificates that a machine expanded; "
-                f"SymPy confirms {sum(one.sympy == YES for one in records)}; "
-                f"{twins} deliberately altered statements are refuted by exact counterexamples.")
+    sentence = (f"{proved} of {len(rows)} statements are proved: a program expands the certificate of every step. "
+                f"SymPy confirms {sum(one.sympy == YES for one in records)} of the proofs. Exact counterexamples "
+                f"refute {twins} deliberately altered statements.")
     parts = [Part(sentence, REPRODUCED if proved == len(rows) else REFUTED)]
     tables = {"statements": table}
     if development:
@@ -119,9 +119,9 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
         asked = [one for one in development if one.holds is not None]
         lost = [one for one in development if one.coq == NO_ANSWER]
         accepted = sum(one.holds is True for one in asked)
-        told = (f"Coq proves {accepted} of {len(development)} theorems about the checker and the arithmetic of the "
-                "last step, with no axioms but those of the real numbers and, in Flocq, of classical logic. "
-                f"{ARGUED}" if asked or lost else
+        told = (f"Coq proves {accepted} of {len(development)} theorems about the exact checker and the floating-point "
+                "arithmetic of the resolver's last step. Their only axioms are those of the real numbers and, through "
+                f"Flocq, classical logic. {ARGUED}" if asked or lost else
                 f"Coq is not installed: {len(development)} theorems about the code were not checked here.")  # fmt: skip
         if lost:
             told = f"{told} Of {len(lost)} theorems Coq did not compile the file: {lost[0].error}"

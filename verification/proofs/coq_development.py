@@ -29,17 +29,17 @@ KNOWN_AXIOMS = frozenset({
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
 SAYS = {
-    "check_sound": "where the exact checker says yes, wᵀMw ≤ vᵀMv over the real numbers",
-    "check_complete": "where it says no of lists that fit, wᵀMw > vᵀMv",
+    "check_sound": "if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers",
+    "check_complete": "if it rejects lists of the right lengths, wᵀMw > vᵀMv",
     "two_sum_exact": "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow",
-    "two_product_exact": "two_product(a, b) is a b exactly where it is 0 or at least 2⁻⁹⁶⁹",
-    "two_product_underflow": "two_product(a, b) is within 7/2 of 2⁻¹⁰⁷⁴ of a b always",
-    "compensated": "the running bound of a double-double sum of n terms, by induction on n",
-    "loop_error": "either loop of `gain`, a double-double sum of n products of pairs: its error and its size",
-    "gain_error": "`gain` as a whole: |Γ − (high + low)| is at most the bounds of its rows and of the sum over them",
-    "entry_fits": "what the code puts in, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), is exact and meets the hypotheses of gain_error",
-    "sign_kept": "a sum that is at most 0 as computed is at most 0",
-    "accepted_never_gains": "high + (low + radius) ≤ 0 as computed, and a radius that bounds the error: Γ ≤ 0",
+    "two_product_exact": "two_product(a, b) is exactly a b if a b is 0 or its magnitude is at least 2⁻⁹⁶⁹",
+    "two_product_underflow": "two_product(a, b) always differs from a b by at most 7/2 · 2⁻¹⁰⁷⁴",
+    "compensated": "error bound of a double-double sum of n terms, by induction on n",
+    "loop_error": "error and size of either loop of `gain`, a double-double sum of n products of pairs",
+    "gain_error": "error of `gain`: |Γ − (high + low)| is at most the sum of the bounds of its rows and of their sum",
+    "entry_fits": "the terms that the code adds, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), are exact and meet the hypotheses of gain_error",
+    "sign_kept": "if a computed sum is at most 0, the exact sum is at most 0",
+    "accepted_never_gains": "if the computed high + (low + radius) ≤ 0 and the radius bounds the error, then Γ ≤ 0",
 }
 # Of each, the digest of what was described (`stated`): the English is not printed of another statement.
 STATED = {
@@ -56,9 +56,9 @@ STATED = {
     "accepted_never_gains": "ae6f139f59ee5a76",
 }
 # What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
-ARGUED = ("Not in Coq: that the bound of gain_error is below the radius that `gain` returns (rational numbers show it "
-          "for each d; the rounding of the radius is argued), and, in prose only, the bounds of the other three "
-          "evaluations and that an overflow is never accepted.")
+ARGUED = ("Not proved in Coq: the error bound of theorem gain_error is below the radius that the function `gain` "
+          "returns (rational arithmetic shows this for each d; the rounding of the radius has an argument in prose). "
+          "The bounds of the other three evaluations, and the rejection of every overflow, are argued in prose only.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 

@@ -89,7 +89,7 @@ def single_contact_complementarity() -> Statement:
                 SINGLE_CONTACT_COMPLEMENTARITY_CASE,
             ),
         ),
-        remarks=(r"$p \geq 0$ need not be asked for: it follows.",),
+        remarks=(r"$p \geq 0$ is not assumed; it follows.",),
     )
 
 
@@ -212,7 +212,7 @@ def scaled_impulse() -> Statement:
                 "one factor per contact would be passive too",
                 NonNegative("KE − KE⁺ with factors S", v.T * M * v - uneven.T * M * uneven),
                 impact_case([[1, 0], [0, 1]], [[1, 0], [-1, 1]], [0, -1], e=1, s=1, S=[[1, 0], [0, 0]]),
-                "the contact that does the braking is switched off, the other one pushes",
+                "the factor removes the impulse that brakes; the impulse of the other contact remains",
             ),
         ),
     )
@@ -271,7 +271,7 @@ def loss_without_stiffness() -> Statement:
         ),
         twins=(
             Twin(
-                "the same of a penalty contact, which needs a finite time",
+                "the same statement for a penalty contact, which needs a finite time",
                 equation("F changes nothing", later.T * M * later, after.T * M * after),
                 LOSS_WITHOUT_STIFFNESS_CASE,
                 "a spring and damper that push with 3 N for 1 s: the loss depends on them, unlike that of an impact",

@@ -26,7 +26,7 @@ def erratum_half() -> Statement:
     before = energy - (1 + e) * Fraction(1, 2) * (2 * form - (1 + e) * form)
     step = identity("the last step of (32)", before, energy - Fraction(1, 2) * (1 - e * e) * form)
     return Statement(
-        title="Erratum: the half that (18), (24) and (32) lose",
+        title="Erratum: the factor ½ missing in (18), (24) and (32)",
         source="paper (32), last line; (18), (24); erratum 1",
         statement=(
             r"With $k = KE_0$ and $x = \dot q_0^\top J^\top \bar J^\top D \bar J J \dot q_0$ the last but one line of "
@@ -148,7 +148,8 @@ def erratum_shape() -> Statement:
         concludes=(work.claim.name,),
         twins=(
             Twin(
-                "the printed shape, where it can be read at all (d = 3): the force map would be the transpose",
+                "the printed shape for d = 3, the only case in which it is defined: the force map would be the "
+                "transpose",
                 equation("Fᵀ J v = (J F)ᵀ v", vector("F", "d").T * square * v, (square * vector("F", "d")).T * v),
                 case,
                 "for d other than 3 the product does not even exist",
@@ -181,7 +182,7 @@ def erratum_friction_sign() -> Statement:
         witness=case,
         needed=(
             Without(rough.name, case.with_values(μ=-1)),
-            Without(pressed.name, case.with_values(N=-1), "(5) as printed may pull: then friction drives the motion"),
+            Without(pressed.name, case.with_values(N=-1), "(5) as printed may pull; friction then drives the motion"),
             Without(along.name, case.with_values(σ=1), "the printed law"),
         ),
         twins=(
@@ -281,10 +282,11 @@ def erratum_adhesion() -> Statement:
         ),
         twins=(
             Twin(
-                "what was not approaching stays so: here the opposite wall of a tight slot, row −J",
+                "a contact that did not approach does not approach afterwards: here the opposite wall of a tight slot, "
+                "row −J",
                 NonNegative("−J v⁺ ≥ 0 for a unit mass, v⁺ = v + Jᵀ p", _slot()),
                 BALL.with_values(e=1),
-                "the rebound from one wall is an approach to the other",
+                "the rebound from one wall approaches the other wall",
             ),
         ),
     )
@@ -352,7 +354,7 @@ def erratum_saturation() -> Statement:
     """Erratum: clipping the device's force component by component can add energy to the device."""
     f, speed, inverse_mass, factor, gain = (scalar(name) for name in ("f", "v", "ω", "s", "Δ"))
     name = equation(
-        "twice the gain of one component of a diagonal inertia", gain, _gain(factor, f, speed, inverse_mass)
+        "twice the energy gain of one component of a diagonal inertia", gain, _gain(factor, f, speed, inverse_mass)
     )
     low, high = NonNegative("s ≥ 0", factor), NonNegative("s ≤ 1", 1 - factor)
     mass = NonNegative("ω = 1/m ≥ 0", inverse_mass)

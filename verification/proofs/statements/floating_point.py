@@ -40,7 +40,7 @@ def fp_projector() -> Statement:
         (Term(1, (), first.claim), Term(1, (small,), first.claim), Term(1, (*both, small), second.claim)),
     )
     return Statement(
-        title="Floating point: the projector keeps the energy whatever the conditioning",
+        title="Floating point: the energy error of the projector does not depend on conditioning",
         source="docs/theory.md",
         statement=(
             r"Let $Q^\top Q \leq (1+\delta) I$. Then $u^+ = u - (1+e) Q Q^\top u$ has $|u^+|^2 \leq (1 + (1+e)^2 "
@@ -127,7 +127,7 @@ def fp_cholesky() -> Statement:
                 "the error does not matter",
                 NonNegative("wᵀMw ≤ (1+g) vᵀMv", (1 + growth) * v.T * M * v - after.T * M * after),
                 PLANE,
-                "the metric takes one direction for heavier and the other for lighter than it is",
+                "in the perturbed metric one direction is too heavy and the other too light",
             ),
         ),
         assumed=(
@@ -230,7 +230,7 @@ def fp_rounding() -> Statement:
         because="Young's inequality in the metric M, by the square of η v − r",
     )
     return Statement(
-        title="Floating point: rounding the answer costs √κ",
+        title="Floating point: rounding the returned velocity costs √κ",
         source="docs/theory.md",
         statement=(
             r"Scale the units so that $I \leq M \leq \kappa I$, and let $v$ be rounded to $v + r$ with $|r| \leq u "
@@ -249,7 +249,7 @@ def fp_rounding() -> Statement:
         ),
         twins=(
             Twin(
-                "the energy grows by at most (1 + η/√κ)² = (1 + u)²: conditioning does not matter",
+                "the energy grows by at most (1 + η/√κ)² = (1 + u)², independent of the condition number",
                 NonNegative(
                     "(1 + η/10)² vᵀMv, here √κ = 10",
                     (10 + eta) * (10 + eta) * v.T * M * v - 100 * (v + r).T * M * (v + r),
@@ -286,7 +286,7 @@ def fp_promise() -> Statement:
     )
     case = instance(d=1, k=1)
     return Statement(
-        title="Floating point: the promised bound 10 d ε √κ",
+        title="Floating point: the bound 10 d ε √κ",
         source="docs/theory.md",
         statement=(
             r"The bound of fp_clamp and fp_rounding, $(65/64)(12 + 6 \sqrt{\kappa}) u$, with what is left of second "
@@ -300,7 +300,7 @@ def fp_promise() -> Statement:
         needed=(Without(dimension.name, case.with_values(d="1/2")), Without(condition.name, case.with_values(k="1/2"))),
         twins=(
             Twin(
-                "half of the promised constant would do in one dimension",
+                "half of the constant suffices in one dimension",
                 NonNegative("5 d ε √κ", 10 * d * k - bound),
                 case,
                 "for d = 1 and κ = 1 the sum of the terms is 18.3 u",

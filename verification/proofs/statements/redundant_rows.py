@@ -122,7 +122,8 @@ def independent_subset() -> Statement:
                 "the impulses agree as well",
                 equation("G J = Rᵀ Wₙ⁻¹ Jₙ", G * J, r.T * wi * jn),
                 INDEPENDENT_SUBSET_CASE,
-                "the velocities agree, the impulses at the contacts need not: W† shares the push, (37) does not",
+                "the velocities agree, but the impulses at the contacts may differ: W† shares the impulse between the "
+                "rows, (37) does not",
             ),
         ),
         remarks=(

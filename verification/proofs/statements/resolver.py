@@ -381,6 +381,6 @@ def energy_clamp() -> Statement:
         ),
         remarks=(
             "M need not be definite, and nothing is divided by pᵀWp, which may be zero near the kernel of Jᵀ.",
-            "A clamped impact is passive, not therefore right: what it leaves approaching must be reported.",
+            "A clamped impact is passive but may not meet Newton's law: contacts that still approach must be reported.",
         ),
     )

@@ -57,8 +57,8 @@ def theorem_1() -> Statement:
     )
     law = identity("Newton's restitution law", row * after, -e * row * v, rules, "J M⁻¹ Jᵀ ω = 1")
     return Statement(
-        title="Theorem 1: one contact never creates energy",
-        source="paper (18)-(19), Appendix I (27)-(32), with the factor ½ that (18) lost",
+        title="Theorem 1: an impact at one contact never creates energy",
+        source="paper (18)-(19), Appendix I (27)-(32), with the factor ½ that is missing in (18)",
         statement=(
             r"Let $v^+ = v - (1+e) M^{-1} J^\top \omega J v$ with one row $J$ and $\omega = (J M^{-1} J^\top)^{-1}$. "
             r"Then $J v^+ = -e J v$ and $KE^+ = KE - \frac12 (1-e^2) \, v^\top J^\top \omega J v \leq KE$ for every "
@@ -91,7 +91,7 @@ def _theorem_1_needed(inverse: str) -> tuple[Without, ...]:
     return (
         Without(SYMMETRIC_MASS.name, skew, "a mass matrix with a skew part has no energy theorem"),
         Without(INVERSE_MASS.name, THEOREM_1_POINT_MASS.with_values(M=[[2]]), "M⁻¹ must be the inverse of this M"),
-        Without(DEFINITE_MASS.name, negative, "a negative mass gains what it should lose"),
+        Without(DEFINITE_MASS.name, negative, "a negative mass gains the energy that it should lose"),
         Without(
             inverse, THEOREM_1_POINT_MASS.with_values(ω=[[3]]), "three times the impulse returns the mass twice as fast"
         ),
@@ -126,8 +126,8 @@ def theorem_2() -> Statement:
     )
     law = identity("Newton's restitution law (15)", J * after, -e * J * v, rules, "J M⁻¹ Jᵀ G J = J")
     return Statement(
-        title="Theorem 2: simultaneous contacts, redundant ones included, never create energy",
-        source="paper (20)-(24), Appendix II (34), with the factor ½ that (24) lost; C01, C02, C04, C08",
+        title="Theorem 2: an impact at simultaneous contacts, redundant ones included, never creates energy",
+        source="paper (20)-(24), Appendix II (34), with the factor ½ that is missing in (24); C01, C02, C04, C08",
         statement=(
             r"Let $v^+ = v - (1+e) M^{-1} J^\top G J v$, where $G$ is any matrix with $W G W = W$ for $W = J M^{-1} "
             r"J^\top$ (the Moore-Penrose inverse $W^\dagger$ is one). Then $J v^+ = -e J v$ and $KE^+ = KE - \frac12 "
@@ -218,7 +218,8 @@ def impulse_of_independent_rows() -> Statement:
                     p=[1, 0],
                     e=0,
                 ).with_values(**{"v⁺": [0]}),
-                "one wall reported twice: any split of the impulse does, (19) names one of them",
+                "one wall reported twice: any split of the impulse between the two rows is a solution, and (19) gives "
+                "one of them",
             ),
             Without(balance.name, CASE.with_values(p=[7])),
             Without(law.name, CASE.with_values(**{"v⁺": [1], "p": [2]})),
@@ -280,7 +281,7 @@ def dynamically_consistent_inverse() -> Statement:
                 "the plain pseudo-inverse of J would do as well",
                 equation("(29) with J⁺ = Jᵀ (J Jᵀ)⁻¹", M * euclid * J, J.T * euclid.T * M),
                 case,
-                "J⁺ does not know the masses",
+                "J⁺ does not depend on the masses",
             ),
         ),
     )
@@ -336,7 +337,8 @@ def newton_law_solvable() -> Statement:
             ),
             Without(inverse.name, TWICE.with_values(G=[[1, 0], [0, 1]])),
         ),
-        twins=(Twin("the impulse is unique", equation("p = G b", p, g * b), TWICE, "the push may be split at will"),),
+        twins=(Twin("the impulse is unique", equation("p = G b", p, g * b), TWICE,
+                    "the impulse can be split arbitrarily between the rows"),),  # fmt: skip
         remarks=(
             r"With one scalar $e$ for all contacts $b = -(1+e) J v$ lies in the range of $J$, which is the range of "
             r"$W$ for a positive definite $M$: then the law can always be met (theorem_2).",
