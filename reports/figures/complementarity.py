@@ -21,6 +21,7 @@ from reports.figures.style import (
     line_arguments,
     looks_of,
 )
+from verification.cost.calls import PRINTED
 from verification.finding import Table, titled
 
 Rows = list[dict[str, Any]]
@@ -165,7 +166,7 @@ def _by_rows(plot: Plot, rows: Rows, places: Sequence[tuple[float, float]]) -> N
 # At most six curves; the numbers have all. The table calls "IAPB" what Python calls.
 TIMED = {
     "IAPB kernel": STYLES["IAPB kernel"], "Lemke kernel": STYLES["Lemke kernel"], "IAPB": STYLES["IAPB, Python"],
-    "IAPB printed formula": STYLES["IAPB printed formula"], "gauss_seidel": STYLES["gauss_seidel"],
+    PRINTED: STYLES["printed, numpy"], "gauss_seidel": STYLES["gauss_seidel"],
     "daqp": STYLES["daqp"],
 }
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from reports.figures.canvas import note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.labels import SIZE, label_marks
 from reports.figures.numbers import power_of_ten
@@ -14,6 +16,7 @@ from reports.figures.plot import Plot
 from reports.figures.style import (
     BLUE,
     FORCE,
+    INK,
     MUTED,
     OUTCOMES,
     STYLES,
@@ -21,13 +24,15 @@ from reports.figures.style import (
     line_arguments,
     looks_of,
 )
+from verification.claims.c22_cost import holds
+from verification.cost.calls import PRINTED
+from verification.cost.growth import FACTORED
 from verification.cost.impacts import (
     CALLED,
     IAPB,
     LEMKE,
     LONGEST,
     NO_GAIN,
-    PRINTED,
     QP,
     SWEEPS,
     by_way,
@@ -35,6 +40,7 @@ from verification.cost.impacts import (
     lost_to_rivals,
     short_time,
 )
+from verification.cost.trajectories import GAINED, INTEGRATORS, WORLDS, Curve, by_chance, curves, times, worth
 from verification.finding import Table
 
 Row = Mapping[str, Any]
@@ -43,17 +49,18 @@ _LOOKS: dict[str, LineStyle] = {  # method -> its look, which has its name at th
     IAPB: STYLES["IAPB"], SWEEPS: STYLES["Gauss-Seidel"], LEMKE: STYLES["Lemke"],
     CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], QP: STYLES["DAQP, Python"],
 }
-_SHADES = ((1e-9, 0.30), (1e-6, 0.20), (1e-3, 0.10))  # largest error -> shade of the cell
+_EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloured cell; strengths of colours
 
 
 @recipe(
     "which-method", "Which method for my budget?", "work_precision", section="accuracy",
-    caption="Find the row of your impact and the column of your time: the method that solves all of nine hard impacts "
-    "of that size in time and without a gain of energy, or most of them, with the least of the largest errors (below "
-    "1e-9 the fastest). Below its name: where it is stopped early, that error relative to |v⁻|, and how many of the "
-    "nine end in time where not all do. Blue: below 1e-3, the darker the more exact; an error near 1 solves next to "
-    "nothing. Compiled methods; the numbers name those to call from Python. The nine: M of condition 1, 1e3 and 1e6, "
-    "rows apart by 1, 1e-3 and 1e-6 of themselves, e = 0, 1/2 and 1; d is the number of coordinates.",
+    caption="Find the row of your impact and the column of your time. A cell names the compiled method that solves all "
+    "of nine hard impacts of that size in time and without a gain of energy, or most of them, and below it its largest "
+    "error relative to |v⁻|. Its colour is the method's, as in the pictures below: strong for an error below 1e-9, "
+    "pale for one up to 1e-3. “none”: nothing solves half of the nine to 1e-3 in this time; “nearest” is the largest "
+    "error of what at least ends in time without making energy. The numbers name that method, and those to call from "
+    "Python. The nine: M of condition 1, 1e3 and 1e6, rows apart by 1, 1e-3 and 1e-6 of themselves, e = 0, 1/2 and 1; "
+    "d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
     """A cell per size and budget."""
@@ -63,12 +70,15 @@ def which_method(numbers: Table) -> Drawn:
     with Plot("which-method", (6.8, 0.46 * len(sizes) + 0.7)) as plot:
         for row in found.records():
             x, y = budgets.index(row["budget"]), sizes.index((row["contacts"], row["coordinates"]))
-            largest = row["largest error"]
-            shade = next((shade for most, shade in _SHADES if largest is not None and largest <= most), 0.0)
-            plot.axes.fill_between((x - 0.48, x + 0.48), y - 0.46, y + 0.46, color=BLUE, alpha=shade, linewidth=0)
-            plot.axes.text(x, y - 0.2, row["method"], ha="center", va="center", fontsize=8.5)
-            if largest is not None:
-                plot.axes.text(x, y + 0.2, _cell_note(row), ha="center", va="center", fontsize=7.0)
+            solved = row["method"] != "none"
+            if solved:
+                plot.axes.fill_between((x - 0.48, x + 0.48), y - 0.46, y + 0.46, linewidth=0,
+                                       color=_LOOKS[row["method"]].color,
+                                       alpha=_STRONG if row["largest error"] <= _EXACT else _WEAK)
+            plot.axes.text(x, y - 0.2, row["method"], ha="center", va="center", fontsize=8.5,
+                           color=INK if solved else MUTED)
+            plot.axes.text(x, y + 0.2, _cell_note(row), ha="center", va="center", fontsize=7.0,
+                           color=INK if solved else MUTED)
         plot.without_lines()
         plot.axes.set_xticks(range(len(budgets)), [short_time(1e-6 * budget) for budget in budgets])
         plot.axes.xaxis.tick_top()
@@ -81,6 +91,8 @@ def which_method(numbers: Table) -> Drawn:
 
 
 def _cell_note(row: Row) -> str:
+    if row["method"] == "none":
+        return f"nearest: {row['nearest'].split(':')[-1].strip()}" if row["nearest"] else ""
     stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
     share = "" if row["share solved"] > 99 else f", {row['share solved']:.0f} %"
     return f"{stopped}{power_of_error(row['largest error'])}{share}"
@@ -91,18 +103,76 @@ def power_of_error(value: float) -> str:
     return f"{value:.0e}".replace("e-0", "e-") if value < 0.1 else f"{value:.1f}"
 
 
-_MARKS = (
-    "Lower left is better. Each mark is the median of nine hard impacts of that size, the thin line above it reaches "
-    "to the largest error; a curve joins what stopping early buys (IAPB after 1, 2, 4 ... rows, Gauss-Seidel after 1, "
-    "4, 16 ... sweeps). Filled: compiled; empty: called from Python. The grey steps join what no other method beats in "
-    "both. A red ring: it made energy in some of the nine; a cross at the rim: it failed on some, or took more than "
-    "10 ms. "
+_WHY = (
+    "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is made. With one "
+    "or two contacts that fixed work is most of the time. On a pile no row can be dropped, so that it is done for "
+    "every contact, where Lemke's method needs one pivot for each. On a patch all rows but three are dropped, and IAPB "
+    "wins."
 )
 
 
 @recipe(
+    "where-iapb-loses", "Where IAPB loses to a complementarity solver, and by how much", "C22/C22", "work_precision",
+    section="accuracy", caption="",
+)  # fmt: skip
+def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
+    """Lemke's time over IAPB's by contacts, both compiled; the size and the reason in words."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
+
+    looks = looks_of(dict.fromkeys(kernels.column("problem")))
+    said = "Both compiled, timed in turns (claim C22). Below the line at 1 IAPB is the slower. "
+    with Plot("where-iapb-loses", (6.8, 2.8)) as plot:
+        plot.axes.axhline(1.0, color=INK, linewidth=0.9)
+        plot.axes.axhspan(1e-2, 1.0, color=FORCE, alpha=0.07, linewidth=0)
+        for name, look in looks.items():
+            rows = [row for row in kernels.where(problem=name).records() if row["ratio"] is not None]
+            plot.curve([(row["contacts"], row["ratio"]) for row in rows], look)
+            plot.axes.vlines([row["contacts"] for row in rows], [row["lower quartile"] for row in rows],
+                             [row["upper quartile"] for row in rows], color=look.color, linewidth=1.0)
+            said += _lost_on(name, kernels.where(problem=name))
+        note(plot.axes, (0.99, 0.04), "IAPB loses", (0, 0), xycoords="axes fraction", ha="right", va="bottom",
+             color=FORCE)
+        ratios = [row["ratio"] for row in kernels.records() if row["ratio"] is not None]
+        plot.log("contacts", "time of Lemke / time of IAPB", ylim=(0.6 * min(ratios), 2.0 * max(ratios)))
+        plot.axes.yaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 10.0, 100.0]))
+        plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda ratio, _: f"{ratio:g}"))
+        plot.axes.xaxis.set_major_locator(FixedLocator([1, 2, 4, 8, 16, 32, 64, 128, 300]))
+        plot.axes.xaxis.set_major_formatter(FuncFormatter(lambda count, _: f"{count:g}"))
+    return Drawn((Panel(plot.svg, said.strip(), wide=True),), kernels, tuple(looks.items()),
+                 said + _lost_on_hard_impacts(numbers) + _WHY)
+
+
+def _lost_on(name: str, kernels: Table) -> str:
+    """Where IAPB clearly costs more on one family of impacts, and how much at worst."""
+    slower = [row for row in kernels.records() if holds(row) is False]
+    faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
+    won = f"at best Lemke takes {faster['ratio']:.3g} times as long ({faster['contacts']} contacts). "
+    if not slower:
+        return f"On {name} IAPB loses nowhere clearly; {won}"
+    worst, sizes = min(slower, key=lambda row: float(row["ratio"])), [row["contacts"] for row in slower]
+    return (f"On {name} IAPB loses at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} "
+            f"contacts: at worst it takes {1 / worst['ratio']:.2g} times as long as Lemke ({worst['contacts']} "
+            f"contacts); {won}")  # fmt: skip
+
+
+def _lost_on_hard_impacts(numbers: Table) -> str:
+    lost, said = lost_to_rivals(numbers), ""
+    for c in dict.fromkeys(lost.column("contacts")):
+        here = lost.where(contacts=c).records()
+        best = max(here, key=lambda row: float(row["ratio"]))
+        cases = len({row["problem"] for row in here})
+        said += (f"Of the nine hard impacts with {c} contact{'s' * (c > 1)} IAPB loses on {cases}, at worst to "
+                 f"{best['solver']}, by {best['ratio']:.2g} times. ")
+    return said or "On the hard impacts above no compiled solver is as exact as IAPB in less time. "
+
+
+@recipe(
     "impact-accuracy", "What a microsecond buys", "work_precision", section="accuracy",
-    caption=_MARKS,
+    caption="Lower left is better. Each mark is the median of nine hard impacts of that size, the thin line above it "
+    "reaches to the largest error; a curve joins what stopping early buys (IAPB after 1, 2, 4 ... rows, Gauss-Seidel "
+    "after 1, 4, 16 ... sweeps). Filled: compiled; empty: called from Python. The grey steps join what no other method "
+    "beats in both. A red ring: it made energy in some of the nine; a cross at the rim: it failed on some, or took "
+    "more than 10 ms.",
 )  # fmt: skip
 def impact_accuracy(numbers: Table) -> Drawn:
     """A panel per size."""
@@ -111,17 +181,7 @@ def impact_accuracy(numbers: Table) -> Drawn:
         Panel(_impacts(numbers.where(contacts=c, coordinates=d), f"impact-accuracy-{c}"),
               f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}.",
               f"{c} contact{'s' * (c > 1)}, {d} coordinates") for c, d in sizes)  # fmt: skip
-    lost = lost_to_rivals(numbers)
-    said = ""
-    for c in dict.fromkeys(lost.column("contacts")):
-        here = lost.where(contacts=c).records()
-        best = max(here, key=lambda row: float(row["ratio"]))
-        cases = len({row["problem"] for row in here})
-        said += (f"At {c} contact{'s' * (c > 1)} {best['solver']} is up to {best['ratio']:.2g} times as fast as IAPB "
-                 f"(compiled, {cases} of 9 impacts): it neither orders rows nor proves that no energy is made. ")
-    said = said or "No compiled complementarity solver is as exact as IAPB in less time at any of these sizes."
-    return Drawn(panels, numbers, tuple((look.name, look) for look in _LOOKS.values()),
-                 _MARKS + said)
+    return Drawn(panels, numbers, tuple((look.name, look) for look in _LOOKS.values()))
 
 
 def _impacts(numbers: Table, key: str) -> str:
@@ -149,13 +209,7 @@ def _impacts(numbers: Table, key: str) -> str:
             if points:
                 names.append(look.name)
                 ends.append(points[-1])
-        steps, least = [], np.inf
-        for time, error in sorted(front):
-            if error < least:
-                steps += [(time, least), (time, error)] if np.isfinite(least) else [(time, error)]
-                least = error
-        if steps:
-            plot.axes.plot(*zip(*steps, (1e6 * LONGEST, least), strict=True), color=MUTED, linewidth=3, alpha=0.25)
+        _draw_front(plot, front, 1e6 * LONGEST)
         plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 2e4), ylim=(1e-17, 10.0))
         label_marks(plot.axes, names, ends)
     return plot.svg
@@ -203,43 +257,147 @@ def _share(numbers: Table, tolerance: float) -> str:
     return plot.svg
 
 
-_MOTION_ERRORS = {"position": "error of position [lengths]", "energy made": "energy made [kinetic]"}
-_MOTIONS = {  # at most six curves; the numbers have all
-    "IAPB, semi-implicit Euler": STYLES["IAPB, Euler"], "IAPB, Runge-Kutta 4": STYLES["IAPB, RK4"],
-    "PB, semi-implicit Euler": STYLES["PB, Euler"], "rigid (QP per step)": STYLES["rigid, QP per step"],
-    "MuJoCo": STYLES["MuJoCo"], "Drake": STYLES["Drake"],
-}
+_WORLDS = {method: STYLES[method.split(",")[0].removesuffix(" (QP per step)")] for method in WORLDS}
+_NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4")
+_INTEGRATORS = {method: STYLES[name] for method, name in zip(INTEGRATORS, _NAMES, strict=True)}
+_FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
+_READ = (
+    "Lower left is better. Each mark is a run with one step; finer steps are further right. The number at a curve is "
+    "what ten times the accuracy costs on that scene, in times the computing time: a power fitted to exactly the "
+    f"filled marks (thick straight line). Hollow marks are left out of it: there a finer step divides the error by "
+    f"less than {GAINED:g}. “Then level” or “stays at”: no step mends this error; the model of contact decides it. "
+    "“Too few runs”: finer steps took longer than allowed. The grey steps join the runs that nothing beats in both "
+    "time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at the lower rim: "
+    "the error is below what the exact motion itself is known to (about 1e-10), because the step meets the instant of "
+    "impact by chance; it is left out too. "
+)
 
 
 @recipe(
-    "trajectory-precision", "What accuracy of a whole motion costs", "haptic-rate/motions", "haptic-rate/worth",
+    "trajectory-precision", "What accuracy of a whole motion costs, by world", "haptic-rate/motions",
     section="accuracy",
-    caption="Lower left is better: each mark is one run with one step, a line joins the steps of a method. A curve "
-    "that ends level has an error that no step mends: the model of contact decides, not the step. Beside it the most "
-    "by which the energy of the bodies exceeded that at the start; marks at the bottom made none. Crosses at the upper "
-    "rim are runs that failed or would take too long. The numbers say what ten times the accuracy costs each method.",
+    caption=_READ + "Worlds: IAPB and PB by semi-implicit Euler, compiled; ideal: rigid contacts by a QP per step, "
+    "from Python. CBuc is not drawn: it differs from ideal by its coupling to a device, and no device moves here, so "
+    "its motion is that of ideal. Energy made: the most by which kinetic and potential energy exceed those at the "
+    "start, of the largest kinetic energy.",
 )  # fmt: skip
-def trajectory_precision(numbers: Table, worth: Table) -> Drawn:
-    """Two panels per scene: error, and energy made."""
-    looks = {name: _MOTIONS[name] for name in dict.fromkeys(numbers.column("method")) if name in _MOTIONS}
-    panels = tuple(
-        Panel(_motions(numbers.where(scene=scene).records(), looks, column, f"{number}-{column.split()[-1]}"),
-              f"{scene}: {label} against computing time for {', '.join(looks)}.", f"{scene}: {label}")
-        for number, scene in enumerate(dict.fromkeys(numbers.column("scene")))
-        for column, label in _MOTION_ERRORS.items()
-    )  # fmt: skip
-    return Drawn(panels, worth, tuple((look.name, look) for look in looks.values()))
+def trajectory_precision(motions: Table) -> Drawn:
+    """The worlds: a table in words, and a panel per scene."""
+    return _precision("trajectory-precision", motions, _WORLDS)
 
 
-def _motions(rows: list[dict[str, Any]], looks: Mapping[str, LineStyle], column: str, key: str) -> str:
-    with Plot(f"trajectory-precision-{key}", (4.1, 2.9)) as plot:
-        for method, look in looks.items():
-            here = [row for row in rows if row["method"] == method]
-            points = [(row["time"], max(row[column], 1e-9)) for row in here if row[column] is not None and row["time"]]
-            plot.curve(points, look)
-            plot.lost([row["time"] for row in here if row["outcome"] != "ok" and row["time"]], look, 0.98)
-        plot.log("computing time [ms per simulated second]", _MOTION_ERRORS[column], ylim=(5e-10, 10.0))
+@recipe(
+    "integrator-precision", "What a better integrator buys in a whole motion", "haptic-rate/motions",
+    section="accuracy",
+    caption="The same runs for each integrator of IAPB and PB, with a front of their own. An integrator of higher "
+    "order is as exact only between impacts: the step in which an impact falls decides, so that Runge-Kutta 4 costs "
+    "four evaluations and gains little. Marks and numbers as above.",
+)  # fmt: skip
+def integrator_precision(motions: Table) -> Drawn:
+    """The integrators, in the same way."""
+    return _precision("integrator-precision", motions, _INTEGRATORS)
+
+
+def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Drawn:
+    looks = {name: look for name, look in drawn.items() if name in motions.column("method")}
+    found = curves(motions, tuple(looks))
+    told = worth(motions, tuple(looks))
+    lines = "; ".join(_worth_said(row, looks)[0] for row in told.records())
+    panels = [Panel(_worth(key, told, looks), lines, wide=True)]
+    for number, scene in enumerate(dict.fromkeys(motions.column("scene"))):
+        here = [curve for curve in found if curve.scene == scene]
+        said = ", ".join(f"{looks[curve.method].name}: {curve.words}" for curve in here)
+        lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
+        panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
+                            f"{scene}: error of position against computing time. {said}.", scene))
+    return Drawn(tuple(panels), told, (*((look.name, look) for look in looks.values()), ("best for its time", _FRONT)))
+
+
+_HEADINGS = ((0.03, ""), (0.16, "ten times the accuracy costs"), (0.43, "smallest error"),
+             (0.545, "best for its time (on the grey steps)"), (0.87, "energy made"))
+
+
+def _worth(key: str, told: Table, looks: Mapping[str, LineStyle]) -> str:
+    """The figure's numbers in words, a line per method."""
+    rows = told.records()
+    with Plot(f"{key}-worth", (6.8, 0.24 * (len(rows) + 1) + 0.1), bare=True) as plot:
+        plot.axes.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -1.5))
+        for place, heading in _HEADINGS:
+            plot.axes.text(place, -1.0, heading, fontsize=7.5, color=MUTED, va="center")
+        for line, row in enumerate(rows):
+            look = looks[row["method"]]
+            plot.axes.plot((0.0, 0.024), (line, line), color=look.color, linewidth=look.width)
+            plot.marks([(0.012, line)], replace(look, name=""))
+            for (place, _), words in zip(_HEADINGS, _worth_said(row, looks)[1], strict=True):
+                plot.axes.text(place, line, words, fontsize=8.0, va="center",
+                               weight="bold" if words == _NEVER else "normal")
     return plot.svg
+
+
+_NEVER = "never worth its time here"
+
+
+def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[str, ...]]:
+    """A line of the table: as one text, and by columns."""
+    name, scenes = looks[row["method"]].name, row["scenes"]
+    cost = "no step buys it: the error stays"
+    if row["scenes fitted"]:
+        ends = f" ({times(row['least cost'])} to {times(row['largest cost'])})" if row["scenes fitted"] > 1 else ""
+        cost = f"{times(row['tenfold accuracy costs'])} the time{ends}"
+    best = _NEVER
+    if row["best for its time"]:
+        errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
+        best = f"on {row['best for its time']} of {scenes} scenes, errors {' to '.join(errors)}"
+    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > NO_GAIN else "none"
+    cells = (name, cost, power_of_error(row["least error"]), best, made)
+    return f"{name}: ten times the accuracy: {cost}; best for its time: {best}; energy made: {made}", cells
+
+
+def _motions(key: str, here: Sequence[Curve], lost: Table, looks: Mapping[str, LineStyle]) -> str:
+    floor = 0.2 * min(curve.least for curve in here)
+    with Plot(key, (4.1, 3.1)) as plot:
+        front = {(run["time"], run["position"]) for curve in here for run in curve.front}
+        _draw_front(plot, front)
+        for curve in here:
+            look = looks[curve.method]
+            bare = replace(look, name="", marker=look.marker or "o", filled=True)
+            plot.curve(_places(run for run in curve.runs if not by_chance(run)), replace(look, width=0.8), marked=False)
+            plot.marks(_places(curve.fitted), bare, markersize=5)
+            plot.marks(_places(run for run in curve.left_out if not by_chance(run)), replace(bare, filled=False))
+            plot.marks([(run["time"], 1.3 * floor) for run in curve.left_out if by_chance(run)],
+                       replace(bare, filled=False, marker="v"))
+            _draw_fit(plot, curve, look)
+            plot.words[look.name] = f": {curve.words}"
+            times_lost = lost.where(method=curve.method).column("time")
+            plot.lost([time for time in times_lost if time], look, 0.98)
+        plot.log("computing time [ms per simulated second]", "error of position [lengths]", ylim=(floor, 30.0))
+    return plot.svg
+
+
+def _places(runs: Iterable[Row]) -> list[tuple[float, float]]:
+    return [(run["time"], run["position"]) for run in runs]
+
+
+def _draw_fit(plot: Plot, curve: Curve, look: LineStyle) -> None:
+    """The fitted power, over the runs that it is fitted to."""
+    if curve.cost is None:
+        return
+    time, error = (np.log10(column) for column in zip(*_places(curve.fitted), strict=True))
+    ends = np.array([time.min(), time.max()])
+    heights = error.mean() - (ends - time.mean()) / np.log10(curve.cost)
+    plot.axes.plot(10.0**ends, 10.0**heights, color=look.color, linewidth=1.8, alpha=0.6)
+
+
+def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float | None = None) -> None:
+    """Grey steps that join what nothing beats in both time and error, on to a time if it is given."""
+    steps, least = list[tuple[float, float]](), np.inf
+    for time, error in sorted(points):
+        if error < least:
+            steps += [(time, least), (time, error)] if np.isfinite(least) else [(time, error)]
+            least = error
+    if steps:
+        end = [(until, least)] if until else []
+        plot.axes.plot(*zip(*steps, *end, strict=True), color=MUTED, linewidth=3, alpha=0.25)
 
 
 @recipe(
@@ -272,7 +430,7 @@ def _budgets(sizes: Mapping[str, list[Row]], column: str, scale: str) -> str:
 
 
 _HELD = {"contacts": ("coordinates", 12), "coordinates": ("contacts", 60)}  # varied -> what is held, and at what
-_FORMS = {"factored": STYLES["factored"], "gram_pinv": STYLES["gram_pinv"]}
+_FORMS = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
 
 
 @recipe(

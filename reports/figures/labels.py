@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,11 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
     return boxes
 
 
-def name_curves(axes: Any) -> None:
+def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> None:
     """Write the name of each curve at it, in its colour, where it covers least; what is named already is left alone.
 
-    A curve has a name where its `gid` is "curve=name", as `line_arguments` gives it. A single one needs none.
+    A curve has a name where its `gid` is "curve=name", as `line_arguments` gives it. A single one needs none. `words`
+    follow the name.
     """
     lines = {str(line.get_gid())[6:]: line for line in axes.lines if str(line.get_gid()).startswith("curve=")}
     named = [text.get_text() for text in axes.texts]
@@ -58,7 +60,8 @@ def name_curves(axes: Any) -> None:
         others = np.vstack([np.zeros((0, 2)), *(_dense(path, frame) for other, path in paths.items() if other != name)])
         if not len(own):
             continue
-        size = np.array([_LETTER * NAME_SIZE * len(name) + 2.0, NAME_SIZE + 2.0])
+        written = name + words.get(name, "")
+        size = np.array([_LETTER * NAME_SIZE * len(written) + 2.0, NAME_SIZE + 2.0])
         best: tuple[float, Box, Any] = (np.inf, (0.0, 0.0, 0.0, 0.0), own[0])
         for at in own[:: max(len(own) // _PLACES, 1)]:
             for x, y, away in _AROUND:
@@ -75,7 +78,7 @@ def name_curves(axes: Any) -> None:
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         far = np.hypot(*(np.clip(at, box[:2], box[2:]) - at)) > _GAP + 2.0
         place = axes.transData.inverted().transform(at * axes.figure.dpi / 72.0)
-        note = axes.annotate(name, place, (middle[0] - at[0], middle[1] - at[1]), textcoords="offset points",
+        note = axes.annotate(written, place, (middle[0] - at[0], middle[1] - at[1]), textcoords="offset points",
                              ha="center", va="center", fontsize=NAME_SIZE, color=line.get_color(), zorder=9,
                              gid=f"name={name}",
                              arrowprops={"arrowstyle": "-", "color": line.get_color(), "lw": 0.5} if far else None,

@@ -26,6 +26,7 @@ class Plot:
     Attributes
     ----------
     axes, drawing : matplotlib's
+    words : what is written after the name of a curve
     svg : the panel
     """
 
@@ -34,6 +35,7 @@ class Plot:
         self.key, self.size, self.kind, self.bare = key, size, kind, bare
         self.frame = (0.0, 0.0, 1.0, 1.0) if bare and frame is None else frame
         self.svg = ""
+        self.words: dict[str, str] = {}
         self.drawing: Any
         self.axes: Any
 
@@ -53,7 +55,7 @@ class Plot:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:  # fmt: skip
         if error is None:
-            name_curves(self.axes)
+            name_curves(self.axes, self.words)
             self.svg = traced_svg(self.drawing, self.key, self.kind) if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
 

@@ -40,7 +40,7 @@ class LineStyle:
 # of one thing looks the same in every figure. A world's colour and marker belong to it alone.
 LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # the paper's worlds, and ours
-    (("ideal", "rigid, QP per step"), LineStyle(INK, "", (), 2.4)),
+    (("ideal",), LineStyle(INK, "", (), 2.4)),
     (("IAPB", "pfull", "factored", "IAPB kernel", "IAPB, Euler", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
     (("PB", "PB, Euler", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
     (("CBuc",), LineStyle(GREEN, "^", (1.4, 1.4), 1.6)),
@@ -54,7 +54,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # methods for an impact and solvers; what Python calls is dashed, its marks empty
     (("IAPB, Python", "IAPB, RK4"), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
     (("factored, no clamp",), LineStyle(SKY, "s", (5, 1.6))),
-    (("printed, numpy", "gram_pinv", "gram_pinv, as printed", "IAPB printed formula"),
+    (("printed, numpy", "gram_pinv", "gram_pinv, as printed"),
      LineStyle(PURPLE, "s", (4, 2), 1.4)),
     (("Gauss-Seidel",), LineStyle(VERMILION, "v", (), 1.4)),
     (("gauss_seidel",), LineStyle(VERMILION, "v", (4, 2), 1.2, filled=False)),
@@ -72,6 +72,10 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # other engines
     (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
     (("Drake",), LineStyle(AMBER, "v", (1.4, 1.4))),
+    (("Bullet",), LineStyle(GREEN, "P", (3, 1.2))),
+    # worlds by another integrator
+    (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2, filled=False)),
+    (("PB, RK4",), LineStyle(VERMILION, "s", (4, 1, 1, 1), 1.2, filled=False)),
     # integrators
     (("semi-implicit Euler",), LineStyle(MUTED, "s")),
     (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),

@@ -101,7 +101,8 @@ def link_across(pages: Mapping[str, str]) -> dict[str, str]:
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
-    tables = {f"{topic.key}/{name}": table for topic in evidence.topics for name, table in topic.tables.items()}
+    tables = {f"{topic.key}/{name}": table for topic in (*evidence.claims, *evidence.topics)
+              for name, table in topic.tables.items()}
     return {**scenes, **tables, **evidence.inputs}
 
 

@@ -116,7 +116,8 @@ def test_no_two_rows_of_the_table_look_alike() -> None:
 def test_a_name_has_one_colour_and_one_marker_in_every_figure(seen: tuple[list[Drawn], list[Figure]]) -> None:
     lines, figures = seen
     assert strangers(lines) == []
-    assert {line.name for line in lines} >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "daqp", "gram_pinv"}
+    assert {line.name for line in lines} >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "daqp",
+                                             "printed, numpy"}
     for figure in figures:
         for text, look in figure.legend:
             assert look.color == STYLES.get(text, look).color and look.marker == STYLES.get(text, look).marker, text

@@ -13,13 +13,13 @@ from verification.complementarity.agreement import SAME, MapCell
 from verification.complementarity.convergence import CASES, WITHOUT_TRUTH
 from verification.complementarity.extensions import GAIN
 from verification.complementarity.problems import ProblemStudy
-from verification.complementarity.study import ComparisonStudy
+from verification.complementarity.study import SCENE_RESTITUTIONS, ComparisonStudy
+from verification.cost.calls import PRINTED
 from verification.cost.step_cost import (
     COMPILED,
     IAPB,
     KERNEL,
     LEMKE_KERNEL,
-    PRINTED,
     costs_more,
     rivals,
     step_rivals,
@@ -129,9 +129,9 @@ def scenes(study: ComparisonStudy) -> Part | None:
     artefacts = sum(round(c.artefact * c.cases) for c in study.scenes)
     where = f"the laws differ in {', '.join(apart)}" if apart else "the laws agree in all"
     return Part(
-        f"Impacts of the project's scenes: {cases}; {where}. {pulling} impacts need a pulling impulse (no p >= 0 gives "
-        f"their velocity); {artefacts} have one only in the least-norm p. {study.left_out} impacts are left out "
-        "(per-body rows or device limits).",
+        f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}: {cases}; "
+        f"{where}. {pulling} impacts need a pulling impulse (no p >= 0 gives their velocity); {artefacts} have one "
+        f"only in the least-norm p. {study.left_out} impacts are left out (per-body rows or device limits).",
         REPRODUCED if not apart else MIXED, "scenes")  # fmt: skip
 
 
@@ -248,7 +248,8 @@ def cost(study: ComparisonStudy) -> Part | None:
     sizes = costs.column("contacts")
     parts = [_cost_part(costs.where(impacts=family, contacts=contacts), family, contacts)
              for family in dict.fromkeys(costs.column("impacts")) for contacts in sorted({min(sizes), max(sizes)})]
-    return Part(f"C22, time per impact: {'; '.join(found)}. Medians: {'; '.join(parts)}.",
+    return Part(f"C22, time per impact, by every solver at {len(set(sizes))} sizes (claim C22 itself compares the two "
+                f"kernels at more sizes): {'; '.join(found)}. Medians: {'; '.join(parts)}.",
                 verdict_of_trials([pair.costs_more for pair in rivals(study.impact_costs)]),
                 "cost", timed=True)  # fmt: skip
 

@@ -17,6 +17,7 @@ from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase
 
+PRINTED = "printed formula (numpy)"
 Floats = NDArray[Any]
 Call = Callable[[], Floats]
 

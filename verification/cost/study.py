@@ -1,11 +1,12 @@
 """Study "haptic-rate": what a step costs beside others' engines and solvers, how that grows, what a millisecond holds.
 
-Everything that `iapb bench` measures beside the impact methods is timed in one run, one question after the other.
+Everything that `iapb bench` measures beside the impact methods is timed in one run, one question after the other. A
+report has two of these tables from other findings, so that nothing is measured twice (`quoting`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,9 +19,9 @@ from verification.cost.against_mujoco import (
     profile_step,
     race_mujoco,
 )
+from verification.cost.calls import PRINTED
 from verification.cost.growth import (
     FACTORED,
-    PRINTED,
     TITLES,
     exponent,
     fitted,
@@ -28,14 +29,16 @@ from verification.cost.growth import (
     most_contacts,
     power_law,
     scaling,
+    steepest,
 )
 from verification.cost.impacts import anytime, order_bias
 from verification.cost.many_bodies import LEAST_BODIES, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.start_up import start_up
 from verification.cost.step_cost import IAPB, KERNEL, Rivals, impact_cost, rivals
-from verification.cost.trajectories import BELOW, trajectory_precision, worth
+from verification.cost.trajectories import BELOW, WORLDS, times, trajectory_precision, worth
 from verification.finding import (
+    FAILED_CASES,
     MIXED,
     NOT_COMPUTED,
     REPRODUCED,
@@ -62,6 +65,7 @@ QUESTION = (
 )
 FACTORS = {60: 10.0, 300: 100.0}  # contacts, with 12 coordinates -> how many times slower the printed formula is to be
 LARGEST_EXPONENT = {"contacts": 1.1, "bodies": 1.2}
+RATE, SOLVERS = "contacts at 1 kHz", "solvers"  # tables that a report quotes from other findings
 SOLVER_CONTACTS = {"quick": (1, 4, 16, 64), "full": (1, 4, 16, 64, 128, 300)}
 
 Progress = Callable[[str, int, int], None]
@@ -69,15 +73,38 @@ Tables = Mapping[str, Table]
 
 
 def compute(runner: Any, depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Measure and say what came out, as a topic of the report; nothing is simulated for keeping."""
-    return haptic_study(depth, lambda stage, done, total: progress(done, total))
+    """Measure and say what came out, as a topic of the report; nothing is simulated for keeping.
+
+    What other findings of a report measure is left to them: see `quoting`.
+    """
+    failures: list[Failure] = []
+    return finding(dict(measured(depth, lambda stage, done, total: progress(done, total), failures)), failures)
 
 
 def haptic_study(depth: str = "quick", progress: Progress | None = None) -> Finding:
     """Measure all of it, one after the other: nothing else of ours runs meanwhile."""
     failures: list[Failure] = []
-    found = measured(depth, progress or (lambda stage, done, total: None), failures)
-    return finding(dict(found), failures)
+    say = progress or (lambda stage, done, total: None)
+    found = dict(measured(depth, say, failures))
+    rate = haptic_rate(progress=lambda done, total: say("contacts at 1 kHz", done, total), failures=failures)
+    costs = impact_cost(SOLVER_CONTACTS[depth], repeats=5 if depth == "full" else 3, progress=say, failures=failures)
+    return finding(found | {RATE: _rate(rate), SOLVERS: costs}, failures)
+
+
+def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
+    """Return the finding of `compute` with what others measured: contacts in a millisecond (C19), solvers' times.
+
+    Each of these is measured once in a report. Without the other finding the sentence says that it is missing.
+    """
+    if not found.tables:
+        return found
+    tables = {name: table for name, table in found.tables.items() if name != FAILED_CASES}
+    for other in others:
+        if other.key == "C19" and "C19" in other.tables:
+            tables[RATE] = _rate(other.tables["C19"])
+        elif other.key == "complementarity" and "time per impact" in other.tables:
+            tables[SOLVERS] = other.tables["time per impact"]
+    return finding(tables, list(found.failures))
 
 
 def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tuple[str, Table]]:
@@ -95,16 +122,14 @@ def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tup
     times = scaling(15 if full else 7, within("scaling laws"), failures)
     yield "scaling", times
     yield "fitted", fitted(times)
-    yield "contacts at 1 kHz", _rate(haptic_rate(progress=within("contacts at 1 kHz"), failures=failures))
     yield "bodies", study_many_bodies(failures=failures)
     if (robots := attempt("robots", partial(_robots, depth), failures)) is not None:
         yield "robots", robots
-    yield "solvers", impact_cost(SOLVER_CONTACTS[depth], repeats=5 if full else 3, progress=say, failures=failures)
     yield "start", start_up(depth, failures)
     yield "budgets", anytime(40 if full else 15, within("budgets"), failures)
     motions = trajectory_precision(depth=depth, progress=within("whole motions"), failures=failures)
     yield "motions", motions
-    yield "worth", worth(motions)
+    yield "worth", worth(motions, WORLDS)
     yield "order bias", order_bias()
 
 
@@ -154,8 +179,9 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
     return finding_of(KEY, TITLE, QUESTION, f"{answer}.", parts, tables, failures, (targets,))
 
 
-def _part(sentence: str, met: bool, timed: bool = True, quantities: Quantities = ()) -> Part:
-    return Part(sentence, REPRODUCED if met else MIXED, timed=timed, quantities=quantities)
+def _part(sentence: str, met: bool, timed: bool = True, miss: str = "", quantities: Quantities = ()) -> Part:
+    """A part; `miss` says on the first page what is missed, where it is."""
+    return Part(sentence, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss, quantities=quantities)
 
 
 def _missing(sentence: str) -> Part:
@@ -179,7 +205,9 @@ def _say_races(tables: Tables) -> Iterator[Part]:
         ours, target = (forms[0][key] for key in ("our contacts", "asked for"))
         yield _part(
             f"{scene.capitalize()}, at rest: a recorded step of ours, with {ours:.0f} contacts, takes "
-            f"{'; '.join(texts)}. Asked for: at most {target:g}.{missed}", met)  # fmt: skip
+            f"{'; '.join(texts)}. Asked for: at most {target:g}.{missed}", met,
+            miss=f"a step of the {scene} takes {max(race['ratio'] for race in forms):.2g} of MuJoCo's time, "
+                 f"{target:g} asked for")  # fmt: skip
 
 
 def _largest_parts(parts: Table, scene: str) -> str:
@@ -206,13 +234,17 @@ def _say_printed(tables: Tables) -> Iterator[Part]:
         wanted = FACTORS[contacts]
         yield _part(
             f"With 12 coordinates and {contacts} contacts the factored impact takes {ours:.3g} µs, the printed formula "
-            f"{printed:.3g} µs: {ratio:.0f} times as long. Asked for: at least {wanted:g}.", ratio >= wanted
-        )  # fmt: skip
+            f"{printed:.3g} µs: {ratio:.0f} times as long. Asked for: at least {wanted:g}.", ratio >= wanted,
+            miss=f"the factored impact of {contacts} contacts is {ratio:.0f} times as fast as the printed formula, "
+                 f"{wanted:g} asked for")  # fmt: skip
 
 
 def _say_solvers(tables: Tables) -> Iterator[Part]:
     """One sentence per way of calling: faster everywhere, or where not."""
-    found = rivals(tables["solvers"])
+    if SOLVERS not in tables:
+        yield _missing("IAPB beside complementarity solvers: see Against complementarity, which was not computed.")
+        return
+    found = rivals(tables[SOLVERS])
     for called in ("compiled", "from Python"):
         pairs = [pair for pair in found if pair.called == called and pair.solver["outcome"] == "solved"]
         slower = [pair for pair in pairs if pair.costs_more is False]
@@ -220,11 +252,13 @@ def _say_solvers(tables: Tables) -> Iterator[Part]:
         if not decided:
             yield _missing(f"No complementarity solver {called} could be told apart from IAPB.")
             continue
-        checks = _checks(tables["solvers"]) if called == "from Python" else ""
+        checks = _checks(tables[SOLVERS]) if called == "from Python" else ""
         yield _part(
             f"From M, J, v to v⁺ to the same accuracy, {called} on both sides: IAPB is faster in "
             f"{len(decided) - len(slower)} of {len(decided)} pairings of solver and size that differ clearly "
-            f"({len(pairs) - len(decided)} do not){_slower(slower)}.{checks}", not slower)  # fmt: skip
+            f"({len(pairs) - len(decided)} do not){_slower(slower)}.{checks}", not slower,
+            miss=f"{called}, IAPB is slower than a solver in {len(slower)} of {len(decided)} pairs of solver and size"
+        )  # fmt: skip
 
 
 def _slower(pairs: list[Rivals]) -> str:
@@ -252,17 +286,24 @@ def _say_growth(tables: Tables) -> Iterator[Part]:
     times = tables["scaling"]
     power, printed = (exponent(times, method, "contacts") for method in (FACTORED, PRINTED))
     wide = exponent(times, FACTORED, "coordinates")
+    ends = [" (steepest from {:g} to {:g}: {:.2f})".format(*row) for row in tables["fitted"].where(method=FACTORED)
+            .select(("steepest from", "to", "there")).rows]  # fmt: skip
     sizes = times.where(method=FACTORED, coordinates=12).column("contacts")
     yield _part(
         f"The time of the factored impact grows as c to the power {power:.2f} from {min(sizes)} to {max(sizes)} "
-        f"contacts, the printed formula's as {printed:.2f}; with coordinates as d to the power {wide:.2f}. Asked for: "
-        f"at most {LARGEST_EXPONENT['contacts']:g} in c.", power <= LARGEST_EXPONENT["contacts"])  # fmt: skip
+        f"contacts{ends[0]}, the printed formula's as {printed:.2f}; with coordinates as d to the power {wide:.2f}"
+        f"{ends[1]}. Asked for: at most {LARGEST_EXPONENT['contacts']:g} in c.", power <= LARGEST_EXPONENT["contacts"],
+        miss=f"the impact's time grows as contacts to the power {power:.2f}, {LARGEST_EXPONENT['contacts']:g} asked for"
+    )  # fmt: skip
 
 
 def _say_rate(tables: Tables) -> Iterator[Part]:
-    texts = [f"{ours} at d = {d} ({printed} by the printed formula)"
-             for d, ours, printed in tables["contacts at 1 kHz"].rows]  # fmt: skip
-    yield _part(f"Most contacts with 99.9 % of the impacts under a millisecond: {', '.join(texts)}.", True)
+    if RATE not in tables:
+        yield _missing("Most contacts within a millisecond: see claim C19, which was not computed.")
+        return
+    texts = [f"{ours} at d = {d} ({printed} by the printed formula)" for d, ours, printed in tables[RATE].rows]
+    yield _part(f"Most contacts with 99.9 % of the impacts under a millisecond, as claim C19 measures them: "
+                f"{', '.join(texts)}.", True)
 
 
 def _say_bodies(tables: Tables) -> Iterator[Part]:
@@ -270,13 +311,27 @@ def _say_bodies(tables: Tables) -> Iterator[Part]:
     power, last = power_law([row["bodies"] for row in rows], [row["step"] for row in rows]), rows[-1]
     yield _part(
         f"A step of {last['bodies']} free bodies takes {last['step']:.3g} µs; from {LEAST_BODIES} bodies on its time "
-        f"grows as their number to the power {power:.2f}. Asked for: at most {LARGEST_EXPONENT['bodies']:g}.",
-        power <= LARGEST_EXPONENT["bodies"], quantities=(("exponent of bodies", f"{power:.2f}"),))  # fmt: skip
+        f"grows as their number to the power {power:.2f}, over all sizes{_steepest(rows)}. "
+        f"Asked for: at most {LARGEST_EXPONENT['bodies']:g}.", power <= LARGEST_EXPONENT["bodies"],
+        miss=f"the time of a step grows as the number of bodies to the power {power:.2f}, "
+             f"{LARGEST_EXPONENT['bodies']:g} asked for",
+        quantities=(("exponent of bodies", f"{power:.2f}"),))  # fmt: skip
     tested = power_law([row["bodies"] for row in rows], [row["pairs tested"] for row in rows])
     yield _part(
         f"With the broad phase the pairs tested grow as the number of bodies to the power {tested:.2f}: "
         f"{last['pairs tested']:.0f} of {last['pairs of shapes']:,} for {last['bodies']} free bodies. Asked for: at "
-        f"most {LARGEST_EXPONENT['bodies']:g}.", tested <= LARGEST_EXPONENT["bodies"], timed=False)  # fmt: skip
+        f"most {LARGEST_EXPONENT['bodies']:g}.", tested <= LARGEST_EXPONENT["bodies"], timed=False,
+        miss=f"the pairs tested grow as the number of bodies to the power {tested:.2f}")  # fmt: skip
+
+
+def _steepest(rows: Sequence[Row]) -> str:
+    """Where the time grows fastest with the number of bodies, and by how much more they touch there."""
+    if len(rows) < 3:
+        return ""
+    low, high, slope = steepest([row["bodies"] for row in rows], [row["step"] for row in rows])
+    touching = {row["bodies"]: row["contacts"] for row in rows}
+    return (f"; steepest from {low:g} to {high:g} bodies, there to the power {slope:.2f}, where the contacts in a step "
+            f"go from {touching[low]:.2g} to {touching[high]:.2g}")  # fmt: skip
 
 
 def _say_robots(tables: Tables) -> Iterator[Part]:
@@ -291,14 +346,16 @@ def _say_robots(tables: Tables) -> Iterator[Part]:
             f"Mass matrix and bias of {len({row['robot'] for row in rows})} robots ({robots.note}), {form}: "
             f"{best['ratio']:.2g} to {worst['ratio']:.2g} times Pinocchio's, called from Python (most for the "
             f"{worst['quantity']} of {worst['robot']}). Asked for: {'below' if form == MANY else 'at most'} {limit:g}.",
-            worst["ratio"] <= limit)  # fmt: skip
+            worst["ratio"] <= limit, miss=f"the {worst['quantity']} of {worst['robot']}, {form}, takes "
+                                          f"{worst['ratio']:.2g} times Pinocchio's, {limit:g} asked for")  # fmt: skip
 
 
 def _say_start(tables: Tables) -> Iterator[Part]:
     for row in tables["start"].records():
         yield _part(
             f"{row['what']} takes {row['on the wall']:.2f} s on the wall, {row['computing']:.2f} s of it computing. "
-            f"Asked for: under {row['asked for']:g} s of computing.", row["computing"] < row["asked for"])  # fmt: skip
+            f"Asked for: under {row['asked for']:g} s of computing.", row["computing"] < row["asked for"],
+            miss=f"{row['what']} takes {row['computing']:.2f} s, {row['asked for']:g} s asked for")  # fmt: skip
 
 
 def _say_budgets(tables: Tables) -> Iterator[Part]:
@@ -318,7 +375,7 @@ def _say_motions(tables: Tables) -> Iterator[Part]:
         here = motions.where(scene=scene, outcome="ok").records()
         lost = len(motions.where(scene=scene).rows) - len(here)
         best = {name: min(chosen, key=lambda run: (run["position"], run["time"]))
-                for name in ("IAPB", "PB", "rigid", "MuJoCo")
+                for name in ("IAPB", "PB", "ideal", "MuJoCo")
                 if (chosen := [run for run in here if run["method"].startswith(name)])}  # fmt: skip
         text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms per simulated second"
                          for name, run in best.items())
@@ -330,27 +387,28 @@ def _say_motions(tables: Tables) -> Iterator[Part]:
             met = met and bool(as_good) and min(as_good) <= best["MuJoCo"]["time"]
             if as_good:
                 sentence += f"; IAPB is as exact as MuJoCo's best after {min(as_good):.3g} ms per second"
-        yield _part(sentence + (f". {lost} runs failed or timed out." if lost else "."), met)
+        yield _part(sentence + (f". {lost} runs failed or timed out." if lost else "."), met,
+                    miss=f"on the whole motion of {scene} another is as exact in less time")
 
 
 def _say_worth(tables: Tables) -> Iterator[Part]:
-    if "worth" not in tables:
-        return
     rows = tables["worth"].records()
-    costs = [f"{row['method']} {row['tenfold accuracy costs']:.2g}" for row in rows if row["tenfold accuracy costs"]]
-    never = [row["method"] for row in rows if not row["most exact for its time"]]
-    yield _part(f"Ten times the accuracy of a whole motion costs, in times the computing time: {', '.join(costs)}; no "
-                "step buys it where the model of contact decides. Never worth its time, for another is faster and more "
+    names = {row["method"]: row["method"].split(",")[0].removesuffix(" (QP per step)") for row in rows}
+    costs = [f"{names[row['method']]} {times(row['tenfold accuracy costs'])}" for row in rows if row["scenes fitted"]]
+    stays = [names[row["method"]] for row in rows if row["error stays"] == row["scenes"]]
+    never = [names[row["method"]] for row in rows if not row["best for its time"]]
+    level = f"; no step buys it in {', '.join(stays)}, where the error stays" if stays else ""
+    yield _part("Ten times the accuracy of a whole motion costs, in times the computing time (medians over the "
+                f"scenes): {', '.join(costs)}{level}. Never worth its time here, for another is faster and more "
                 f"exact on every scene: {', '.join(never) or 'none'}.", True)
 
 
 def _say_order(tables: Tables) -> Iterator[Part]:
-    if "order bias" not in tables:
-        return
     rows = tables["order bias"].records()
     worst = max(rows, key=lambda row: float(row["spread"]))
     yield _part(f"The same method timed right after each other one: medians differ by at most {worst['spread']:.2g} % "
-                f"({worst['method']}). Asked for: within 10 %.", worst["spread"] <= 10.0)
+                f"({worst['method']}). Asked for: within 10 %.", worst["spread"] <= 10.0,
+                miss=f"the order of timing biases {worst['method']} by {worst['spread']:.2g} %, 10 % asked for")
 
 
 def _error(run: Row) -> str:

@@ -4,13 +4,17 @@ Our compiled worlds are timed in their loop, the record included. The others are
 record: their time is that of the run less that of a run of one step. The least of REPEATS short runs counts. What
 raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST by the time of the coarser
 steps is a time-out. Both stay among the rows. An error below what the truth is worth is no measurement: the row has
-the truth's bound in its place, and its note says so.
+the truth's bound in its place, and its note says so. No scene has an impact at a multiple of a step: there a run
+would be exact by chance.
+
+`curves` says what ten times the accuracy costs along the runs of one method on one scene, and the figures draw the same
+curves; `worth` sums them up per method.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, sin, sqrt
 from typing import Any
@@ -29,6 +33,7 @@ from reference.simulators.scene import FLOOR, RADIUS, WEIGHT, Cuboid, Obstacle, 
 from reference.simulators.trajectory import steps_between_samples
 from verification.clock import timed
 from verification.cost.loop import RecordedLoop
+from verification.cost.step_cost import IDEAL
 from verification.finding import Column, Failure, Table, attempt, table_of
 
 _BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
@@ -65,9 +70,27 @@ def peg_landing() -> FixedScene:
                       0.185, _PEG[0], _PUSH)  # fmt: skip
 
 
+def later(name: str) -> FixedScene:
+    """A scene of the fixed set whose impacts come `_LATER` later: its bodies start that much further back in flight.
+
+    In the set itself an impact falls on a multiple of the step, and a run with that step is exact by chance.
+    """
+    scene = fixed_scene(name)
+    gravity = np.array(scene.gravity)
+
+    def earlier(body: RigidBody) -> RigidBody:
+        position, velocity = np.array(body.position), np.array(body.velocity)
+        x, y, z = (position - _LATER * velocity + 0.5 * _LATER**2 * gravity).tolist()
+        vx, vy, vz = (velocity - _LATER * gravity).tolist()
+        return replace(body, position=(x, y, z), velocity=(vx, vy, vz))
+
+    return replace(scene, bodies=tuple(map(earlier, scene.bodies)))
+
+
+_LATER = 0.5e-3 * (sqrt(5.0) - 1.0)  # [s] the golden ratio of a millisecond: no step divides it
 TRAJECTORY_SCENES: dict[str, Callable[[], FixedScene]] = {
     made.__name__: made for made in (cradle, bouncing_ball, peg_landing)
-} | {name: partial(fixed_scene, name) for name in ("bernoulli", "box_on_four_corners", "box_on_sixteen_corners")}
+} | {name: partial(later, name) for name in ("bernoulli", "box_on_four_corners", "box_on_sixteen_corners")}
 
 
 Floats = NDArray[np.float64]
@@ -77,7 +100,7 @@ STEPS = {
     "full": (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
 }  # [s]
 ENGINES = ("mujoco", "bullet", "drake")  # those of the adapters that take any step
-REPEATS = 2  # below ONCE seconds
+REPEATS = 5  # below ONCE seconds
 ONCE = 0.05
 LONGEST = {"quick": 0.2, "full": 20.0}  # [s] for one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
@@ -139,41 +162,149 @@ def trajectory_precision(
     return table_of(COLUMNS, records, digits=3, note=NOTE)
 
 
+GAINED = 1.5  # a run belongs to a fit if its error is so many times smaller than that of the run before it in the fit
+_LEAST_FALL = 3.0  # over all runs of a fit: with less, a cost of ten times the accuracy would be a guess
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The runs of one method on one scene, from the coarsest step to the finest.
+
+    Attributes
+    ----------
+    fitted : runs along which the error falls; the cost is fitted to exactly these. () without a cost.
+    left_out : the others: before the error falls, after it stops falling, or exact by chance (`by_chance`).
+    cost : times the computing time that a tenth of the error costs; None where the error does not fall threefold.
+    front : runs that no other run of the scene beats in both time and error.
+    too_few : whether there is no cost because finer steps took too long.
+    """
+
+    scene: str
+    method: str
+    fitted: tuple[Record, ...]
+    left_out: tuple[Record, ...]
+    cost: float | None
+    front: tuple[Record, ...]
+    too_few: bool
+
+    @property
+    def runs(self) -> list[Record]:
+        """All runs, coarse to fine."""
+        return _by_step((*self.fitted, *self.left_out))
+
+    @property
+    def least(self) -> float:
+        """The smallest error of position that is no chance."""
+        return float(min(run["position"] for run in self.runs if not by_chance(run)))
+
+    @property
+    def level(self) -> bool:
+        """Whether runs finer than those of the fit no longer improve."""
+        return bool(self.fitted) and any(run["step"] < self.fitted[-1]["step"] and not by_chance(run)
+                                         for run in self.left_out)
+
+    @property
+    def words(self) -> str:
+        """What ten times the accuracy costs on this scene, for a name at the curve."""
+        if self.cost is None:
+            return "too few runs" if self.too_few else f"stays at {self.least:.2g}"
+        return f"10× costs {times(self.cost)}{', then level' * self.level}"
+
+
+def times(factor: float) -> str:
+    """A factor in a few characters: 3.4×, 49×."""
+    return f"{factor:.2g}×" if factor < 10.0 else f"{factor:.0f}×"
+
+
+def _by_step(runs: Iterable[Record]) -> list[Record]:
+    return sorted(runs, key=lambda run: -float(run["step"]))
+
+
+def by_chance(run: Record) -> bool:
+    """Whether the error of position is below what the truth is known to: the step met the instants of impact."""
+    return "position" in run["note"] and str(run["note"]).endswith(BELOW)
+
+
+def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
+    """Return a curve for each scene and each of some methods with a run; the front is among these methods."""
+    found: list[Curve] = []
+    for scene in dict.fromkeys(motions.column("scene")):
+        here = [run for run in motions.where(scene=scene, outcome="ok").records()
+                if run["method"] in methods and run["time"] > 0.0]
+        honest = [run for run in here if not by_chance(run)]
+        for method in methods:
+            runs = _by_step(run for run in honest if run["method"] == method)
+            if not runs:
+                continue
+            fitted = falling(runs)
+            cost = tenfold_cost(fitted)
+            kept = fitted if cost is not None else []
+            left_out = (run for run in here if run["method"] == method and run not in kept)
+            late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
+            found.append(Curve(scene, method, tuple(kept), tuple(left_out), cost,
+                               tuple(run for run in runs if on_front(run, honest)),
+                               cost is None and late and len(fitted) == len(runs)))
+    return found
+
+
+def falling(runs: Sequence[Record]) -> list[Record]:
+    """Return the runs, coarse to fine, along which the error falls by GAINED each; the first: the last before it does.
+    """
+    kept = [runs[0]]
+    for run in runs[1:]:
+        if run["position"] * GAINED <= kept[-1]["position"]:
+            kept.append(run)
+        elif len(kept) == 1 and run["position"] >= kept[0]["position"]:
+            kept = [run]
+    return kept
+
+
+def tenfold_cost(runs: Sequence[Record]) -> float | None:
+    """10^(−1/slope) of error over time, by least squares in logarithms; None where the error falls less than threefold.
+    """
+    if runs[0]["position"] < _LEAST_FALL * runs[-1]["position"]:
+        return None
+    time, error = (np.log10([run[key] for run in runs]) for key in ("time", "position"))
+    return float(10.0 ** (-1.0 / np.polyfit(time, error, 1)[0]))
+
+
 WORTH_COLUMNS = (
-    Column("method", condition=True), Column("least error", timed=True), Column("tenfold accuracy costs", timed=True),
-    Column("most exact for its time", "scenes", timed=True), Column("energy made", timed=True),
+    Column("method", condition=True), Column("tenfold accuracy costs", timed=True), Column("least cost", timed=True),
+    Column("largest cost", timed=True), Column("scenes fitted", timed=True), Column("error stays", timed=True),
+    Column("least error", timed=True), Column("best for its time", "scenes", timed=True), Column("scenes", timed=True),
+    Column("most exact there", timed=True), Column("least exact there", timed=True), Column("energy made", timed=True),
     Column("failed", "runs", timed=True),
 )
 
 
-def worth(motions: Table) -> Table:
+def worth(motions: Table, methods: Sequence[str]) -> Table:
     """Per method, over all scenes: its errors, what ten times the accuracy costs, and where no other is better.
 
-    The cost of ten times the accuracy is 10^(−1/slope) of error over time, by least squares in logarithms over the
-    runs of a scene down to its least error; the median over the scenes in which the error falls at all.
+    The cost is the median over the scenes on which it can be fitted; "error stays": on so many the error does not fall;
+    "best for its time": scenes on whose front it is, with the errors that it has there.
     """
+    found = curves(motions, methods)
     records: list[dict[str, Any]] = []
-    for method in dict.fromkeys(motions.column("method")):
-        factors, best, least, made = [], [], [], 0.0
-        for scene in dict.fromkeys(motions.column("scene")):
-            here = motions.where(scene=scene, outcome="ok").records()
-            mine = [row for row in here if row["method"] == method]
-            if not mine:
-                continue
-            made = max(made, *(row["energy made"] for row in mine))
-            best += [scene] * any(on_front(row, here) for row in mine)
-            last = min(range(len(mine)), key=[row["position"] for row in mine].__getitem__)
-            least.append(mine[last]["position"])
-            time, error = (np.log10([row[key] for row in mine[: last + 1] if row["time"] > 0.0])
-                           for key in ("time", "position"))
-            if len(time) > 1 and error[0] - error[-1] > 0.5:
-                factors.append(10.0 ** (-1.0 / float(np.polyfit(time, error, 1)[0])))
+    for method in methods:
+        mine = [curve for curve in found if curve.method == method]
+        if not mine:
+            continue
+        costs = [curve.cost for curve in mine if curve.cost is not None]
+        front = [run["position"] for curve in mine for run in curve.front]
         runs = motions.where(method=method)
-        records.append({"method": method, "least error": float(np.median(least)) if least else None,
-                        "tenfold accuracy costs": float(np.median(factors)) if factors else None,
-                        "most exact for its time": len(best), "energy made": made,
-                        "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
-    return table_of(WORTH_COLUMNS, records, digits=2, note="Errors of position: medians over the scenes.")
+        records.append({
+            "method": method, "tenfold accuracy costs": float(np.median(costs)) if costs else None,
+            "least cost": min(costs, default=None), "largest cost": max(costs, default=None),
+            "scenes fitted": len(costs), "scenes": len(mine),
+            "error stays": sum(curve.cost is None and not curve.too_few for curve in mine),
+            "least error": float(np.median([curve.least for curve in mine])),
+            "best for its time": sum(bool(curve.front) for curve in mine),
+            "most exact there": min(front, default=None), "least exact there": max(front, default=None),
+            "energy made": max(run["energy made"] for curve in mine for run in curve.runs),
+            "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
+    return table_of(WORTH_COLUMNS, records, digits=2, note=(
+        "Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
+        f"falls by a factor of {GAINED:g} or more from one to the next."))
 
 
 def on_front(row: Record, others: Sequence[Record]) -> bool:
@@ -181,15 +312,21 @@ def on_front(row: Record, others: Sequence[Record]) -> bool:
     return not any(one["time"] < row["time"] and one["position"] < row["position"] for one in others)
 
 
+IMPULSES, PENALTIES = "IAPB, semi-implicit Euler", "PB, semi-implicit Euler"
+# Two comparisons of at most six curves, each with a front of its own: worlds and engines, and integrators.
+WORLDS = (IMPULSES, PENALTIES, IDEAL, "MuJoCo", "Drake", "Bullet")
+INTEGRATORS = (IMPULSES, "IAPB, midpoint", "IAPB, Runge-Kutta 4", PENALTIES, "PB, Runge-Kutta 4")
+
+
 def methods() -> dict[str, Motion]:
-    """Name -> way to run a scene: our worlds with each integrator, the rigid world's schemes, installed engines."""
+    """Name -> way to run a scene: our worlds with each integrator, the ideal world, installed engines."""
     ways: dict[str, Motion] = {
-        "IAPB, semi-implicit Euler": _compiled("ImpulseAugmented", "semi_implicit_euler"),
+        IMPULSES: _compiled("ImpulseAugmented", "semi_implicit_euler"),
         "IAPB, midpoint": _compiled("ImpulseAugmented", "midpoint"),
         "IAPB, Runge-Kutta 4": _compiled("ImpulseAugmented", "runge_kutta_4"),
-        "PB, semi-implicit Euler": _compiled("Penalty", "semi_implicit_euler"),
+        PENALTIES: _compiled("Penalty", "semi_implicit_euler"),
         "PB, Runge-Kutta 4": _compiled("Penalty", "runge_kutta_4"),
-        "rigid (QP per step)": _adapter("rigid"),
+        IDEAL: _adapter("rigid"),
     }
     for name in ENGINES:
         try:

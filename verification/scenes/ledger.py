@@ -235,8 +235,9 @@ def _impacts(measures: Sequence[Measure]) -> Part:
     gained, most = max(m[_ADDED] for m in measures), max(measures, key=lambda m: int(m["most rows in one impact"]))
     rounding = gained <= ROUNDING
     return Part(
-        f"In {sum(m['impacts'] for m in measures)} impacts with up to {most['most rows in one impact']} rows at once "
-        f"({most['scene']}), the largest energy gain, summed in doubles, is {gained:.0e} of the energy exchanged"
+        f"In {sum(m['impacts'] for m in measures)} impacts of the scenes as their files are, with up to "
+        f"{most['most rows in one impact']} rows at once ({most['scene']}), the largest energy gain, summed in "
+        f"doubles, is {gained:.0e} of the energy exchanged"
         + (", the rounding of that sum." if rounding else "."),
         REPRODUCED if rounding else REFUTED)  # fmt: skip
 

@@ -13,7 +13,8 @@ from reference.fclib import write_fclib
 from verification.complementarity.findings import problems
 from verification.complementarity.problems import FACTORS, study_problems
 from verification.cost import step_cost
-from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, PRINTED, impact_cost
+from verification.cost.calls import PRINTED
+from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, impact_cost
 
 
 def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from verification.claims import CLAIMS
+from verification.cost.calls import PRINTED
 from verification.cost.growth import (
     ALLOWED,
     FACTORED,
-    PRINTED,
     RATE_COLUMNS,
     SCALING_COLUMNS,
     SIZES,

@@ -10,17 +10,27 @@ import pytest
 import typer
 
 from reports.commands import bench as command
-from reports.figures.cost import anytime, effect_costs, effect_steps, impact_scaling, trajectory_precision
+from reports.figures.cost import (
+    anytime,
+    effect_costs,
+    effect_steps,
+    impact_scaling,
+    integrator_precision,
+    trajectory_precision,
+)
+from reports.figures.plot import Plot
+from tests.reports.figure_inputs import tables as kept_tables
 from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
+from verification.cost.calls import PRINTED
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
 from verification.cost.effects import steps, summary
-from verification.cost.growth import FACTORED, PRINTED, RATE_COLUMNS, SCALING_COLUMNS, fitted
+from verification.cost.growth import FACTORED, RATE_COLUMNS, SCALING_COLUMNS, fitted, steepest
 from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
 from verification.cost.start_up import COLUMNS as START_COLUMNS
 from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL
-from verification.cost.study import _rate, finding
-from verification.cost.trajectories import BELOW, worth
+from verification.cost.study import RATE, SOLVERS, _rate, compute, finding, quoting
+from verification.cost.trajectories import BELOW, INTEGRATORS, WORLDS, by_chance, curves, tenfold_cost, worth
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
 from verification.mechanics.robot_timing import MANY, ONE
@@ -72,7 +82,7 @@ def tables() -> Tables:
     robots = titled(("robot", "quantity", "form", "ratio"), [("arm", "bias", form, 0.9) for form in (ONE, MANY)])
     late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0},
             {"method": "the printed formula", "coordinates": 3, "contacts": 60, "late calls": 0}]  # fmt: skip
-    motions = [_run("IAPB, Runge-Kutta 4", 1.0, 1e-3, 1.0), _run("PB, semi-implicit Euler", 1.0, 1.0, 1.0),
+    motions = [_run("IAPB, semi-implicit Euler", 1.0, 1e-3, 1.0), _run("PB, semi-implicit Euler", 1.0, 1.0, 1.0),
                _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")]  # fmt: skip
     return {
         "steps against MuJoCo": _races(0.05),
@@ -85,7 +95,7 @@ def tables() -> Tables:
         "solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4), ("Lemke kernel", 2e-6)),
         "start": Table(START_COLUMNS, (("iapb --help", 0.4, 0.3, 1, 0.5),)),
         "budgets": table_of(BUDGET_COLUMNS, [_budget(budget) for budget in range(5)]),
-        "motions": table_of(MOTION_COLUMNS, motions), "worth": worth(table_of(MOTION_COLUMNS, motions)),
+        "motions": table_of(MOTION_COLUMNS, motions), "worth": worth(table_of(MOTION_COLUMNS, motions), WORLDS),
         "order bias": titled(("method", "spread"), [("IAPB", 4.0)]),
     }  # fmt: skip
 
@@ -118,8 +128,9 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
     ],
 )
 def test_a_miss_is_called_one(tables: Tables, change: Tables, words: str) -> None:
-    missed = [part.sentence for part in _found(tables | change).parts if part.verdict == MIXED]
-    assert len(missed) == 1 and words in missed[0]
+    missed = [part for part in _found(tables | change).parts if part.verdict == MIXED]
+    assert len(missed) == 1 and words in missed[0].sentence
+    assert missed[0].miss or "any number of rows" in missed[0].sentence  # the first page has a clause on it
 
 
 def test_an_absent_engine_is_named(tables: Tables) -> None:
@@ -137,10 +148,10 @@ def test_an_error_that_the_truth_cannot_show_is_not_called_an_error(tables: Tabl
 def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
     motions = trajectory_precision.draw(inputs)
-    assert len(motions.panels) == 2
-    assert [name for name, _ in motions.legend] == ["IAPB, RK4", "PB, Euler", "MuJoCo"]
+    assert [panel.label for panel in motions.panels] == ["", "ball"]
+    assert [name for name, _ in motions.legend] == ["IAPB", "PB", "MuJoCo", "best for its time"]
     without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
-    assert motions.panels[0].svg != trajectory_precision.draw(without).panels[0].svg
+    assert motions.panels[1].svg != trajectory_precision.draw(without).panels[1].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
 
 
@@ -181,11 +192,90 @@ def test_bench_ends_with_1_where_a_row_failed(
     command.bench(False, False, "", 20, 6)
 
 
+def _table(**errors: tuple[float, ...]) -> Table:
+    """Runs whose steps and times fall and grow by a hundred from one to the next; " in a note: below the bound."""
+    return table_of(MOTION_COLUMNS, [
+        _run(name, 10.0**-k, error, 1.1 * 100.0**k + (name == "late"), note=f"position {BELOW}" if error < 1e-9 else "")
+        for name, given in errors.items() for k, error in enumerate(given)])  # fmt: skip
+
+
 def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
     """Error over time with slope −1/2 costs a hundredfold; a method behind another on every scene is on no front."""
-    runs = [_run(name, 1.0, error, time)
-            for name, errors in (("good", (1e-1, 1e-2, 1e-3)), ("late", (2e-1, 2e-1, 2e-1)))
-            for error, time in zip(errors, (1.1, 1.1e2, 1.1e4), strict=True)]
-    good, late = worth(table_of(MOTION_COLUMNS, runs)).records()
-    assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["most exact for its time"] == 1
+    good, late = worth(_table(good=(1e-1, 1e-2, 1e-3), late=(2e-1, 2e-1, 2e-1)), ("good", "late")).records()
+    assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["best for its time"] == 1
     assert late["tenfold accuracy costs"] is None and late["least error"] == 2e-1
+    assert late["best for its time"] == 0 and late["error stays"] == 1
+
+
+@pytest.mark.parametrize(("errors", "fitted", "words"), [
+    ((1e-1, 1e-2, 1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×"),
+    ((1e-1, 1e-2, 0.9e-2, 1.1e-2), (1e-1, 1e-2), "10× costs 100×, then level"),
+    ((0.9, 1.0, 1e-1, 1e-2), (1.0, 1e-1, 1e-2), "10× costs 100×"),  # the coarse end does not count
+    ((1e-1, 1e-2, 1e-10), (1e-1, 1e-2), "10× costs 100×"),  # exact by chance
+    ((0.5, 0.48, 0.5), (), "stays at 0.48"),
+])
+def test_a_fit_takes_the_runs_on_which_the_error_falls(
+    errors: tuple[float, ...], fitted: tuple[float, ...], words: str
+) -> None:
+    [curve] = curves(_table(good=errors), ("good",))
+    assert tuple(run["position"] for run in curve.fitted) == fitted and curve.words == words
+    assert sorted(run["position"] for run in curve.runs) == sorted(errors)
+
+
+@pytest.mark.parametrize(("recipe", "methods"), [(trajectory_precision, WORLDS), (integrator_precision, INTEGRATORS)])
+def test_a_fit_uses_exactly_the_filled_marks_that_are_drawn(
+    recipe: Any, methods: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filled, hollow = [], []
+
+    def noted(self: Plot, points: Any, look: Any, **how: Any) -> None:
+        (filled if look.filled else hollow).append(sorted(points))
+
+    monkeypatch.setattr(Plot, "marks", noted)
+    motions = kept_tables()["haptic-rate/motions"]
+    drawn = recipe.draw({"haptic-rate/motions": motions})
+    found = curves(motions, methods)
+    assert len(found) > 20 and sum(curve.cost is not None for curve in found) > 10
+    for curve in found:
+        assert curve.cost is None or curve.cost == tenfold_cost(curve.fitted)
+        assert sorted((run["time"], run["position"]) for run in curve.fitted) in filled
+        assert sorted((run["time"], run["position"]) for run in curve.left_out if not by_chance(run)) in hollow
+        [panel] = [panel for panel in drawn.panels if panel.label == curve.scene]
+        assert f": {curve.words}</text>" in panel.svg
+    assert drawn.numbers.rows == worth(motions, methods).rows  # the table in the picture is that of the same runs
+    for row in drawn.numbers.records():
+        assert ("never worth" in drawn.panels[0].alt.split("best for its time: ")[1 + methods_of(drawn, row)]) == (
+            row["best for its time"] == 0)  # fmt: skip
+
+
+def methods_of(drawn: Any, row: Any) -> int:
+    """The line of a method in the picture's table."""
+    return int(drawn.numbers.column("method").index(row["method"]))
+
+
+def test_the_scenes_have_no_impact_at_a_multiple_of_a_step() -> None:
+    """Otherwise a run is exact by chance, and its method seems better than it is."""
+    runs = kept_tables()["haptic-rate/motions"].where(outcome="ok").records()
+    assert len(runs) > 150 and not any(by_chance(run) for run in runs)
+
+
+def test_a_report_measures_each_quantity_once_and_quotes_it(
+    tables: Tables, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = {name: table for name, table in tables.items() if name not in (RATE, SOLVERS)}
+    monkeypatch.setattr("verification.cost.study.measured", lambda *given: iter(own.items()))
+    topic = compute(None, "quick", lambda done, total: None)
+    assert not {RATE, SOLVERS} & set(topic.tables)
+    assert [part.verdict for part in topic.parts].count(NOT_COMPUTED) == 2
+    late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0}]
+    c19 = Finding("C19", "", "", "", REPRODUCED, tables={"C19": table_of(RATE_COLUMNS, late)})
+    costs = Finding("complementarity", "", "", "", REPRODUCED, tables={"time per impact": tables[SOLVERS]})
+    whole = quoting(topic, (c19, costs))
+    assert whole.tables[SOLVERS] is costs.tables["time per impact"]
+    assert whole.tables[RATE].rows == _rate(c19.tables["C19"]).rows
+    assert NOT_COMPUTED not in [part.verdict for part in whole.parts]
+    assert quoting(replace(topic, tables={}), (c19, costs)).parts == topic.parts
+
+
+def test_where_a_curve_climbs_fastest_is_found() -> None:
+    assert steepest([1, 100, 10], [1.0, 1e4, 10.0]) == (10, 100, pytest.approx(3.0))

@@ -7,15 +7,17 @@ import pytest
 
 from iapb import ArgumentError
 from reports.commands.bench import seconds_of
-from reports.figures.cost import budget_share, impact_accuracy
+from reports.figures.cost import budget_share, impact_accuracy, where_iapb_loses
 from reports.figures.cost import which_method as drawn_choices
 from verification import which_method
+from verification.claims.c22_cost import COLUMNS as C22_COLUMNS
 from verification.cost import calls, impacts
 from verification.cost.calls import KernelCall, LemkeCall, SweepsCall, engine_call
 from verification.cost.impacts import (
     COMPILED,
     IAPB,
     METHOD_COLUMNS,
+    SOLVED,
     SWEEPS,
     TOO_SLOW,
     WAYS,
@@ -96,18 +98,32 @@ def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> No
     assert chosen(3e-7) is None
     assert chosen(5e-7) == chosen(2e-6) == (SWEEPS, "4 sweeps")  # the more exact one makes energy
     assert chosen(2.6e-6) == chosen(1.0) == ("Lemke", "all pivots")  # below 1e-9 the faster one
-    assert "stopped after 4 sweeps" in str(choose(KNOWN, 5e-7, 4, 3))
-    assert choices(KNOWN).column("method") == [SWEEPS, *["Lemke"] * 4]
+    nearest = choose(KNOWN, 5e-7, 4, 3)
+    assert nearest is not None and not nearest.enough and "no method solves half" in str(nearest)
+    assert "nearest is Gauss-Seidel, stopped after 4 sweeps" in str(nearest)
+
+
+def test_a_cell_names_no_method_that_solves_less_than_half() -> None:
+    """A row of IAPB with an error of 1 was named as the method to take."""
+    table = choices(KNOWN)
+    assert table.column("method") == ["none", *["Lemke"] * 4]
+    assert table.column("nearest") == ["Gauss-Seidel, 4 sweeps: 0.1", *[None] * 4]
+    assert all(row["share solved"] >= 50.0 and row["error"] <= SOLVED for row in table.records() if row["time"])
 
 
 def test_where_a_rival_is_faster_is_said() -> None:
     assert [row["solver"] for row in lost_to_rivals(KNOWN).records()] == ["Lemke", "Lemke"]
-    assert "Lemke is up to 1.2 times as fast as IAPB" in impact_accuracy.draw({"work_precision": KNOWN}).caption
+    keys = ("problem", "contacts", "ratio", "lower quartile", "upper quartile")
+    rows = [("pile", 1, 2.0, 1.9, 2.1), ("pile", 8, 0.5, 0.4, 0.6), ("pile", 64, 0.99, 0.9, 1.1)]
+    kernels = table_of(C22_COLUMNS, [dict(zip(keys, row, strict=True)) for row in rows])
+    said = where_iapb_loses.draw({"work_precision": KNOWN, "C22/C22": kernels}).caption
+    assert "On pile IAPB loses at 1 of 3 sizes, from 8 to 8 contacts: at worst it takes 2 times as long" in said
+    assert "with 4 contacts IAPB loses on 2, at worst to Lemke, by 1.2 times" in said and "The reason: " in said
 
 
 def test_figures_show_every_size_and_failure() -> None:
     inputs = {"work_precision": KNOWN}
-    assert "0.5 µs: Gauss-Seidel" in drawn_choices.draw(inputs).panels[0].alt
+    assert "0.5 µs: none" in drawn_choices.draw(inputs).panels[0].alt
     assert len(budget_share.draw(inputs).panels) == 3
     without = {"work_precision": KNOWN.where(outcome="ok")}
     slow = impact_accuracy.draw({"work_precision": rows_of((IAPB, "all rows", 1e5, 1e-15, 0.0))})
