@@ -15,7 +15,7 @@ import inspect
 import struct
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
@@ -35,6 +35,7 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+from numpy.typing import NDArray
 
 from iapb.inlining import compile_as_whole
 
@@ -45,7 +46,7 @@ def _source_stamp() -> str:
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         text = path.read_bytes()
-        if b"iapb.compiled" in text or path.name in ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays.py"):
+        if b"@kernel" in text or path.name in ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays.py"):
             digest.update(str(path.relative_to(folder)).encode() + b"\0" + text)
     return digest.hexdigest()
 
@@ -138,7 +139,7 @@ class Block:
 
     block_type: BlockType
     address: int  # of the layout in memory
-    _folded: tuple[_Tree, np.ndarray, int]  # of a twin: what it is made of
+    _folded: tuple[_Tree, np.ndarray, int, Sequence[np.ndarray]]  # of a twin: what it is made of
     _piece: np.ndarray | None = None  # of a twin: the memory of its layouts, then of its arrays
 
     def __init__(self, content: Any) -> None:
@@ -150,54 +151,68 @@ class Block:
         self._memory = np.array(words, dtype=np.int64)
         self.address = self._memory.ctypes.data
 
-    def twin(self, blank: bool = False) -> Block:
-        """Return a block of the same layout in memory of its own, a copy or all zeros: quicker than making one.
+    def twin(self) -> Block:
+        """Return a copy with the same layout in memory of its own: quicker than making one.
 
         Its layouts and arrays lie in one piece of memory; the Python objects of a nested block are made when first
         asked for.
         """
-        plan, empty = self._plan, np.zeros if blank else np.empty
-        raw = empty(plan.size + _LINE, np.uint8)
+        plan = self._plan
+        raw = np.empty(plan.size + _LINE, np.uint8)
         start: int = raw.__array_interface__["data"][0]
         piece = raw[-start % _LINE:][: plan.size]
         words, base = piece[: plan.words.nbytes].view(np.int64), start + -start % _LINE
         words[:] = plan.words
-        words[plan.addresses] += base
-        made = _unfolded(plan.tree, piece, base)
+        words[plan.blocks] += base
+        words[plan.arrays] += base
+        made = _unfolded(plan.tree, piece, base, ())
         made._plan, made._piece = plan, piece
-        if not blank and self._piece is not None:
+        if self._piece is not None:
             piece[plan.words.nbytes :] = self._piece[plan.words.nbytes :]
-        elif not blank:
+        else:
             for ours, theirs in zip(made.arrays(), self.arrays(), strict=True):
                 ours[...] = theirs
         return made
+
+    def on(self, arrays: Sequence[np.ndarray], addresses: NDArray[np.int64]) -> Block:
+        """Return a block like this one on other arrays of the same shapes, in the order of `arrays()`.
+
+        The caller gives the addresses of their first entries, which numpy takes long to tell.
+        """
+        plan = self._plan
+        words = plan.words.copy()
+        base: int = words.__array_interface__["data"][0]
+        words[plan.blocks] += base
+        words[plan.arrays] = addresses
+        return _unfolded(plan.tree, words.view(np.uint8), base, arrays)
 
     @cached_property
     def _plan(self) -> _Plan:
         """Where everything lies in a twin."""
         blocks = list(self._with_nested())
         starts = np.cumsum([0, *(_rounded(each._memory.nbytes) for each in blocks)]).tolist()
-        places = dict(zip(map(id, blocks), starts, strict=False))
-        words, addresses, at = np.zeros(starts[-1] // 8, np.int64), [], starts[-1]
+        words, nested, at = np.zeros(starts[-1] // 8, np.int64), [], starts[-1]
+        parts: dict[int, _Part] = {}  # by the word of its address
         trees: dict[int, _Tree] = {}
-        for each in reversed(blocks):  # nested ones first
+        places = dict(zip(map(id, blocks), starts, strict=False))
+        for each in blocks:
             first = places[id(each)] // 8
-            members: list[Any] = []
             words[first : first + len(each._memory)] = each._memory
             for member, place in zip(each._content, each.block_type.places, strict=True):
                 if isinstance(member, np.ndarray):
-                    members.append(_Part(at, member.shape, member.dtype, member.strides))
-                    words[first + place + 4], at = at, at + _rounded(member.nbytes)
-                    addresses.append(first + place + 4)
+                    words[first + place + 4] = at
+                    parts[first + place + 4] = _Part(len(parts), at, member.shape, member.dtype, member.strides)
+                    at += _rounded(member.nbytes)
                 elif isinstance(member, Block):
-                    members.append(trees[id(member)])
                     words[first + place] = places[id(member)]
-                    addresses.append(first + place)
-                else:
-                    members.append(member)
-            layout = 8 * first, 8 * first + each._memory.nbytes
-            trees[id(each)] = _Tree(*layout, type(each._content), each.block_type, members)
-        return _Plan(at, words, np.array(addresses, np.int64), trees[id(self)])
+                    nested.append(first + place)
+        for each in reversed(blocks):  # nested ones first
+            first, size = places[id(each)], each._memory.nbytes
+            members = [parts[first // 8 + place + 4] if isinstance(member, np.ndarray) else
+                       trees[id(member)] if isinstance(member, Block) else member
+                       for member, place in zip(each._content, each.block_type.places, strict=True)]
+            trees[id(each)] = _Tree(first, first + size, type(each._content), each.block_type, members)
+        return _Plan(at, words, np.array(nested, np.int64), np.array([*parts], np.int64), trees[id(self)])
 
     def _with_nested(self) -> Iterator[Block]:
         yield self
@@ -213,19 +228,22 @@ class Block:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # not yet made
             if name == "_content" and "_folded" in self.__dict__:
-                tree, piece, base = self._folded
-                self._content = tree.kind(*(
-                    np.ndarray(member.shape, member.dtype, piece, member.at, member.strides)
-                    if type(member) is _Part else _unfolded(member, piece, base) if type(member) is _Tree else member
-                    for member in tree.members))
+                tree, piece, base, given = self._folded
+                self._content = tree.kind(*[
+                    (given[member.number] if given else
+                     np.ndarray(member.shape, member.dtype, piece, member.at, member.strides))
+                    if type(member) is _Part else
+                    _unfolded(member, piece, base, given) if type(member) is _Tree else member
+                    for member in tree.members])
                 return self._content
             raise AttributeError(name)  # as when unpickling
         return getattr(self._content, name)
 
 
 class _Part(NamedTuple):
-    """An array of a twin: byte of its piece at which it begins, and what it looks like."""
+    """An array of a twin: its number, byte of its piece at which it begins, and what it looks like."""
 
+    number: int
     at: int
     shape: tuple[int, ...]
     dtype: np.dtype[Any]
@@ -243,18 +261,19 @@ class _Tree(NamedTuple):
 
 
 class _Plan(NamedTuple):
-    """A twin: bytes in all, the layouts with addresses as if the piece lay at 0, which words are addresses."""
+    """A twin: bytes in all, layouts with addresses as if it lay at 0, which words are those of blocks and of arrays."""
 
     size: int
     words: np.ndarray
-    addresses: np.ndarray
+    blocks: np.ndarray
+    arrays: np.ndarray
     tree: _Tree
 
 
-def _unfolded(tree: _Tree, piece: np.ndarray, base: int) -> Block:
+def _unfolded(tree: _Tree, piece: np.ndarray, base: int, given: Sequence[np.ndarray]) -> Block:
     """The block of a twin, of which nothing but the address is made yet."""
     made = object.__new__(Block)
-    made.block_type, made.address, made._folded = tree.block_type, base + tree.at, (tree, piece, base)
+    made.block_type, made.address, made._folded = tree.block_type, base + tree.at, (tree, piece, base, given)
     made._memory = piece[tree.at : tree.stop].view(np.int64)
     return made
 

@@ -33,14 +33,21 @@ def distrust_of(run: Run) -> tuple[str, ...]:
                                    _flew(run), _overran(run)) if found)
 
 
-def _at_hand(run: Run) -> tuple[float, float]:
-    """Energy in springs at the start, and all that the run may show [J]: start, springs, fallen through, worked in."""
-    energy, contact = run.energy, run.scene_resolved.get("contact", {})
-    first = slice(int(run.contacts.offsets[0]), int(run.contacts.offsets[1])) if run.steps else slice(0, 0)
-    stored = 0.5 * contact.get("stiffness", 0.0) * float(np.sum(np.minimum(run.contacts.gap[first], 0.0) ** 2))
+def _in_springs(run: Run) -> float:
+    """Energy in springs at the start [J]."""
+    touching = run.contacts.gap[int(run.contacts.offsets[0]) : int(run.contacts.offsets[1])] if run.steps else ()
+    if not len(touching):
+        return 0.0
+    stiffness = run.scene_resolved.get("contact", {}).get("stiffness", 0.0)
+    return float(0.5 * stiffness * float(np.sum(np.minimum(touching, 0.0) ** 2)))
+
+
+def _at_hand(run: Run) -> float:
+    """All the energy that the run may show [J]: start, springs, fallen through, worked in."""
+    energy = run.energy
     fallen = float(energy["potential"][0] - energy["potential"].min())
     worked = sum(float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work"))
-    return stored, float(energy["kinetic"][0]) + stored + fallen + worked
+    return float(energy["kinetic"][0]) + _in_springs(run) + fallen + worked
 
 
 def _made_energy(run: Run) -> str:
@@ -48,15 +55,14 @@ def _made_energy(run: Run) -> str:
     energy = run.energy
     if not {"kinetic", "potential", "hand_work", "coupling_work"} <= set(energy) or not run.steps:
         return ""
-    stored, at_hand = _at_hand(run)
     total = energy["kinetic"] + energy["potential"]
-    allowed = total[0] + stored + energy["hand_work"] + energy["coupling_work"]
+    allowed = total[0] + _in_springs(run) + energy["hand_work"] + energy["coupling_work"]
     excess = total[1:] - allowed
     k = int(np.argmax(excess))
-    if excess[k] <= UNACCOUNTED * at_hand + _trifle(run):
+    if excess[k] <= 0.0 or excess[k] <= UNACCOUNTED * _at_hand(run) + _trifle(run):
         return ""
     return (f"its energy is {excess[k]:.3g} J above start and work at {run.time[k + 1]:.4g} s, where these are "
-            f"{at_hand:.3g} J")
+            f"{_at_hand(run):.3g} J")
 
 
 def _trifle(run: Run) -> float:
@@ -71,8 +77,10 @@ def _friction_drove(run: Run) -> str:
     work = run.energy.get("friction_work")
     if work is None or not len(work) or not {"hand_work", "coupling_work"} <= set(run.energy):
         return ""
-    most, (_, at_hand) = float(work.max()), _at_hand(run)
-    return f"friction drove the bodies, by {most:.3g} J" if most > UNACCOUNTED * at_hand + _trifle(run) else ""
+    most = float(work.max())
+    if most <= 0.0 or most <= UNACCOUNTED * _at_hand(run) + _trifle(run):
+        return ""
+    return f"friction drove the bodies, by {most:.3g} J"
 
 
 def _size(shapes: Iterable[dict[str, Any]], without: float = math.inf) -> float:
@@ -94,6 +102,8 @@ def _sank(run: Run) -> str:
     if not len(run.contacts.gap) or len(bodies) != len(run.body_names):
         return ""
     sizes = np.array([*(_size(body.get("shapes", ())) for body in bodies), math.inf])  # the world is -1, the last
+    if run.contacts.gap.min() >= -DEEP * sizes.min():
+        return ""
     thinner = np.minimum(sizes[run.contacts.body_a], sizes[run.contacts.body_b])
     i = int(np.argmin(run.contacts.gap / thinner))
     if -run.contacts.gap[i] <= DEEP * thinner[i]:
@@ -201,18 +211,20 @@ def _flew(run: Run) -> str:
     lengths = [i for i, unit in enumerate(run.coordinate_units) if unit == "m"]
     if not lengths or not run.steps:
         return ""
+    moved = [max(float(run.q[:, i].max() - run.q[0, i]), float(run.q[0, i] - run.q[:, i].min())) for i in lengths]
+    most, i = max(zip(moved, lengths, strict=True), key=lambda each: each[0])
     scene, time = run.scene_resolved, float(run.time[-1])
+    reach = float(np.abs(run.q[0]).max() + np.abs(run.v[0]).max() * time)
+    if most <= WILD * reach:
+        return ""
     masses = [body["mass"] for body in scene.get("bodies", ()) if body.get("mass")]
     push = float(np.linalg.norm(run.hand_force, axis=1).max(initial=0.0)) / min(masses, default=1.0)
     acceleration = float(np.linalg.norm(scene.get("gravity") or [0.0])) + push
-    reach = float(np.abs(run.q[0]).max() + np.abs(run.v[0]).max() * time + 0.5 * acceleration * time**2)
+    reach += 0.5 * acceleration * time**2
     reach += max((_size(body.get("shapes", ()), 0.0) for body in scene.get("bodies", ())), default=0.0)
-    moved = np.abs(run.q[:, lengths] - run.q[0, lengths]).max(axis=0)
-    i = int(moved.argmax())
-    if moved[i] <= WILD * reach:
+    if most <= WILD * reach:
         return ""
-    far = in_metres(float(moved[i]))
-    return f"{run.coordinate_names[lengths[i]]} moves by {far}, where {in_metres(reach)} can be explained"
+    return f"{run.coordinate_names[i]} moves by {in_metres(most)}, where {in_metres(reach)} can be explained"
 
 
 def _overran(run: Run) -> str:

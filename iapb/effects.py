@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,17 +55,28 @@ class Effect:
     ignores: str = ""
 
 
-@dataclass(frozen=True)
-class Question:
-    """A scene and the caller's law, coupling and rendering; None = not chosen yet, so the scene decides alone."""
+class Facts(NamedTuple):
+    """What the effects ask of a scene besides what it says."""
 
-    scene: Scene
     mechanism: Mechanism
     wall_pairs: int  # candidate pairs of a moving shape and a static one
     body_pairs: int  # of shapes of two trees
     tree_pairs: int  # of shapes of one tree
     restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
     frictions: tuple[float, ...]  # different values of mu among the pairs, ascending
+
+
+@dataclass(frozen=True)
+class Question:
+    """A scene and the caller's law, coupling and rendering; None = not chosen yet, so the scene decides alone."""
+
+    scene: Scene
+    mechanism: Mechanism  # this and the next five: see `Facts`
+    wall_pairs: int
+    body_pairs: int
+    tree_pairs: int
+    restitutions: tuple[float, ...]
+    frictions: tuple[float, ...]
     limited: tuple[str, ...]  # bodies whose joint has limits that the law keeps
     law: str | None
     uses: frozenset[str]  # what the law makes of the contact section
@@ -499,28 +510,34 @@ def decide_effects(
     """
     scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
-    return decide_for(scene, mechanism, shapes, pairs_of(scene, shapes), law, coupling, rendering)
+    pairs = pairs_of(scene, shapes)
+    values = (np.unique(each).tolist() for each in (restitutions_of(scene, pairs), friction_by_pair(scene, pairs)))
+    facts = Facts(mechanism, *count_pairs(mechanism, shapes, pairs), *map(tuple, values))
+    return decide_for(scene, facts, law, coupling, rendering)
 
 
-def decide_for(
-    scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32], law: ContactLaw | str | None,
-    coupling: Coupling | str | None, rendering: str | None = None,
-) -> tuple[Effect, ...]:
-    """`decide_effects` for a scene whose mechanism, shapes and candidate pairs exist already."""
+def count_pairs(mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) -> tuple[int, int, int]:
+    """Return how many candidate pairs there are with walls, between trees and within one."""
     counts = {"wall": 0, "body": 0, "tree": 0}
     for a, b in pairs:
         tree_a, body_b = mechanism.tree_of_body[shapes.body[a]], shapes.body[b]
         same = body_b >= 0 and mechanism.tree_of_body[body_b] == tree_a
         counts["wall" if body_b < 0 else "tree" if same else "body"] += 1
-    values = tuple(float(e) for e in restitutions_of(scene, pairs))
-    frictions = tuple(float(mu) for mu in np.unique(friction_by_pair(scene, pairs)))
+    return counts["wall"], counts["body"], counts["tree"]
+
+
+def decide_for(
+    scene: Scene, facts: Facts, law: ContactLaw | str | None, coupling: Coupling | str | None,
+    rendering: str | None = None,
+) -> tuple[Effect, ...]:
+    """`decide_effects` for a settled scene of which the facts are known."""
     known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
     if rendering is None and law is not None and not isinstance(law, str):
         rendering = getattr(law, "rendering", "full")
     uses = EVERYTHING | {JOINTS} if known is None else getattr(known, "uses", EVERYTHING)
     limited = tuple(body.name for body in scene.bodies if body.joint_limits is not None and JOINTS in uses)
     question = Question(
-        scene, mechanism, counts["wall"], counts["body"], counts["tree"], values, frictions, limited,
+        scene, *facts, limited=limited,
         law=law if law is None or isinstance(law, str) else law.name, uses=uses,
         coupling=coupling if coupling is None or isinstance(coupling, str) else coupling.name,
         logs_impulses=law is None or isinstance(law, str) or getattr(law, "impulses", False),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,15 +15,18 @@ from numpy.typing import NDArray
 from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.distrust import distrust_of
+from iapb.effects import Effect
 from iapb.haptics.kernels import PLANNED
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
-from iapb.run import ContactTable, EffectRow, ImpactTable, Run, blank, digests, quantities
+from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, blank, digests, quantities
 from iapb.scene.model import SpatialScene
 
 Floats = NDArray[np.float64]
+Start = tuple[dict[str, Floats], dict[str, float]]  # state and energy at the start of all
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
+_ROOM = 30e6  # bytes that chunks in a row may take together, unless one is larger
 _STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C answer at least that often
 
 # What the loop writes; poses, energies and digests of M follow from it.
@@ -38,11 +42,11 @@ _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "
 class Record(NamedTuple):
     """Arrays of one chunk of n steps, by the names of `iapb.run`."""
 
-    steps: Any  # n lines; states are those at the *end* of each step
+    used: np.ndarray  # (2,) int64: contacts and impacts written so far
     contact_count: np.ndarray  # (n,) int64
+    steps: Any  # n lines; states are those at the *end* of each step
     contacts: Any  # up to m lines, m the capacity of the chunk
     impacts: Any  # up to n t lines, one per island and step, t trees
-    used: np.ndarray  # (2,) int64: contacts and impacts written so far
 
 
 def chunk_steps(contacts: int, remaining: int) -> int:
@@ -52,28 +56,84 @@ def chunk_steps(contacts: int, remaining: int) -> int:
 
 def bytes_per_step(simulation: Any) -> int:
     """Bytes that each step adds to a run: its lines twice while chunks are joined, and the ledger; no contacts."""
+    return 2 * _line_bytes(coordinates_of(simulation), 0, 0) + 8 * len(FORCES) + 40
+
+
+def coordinates_of(simulation: Any) -> tuple[int, int, int, int]:
+    """Lengths of q and v, and of the device's."""
     mechanism, port = simulation.system.mechanism, simulation.port
-    lengths = {"time": 1, "step": 1, "coordinate": mechanism.nq, "velocity": mechanism.nv,
-               "device_coordinate": len(port.device_q), "device_velocity": len(port.device_v)}
-    lines = sum(array.nbytes for array in blank(STATES + STEPS, lengths).values())
-    return 2 * lines + 8 * len(FORCES) + 40
+    return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
+
+
+@lru_cache(maxsize=8)
+def _line_bytes(coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> int:
+    """Bytes of the lines of a step, with all contacts that there can be."""
+    return sum(array.nbytes for array in chain(*_lines(1, coordinates, contacts, trees, np.empty).values()))
 
 
 def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
     """Allocate one chunk; `coordinates` = (nq, d, nq_t, d_t)."""
-    made: Record = _first_record(steps, coordinates, contacts, trees).twin(blank=True)
-    return made
+    return Room(steps, coordinates, contacts, trees).record(steps)
 
 
 @lru_cache(maxsize=8)
 def _first_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Any:
-    """A chunk of which blank twins are used; its zeros take no memory until somebody writes to them."""
+    """A chunk that says where everything lies in those of its shape; its zeros take no memory."""
+    lines = _lines(steps, coordinates, contacts, trees, np.zeros)
+    return block(Record(np.zeros(2, np.int64), np.zeros(steps, np.int64), **lines))
+
+
+def _lines(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int,
+           make: Callable[..., Any]) -> dict[str, Any]:
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
-    return block(Record(
-        columns("StepLines", blank(STATES + STEPS, lengths)), np.zeros(steps, np.int64),
-        columns("ContactLines", blank(CONTACTS, lengths)), columns("ImpactLines", blank(IMPACTS, lengths)),
-        np.zeros(2, np.int64)))
+    return {name: columns(f"{name}_lines", blank(listed, lengths, make)) for name, listed in _LINES.items()}
+
+
+class Room:
+    """Memory for chunks one after another: the lines of a run that fits in need no joining.
+
+    Parameters
+    ----------
+    steps : of all chunks together
+    coordinates, contacts, trees : see `make_record`
+    """
+
+    def __init__(self, steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> None:
+        self._most, self._sizes = steps, (coordinates, contacts, trees)
+        self.counts = np.empty(steps, np.int64)
+        self.lines = _lines(steps, *self._sizes, np.empty)
+        self._arrays = [self.counts, *chain(*self.lines.values())]
+        self._table = [0] * (1 + len(STATES + STEPS)) + [1] * len(CONTACTS) + [2] * len(IMPACTS)
+        self._places = np.array([array.__array_interface__["data"][0] for array in self._arrays])
+        self._strides = np.array([array.strides[0] for array in self._arrays])
+        self.chunks = 0
+        self.used = [0, 0, 0]  # steps, contacts and impacts that are kept
+        self._open: Any = None  # the chunk that is written
+
+    def fits(self, steps: int) -> bool:
+        """Whether there is room for another chunk, and the last one is kept."""
+        return self._open is None and self.used[0] + steps <= self._most
+
+    def record(self, steps: int) -> Record:
+        """Return the next chunk, in which there may be anything."""
+        coordinates, contacts, trees = self._sizes
+        used, sizes = np.zeros(2, np.int64), (steps, steps * contacts, steps * trees)
+        arrays = [array[self.used[t] : self.used[t] + sizes[t]]
+                  for array, t in zip(self._arrays, self._table, strict=True)]
+        places = np.array([used.__array_interface__["data"][0], *self._places])
+        places[1:] += self._strides * np.array(self.used)[self._table]
+        self._open = _first_record(steps, coordinates, contacts, trees).on([used, *arrays], places)
+        made: Record = self._open
+        return made
+
+    def keep(self, record: Any, steps: int) -> bool:
+        """Keep the lines of the chunk that was written; False where it is another one."""
+        if record is not self._open:
+            return False
+        self._open, self.chunks = None, self.chunks + 1
+        self.used = [used + more for used, more in zip(self.used, (steps, *record.used.tolist()), strict=True)]
+        return True
 
 
 @kernel
@@ -145,11 +205,12 @@ class Recorder:
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
         self.records: list[Any] = []
+        self._room: Room | None = None
         self.sizes: list[int] = []
         self.seconds: list[float] = []
         self.first, self.steps = 0, 0  # steps before those that are held, and steps in all
         self._before: dict[str, float] | None = None  # the ledger at `first`
-        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None  # state and energy at the start
+        self._at_first: Start | None = None
 
     @property
     def held_bytes(self) -> int:
@@ -158,7 +219,7 @@ class Recorder:
 
     def chunk(self, total: int) -> BaseException | None:
         """Do and keep the next chunk; return what stopped it before its end."""
-        record, size = self.blank(total)
+        record, size = self._in_a_row(total)
         if self.steps == 0:
             self.simulation.prepare(record)  # what is timed is steps alone
         started = time.perf_counter()
@@ -167,19 +228,32 @@ class Recorder:
         return stop
 
     def blank(self, total: int) -> tuple[Record, int]:
-        """Return an empty record for the next chunk and its number of steps; the whole run has `total`."""
-        system = self.simulation.system
-        size = chunk_steps(system.capacity, total - self.steps)
-        return make_record(size, self.coordinates, system.capacity, len(system.mechanism.tree_dofs)), size
+        """Return a record by itself for the next chunk and its number of steps; the whole run has `total`."""
+        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
+        return make_record(size, *self._sizes), size
+
+    def _in_a_row(self, total: int) -> tuple[Record, int]:
+        """Return the same behind the last chunk, where there is room."""
+        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
+        if self._room is None or not self._room.fits(size):
+            most = int(_ROOM / max(1, _line_bytes(*self._sizes)))
+            self._room = Room(max(size, min(total - self.steps, most)), *self._sizes)
+        return self._room.record(size), size
 
     @property
     def coordinates(self) -> tuple[int, int, int, int]:
         """Lengths of q and v, and of the device's."""
-        mechanism, port = self.simulation.system.mechanism, self.simulation.port
-        return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
+        return coordinates_of(self.simulation)
+
+    @cached_property
+    def _sizes(self) -> tuple[tuple[int, int, int, int], int, int]:
+        system = self.simulation.system
+        return self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
 
     def keep(self, record: Any, steps: int, seconds: float) -> None:
         """Take a chunk of which `steps` lines are written, in `seconds` of work."""
+        if self._room is not None and not self._room.keep(record, steps):
+            self._room = None
         self.records.append(record)
         self.sizes.append(steps)
         self.seconds.append(seconds)
@@ -191,7 +265,7 @@ class Recorder:
 
     def forget(self) -> None:
         """Hold nothing any more: somebody else has written the chunks down."""
-        self.records, self.sizes, self.seconds, self.first = [], [], [], self.steps
+        self.records, self.sizes, self.seconds, self.first, self._room = [], [], [], self.steps, None
 
     def go_on(self, steps: int) -> None:
         """Count from a number of steps that were done, and written down, before."""
@@ -199,12 +273,23 @@ class Recorder:
 
     def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
         """The columns of the record's `steps`, `contacts` or `impacts` over all chunks; `before`: a line ahead."""
-        sizes = self.sizes if lines == "steps" else [int(each.used[int(lines == "impacts")]) for each in self.records]
+        table, ahead = list(_LINES).index(lines), before or {}
+        if self._room is not None and self._room.chunks == len(self.records):
+            used = self._room.used[table]
+            found = {each.name: _filled(getattr(self._room.lines[lines], each.name), used) for each in _LINES[lines]}
+            return found | {name: np.concatenate([first[None], found[name]]) for name, first in ahead.items()}
+        sizes = self.sizes if lines == "steps" else [int(each.used[table - 1]) for each in self.records]
         parts = [getattr(each, lines) for each in self.records]
         return {each.name: np.concatenate([
-            *([before[each.name][None]] if before and each.name in before else []),
+            *([ahead[each.name][None]] if each.name in ahead else []),
             *(getattr(part, each.name)[:size] for part, size in zip(parts, sizes, strict=True))])
             for each in _LINES[lines]}
+
+    def _counts(self) -> NDArray[np.int64]:
+        """Contacts of each step."""
+        if self._room is not None and self._room.chunks == len(self.records):
+            return self._room.counts[: self._room.used[0]]
+        return np.concatenate([each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)])
 
     def run(self, world: str, stopped: str) -> Run:
         """Everything held as a Run; `stopped` says why it is not complete."""
@@ -213,55 +298,88 @@ class Recorder:
     def take(self, world: str) -> Run:
         """Return what is held as a part of a run, and forget it: the next part starts where this one ends."""
         part, ledger = self._part(world, "")
+        self._at_first = self._at_first or _first_of(part)
+        self._before = last_of(ledger(part), self._before)
         self.start = {each.name: getattr(part, each.name)[-1].copy() for each in STATES}
-        self._before = last_of(ledger, self._before)
         self.forget()
         return part
 
-    def _part(self, world: str, stopped: str) -> tuple[Run, dict[str, Floats]]:
-        """The Run, and its whole ledger."""
+    def _part(self, world: str, stopped: str) -> tuple[Run, Callable[[Run], dict[str, Floats]]]:
+        """The Run, and what gives its whole ledger."""
         simulation, system = self.simulation, self.simulation.system
         steps = self.joined("steps", self.start)
         states = {each.name: steps.pop(each.name) for each in STATES}
-        counts = [each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)]
-        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
-        law, coupling = simulation.law, simulation.coupling
+        counts = self._counts()
+        offsets = np.zeros(len(counts) + 1, np.int64)
+        np.cumsum(counts, out=offsets[1:])
+        law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
         impacts = self.joined("impacts")
         struck = states["q"][impacts["step"] - self.first]
+        device = system.device_mechanism() if coupling.name != "none" else None
+        ledger = _once(partial(energy_of_run, mechanism=mechanism, gravity=system.gravity, device=device,
+                               before=self._before))
+        planar = not isinstance(scene, SpatialScene)
+        later: dict[str, Any] = {
+            "scene_source": Later(lambda run: scene.source_text),
+            "scene_resolved": Later(lambda run: scene.resolved()),
+            "effects": Later(partial(_rows, simulation.effects)),
+            "pose": Later(lambda run: mechanism.poses(run.q, planar=planar)),
+            "energy": Later(partial(_shown, ledger, coupling.name == "unilateral")),
+            "distrust": Later(partial(_distrust, self._at_first)),
+        }
         run = Run(
-            scene_name=simulation.scene.name, scene_source=simulation.scene.source_text,
-            scene_resolved=simulation.scene.resolved(), world=world or f"{law.name} + {coupling.name}",
+            scene_name=scene.name, world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
             coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
-            coordinate_names=system.mechanism.coordinate_names, coordinate_units=system.mechanism.coordinate_units,
-            velocity_names=system.mechanism.velocity_names, velocity_units=system.mechanism.velocity_units,
-            body_names=system.mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states,
-            pose=system.mechanism.poses(states["q"], planar=not isinstance(simulation.scene, SpatialScene)),
-            **steps,
+            coordinate_names=mechanism.coordinate_names, coordinate_units=mechanism.coordinate_units,
+            velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
+            body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
+            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states, **steps,
             contacts=ContactTable(offsets, **self.joined("contacts")),
-            impacts=ImpactTable(**impacts, mass_digest=digests(system.mechanism.mass_matrices(struck))),
-            energy={}, effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores)
-                                     for one in simulation.effects),
+            impacts=ImpactTable(**impacts, mass_digest=digests(mechanism.mass_matrices(struck))),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
-            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks,
+            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks, **later,
         )
-        device = system.device_mechanism() if coupling.name != "none" else None
-        ledger = energy_of_run(run, system.mechanism, system.gravity, device, self._before)
-        # Without the tool's balance under a unilateral coupler, where the tool is carried at times.
-        kept = _KEPT_WHEN_CARRIED if coupling.name == "unilateral" else ledger
-        run = replace(run, energy={name: values for name, values in ledger.items() if name in kept})
-        return replace(run, distrust=distrust_of(self._since_the_start(run))), ledger
+        return run, ledger
 
-    def _since_the_start(self, part: Run) -> Run:
-        """Return the run or, of a later part, one that goes from the first state of all to those of the part."""
-        first = {name: getattr(part, name)[0].copy() for name in ("q", "v")}
-        energy = {name: part.energy[name][0] for name in ("kinetic", "potential")}
-        if self._at_first is None:
-            self._at_first = first, energy
-            return part
-        first, energy = self._at_first
-        states: dict[str, Any] = {
-            name: np.concatenate([state[None], getattr(part, name)[1:]]) for name, state in first.items()}
-        ledger = {name: np.concatenate([[value], part.energy[name][1:]]) for name, value in energy.items()}
-        return replace(part, energy=part.energy | ledger, **states)
+
+def _rows(effects: Sequence[Effect], run: Run) -> tuple[EffectRow, ...]:
+    return tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in effects)
+
+
+def _once(make: Callable[[Run], dict[str, Floats]]) -> Callable[[Run], dict[str, Floats]]:
+    """The same function, which keeps what it returned."""
+    known: list[dict[str, Floats]] = []
+
+    def ask(run: Run) -> dict[str, Floats]:
+        if not known:
+            known.append(make(run))
+        return known[0]
+
+    return ask
+
+
+def _shown(ledger: Callable[[Run], dict[str, Floats]], carried: bool, run: Run) -> dict[str, Floats]:
+    """The ledger without the tool's balance under a unilateral coupler, where the tool is carried at times."""
+    return {name: values for name, values in ledger(run).items() if name in _KEPT_WHEN_CARRIED or not carried}
+
+
+def _first_of(run: Run) -> Start:
+    """State and energy at the start of a run."""
+    return ({name: getattr(run, name)[0].copy() for name in ("q", "v")},
+            {name: run.energy[name][0] for name in ("kinetic", "potential")})
+
+
+def _distrust(at_first: Start | None, part: Run) -> tuple[str, ...]:
+    """Distrust of a run or, for a later part, of one that goes from the first state of all to those of the part."""
+    if at_first is None:
+        return distrust_of(part)
+    states: dict[str, Any] = {
+        name: np.concatenate([state[None], getattr(part, name)[1:]]) for name, state in at_first[0].items()}
+    ledger = {name: np.concatenate([[value], part.energy[name][1:]]) for name, value in at_first[1].items()}
+    return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states))
+
+
+def _filled(array: np.ndarray, used: int) -> np.ndarray:
+    """The first lines of an array; where most of it is empty, a copy, for they would keep all of it."""
+    return array[:used] if 2 * used >= len(array) else array[:used].copy()

@@ -9,11 +9,11 @@ velocities, device_velocity that of the hand-held tool (and of the device, kinem
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from hashlib import blake2b
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +64,10 @@ def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
     return tuple(quantity for quantity in found if first in ("", quantity.dimensions[0]))
 
 
-def blank(listed: Iterable[Quantity], lengths: Mapping[str, int]) -> dict[str, NDArray[Any]]:
-    """Return an array of zeros for each quantity, by name; `lengths` are those of the dimensions."""
-    return {each.name: np.zeros([lengths[name] for name in each.dimensions], each.dtype) for each in listed}
+def blank(listed: Iterable[Quantity], lengths: Mapping[str, int],
+          make: Callable[..., NDArray[Any]] = np.zeros) -> dict[str, NDArray[Any]]:
+    """Return an array for each quantity, by name, of zeros or as `make` has it; `lengths` of the dimensions."""
+    return {each.name: make([lengths[name] for name in each.dimensions], each.dtype) for each in listed}
 
 
 @dataclass(frozen=True)
@@ -133,9 +134,22 @@ class EffectRow:
     ignores: str = ""
 
 
+class Later(NamedTuple):
+    """What a Run computes when it is first asked for: a function of the run."""
+
+    value: Callable[[Run], Any]
+
+
+_LATER = ("scene_source", "scene_resolved", "pose", "energy", "effects", "distrust")
+
+
 @dataclass(frozen=True, repr=False)
 class Run:
-    """One simulation: scene, law, coupling and everything that came of it (SI units)."""
+    """One simulation: scene, law, coupling and everything that came of it (SI units).
+
+    What follows from the rest (`pose`, `energy`, `distrust`, how scene and effects are written) is computed when it is
+    first asked for.
+    """
 
     scene_name: str
     scene_source: str  # YAML text
@@ -184,7 +198,27 @@ class Run:
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run ends where it does; empty for a complete one
     remarks: tuple[str, ...] = ()  # what was chosen for the scene, such as by contact.auto
-    distrust: tuple[str, ...] = ()  # why the result is not to be trusted (`iapb.distrust`); empty: it is
+    # why the result is not to be trusted (`iapb.distrust`); empty: it is
+    distrust: tuple[str, ...] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        """Lay aside what is computed later."""
+        self.__dict__["_later"] = {name: self.__dict__.pop(name).value for name in _LATER
+                                   if isinstance(self.__dict__[name], Later)}
+
+    def __getattr__(self, name: str) -> Any:
+        """Compute what was laid aside."""
+        later = self.__dict__.get("_later", {}).get(name)
+        if later is None and name not in self.__dict__:  # another thread may have been quicker
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        if later is not None:
+            self.__dict__.setdefault(name, later(self))
+            self._later.pop(name, None)
+        return self.__dict__[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything computed: for pickle and copies."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def steps(self) -> int:

@@ -162,7 +162,7 @@ class Simulation:
         self.state = self.system.make_state()
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.effects = self.system.decide(self.law, self.coupling)
-        self.world = self.system.world_under(self.law if self.compiled else Penalty())
+        self.world = self.system.world_under(*(self.law, self.effects) if self.compiled else (Penalty(),))
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
         blocks = (self.world, self.state, self.port)
         self.link = None if device is None else DeviceLink(device, *blocks)

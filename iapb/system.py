@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import State, Stops, Switches, World
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
+from iapb.effects import EFFECT_NAMES, Effect, Facts, active_names, count_pairs, decide_for
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import PLANNED, Port
@@ -33,8 +33,10 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
+    friction_of_pairs,
     frictions_of,
     joint_damping_of,
+    kept,
     largest_friction,
     mechanism_of,
     pairs_of,
@@ -50,6 +52,57 @@ Floats = NDArray[np.float64]
 _factored = Entry(cholesky)
 
 
+class Parts:
+    """What bodies and walls alone come to: one for all scenes that say the same of them, to the last bit.
+
+    Attributes
+    ----------
+    mechanism, shapes, pairs, stops, capacity, joint_damping : see `System`
+    own_restitution : (r,), see `World`; pair_counts : see `iapb.effects.Facts`
+    firsts : states, ports and the like, of which twins are used
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.mechanism: Mechanism = mechanism_of(scene)
+        self.shapes = shapes_of(scene)
+        self.pairs = pairs_of(scene, self.shapes)
+        self.pair_counts = count_pairs(self.mechanism, self.shapes, self.pairs)
+        self.stops = make_stops(scene, self.mechanism, len(self.shapes.kind))
+        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        self.joint_damping = joint_damping_of(scene)
+        self.own_restitution = restitution_by_shape(scene)
+        self.firsts: dict[Any, Any] = {}
+
+    @cached_property
+    def of_world(self) -> dict[str, Any]:
+        """What of a world is the same under every law."""
+        ranges = np.array(self.mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
+        return {"mechanism": self.mechanism.block, "shapes": block(self.shapes), "pairs": self.pairs,
+                "tree_of_body": self.mechanism.tree_of_body, "joint_damping": self.joint_damping,
+                "tree_start": np.ascontiguousarray(ranges[:, 0]), "tree_stop": np.ascontiguousarray(ranges[:, 1]),
+                "own_restitution": self.own_restitution, "stops": block(self.stops)}
+
+    def broad_phase(self, used: bool) -> Any:
+        """A broad phase of its own, for a world writes into it; where it is not used, a stub that nobody writes."""
+        made = kept(self.firsts, ("broad phase", used), lambda: block(make_broad_phase(
+            self.shapes, self.pairs[: len(self.pairs) * used])).twin())
+        return made.twin() if used else made
+
+
+_PARTS: dict[str, Parts] = {}  # by what the scene says of them
+
+
+def parts_of(scene: Scene) -> Parts:
+    """Return the parts of a scene, the same for scenes that say the same of bodies and walls.
+
+    Positions count where joints have limits, which stop them on an arm that depends on the start.
+    """
+    moved = {"__all__": {"position", "velocity"}}
+    stopped = any(body.joint_limits is not None for body in scene.bodies)
+    said = scene.model_dump_json(include={"bodies", "walls"}, exclude=None if stopped else {"bodies": moved})
+    return kept(_PARTS, f"{type(scene).__name__} {scene.contact.self_collisions} {said}", lambda: Parts(scene))
+
+
 class System:
     """A scene as mechanism, shapes and parameters.
 
@@ -63,26 +116,23 @@ class System:
     dt : float [s]
     restitutions : (r,) the different values of e among the pairs of shapes that can touch, ascending
     frictions : Frictions, of any two shapes
+    start : (q, v)
     joint_damping : (d,) [N s/m, N m s/rad]; stops : Stops, the ends of the joints' ranges
     """
 
     def __init__(self, scene: Scene) -> None:
         self.given = scene
         self.scene, self.remarks = settled(scene)
-        scene = self.scene
-        self.mechanism: Mechanism = mechanism_of(scene)
-        self.shapes = shapes_of(scene)
-        self.pairs = pairs_of(scene, self.shapes)
-        self.stops = make_stops(scene, self.mechanism, len(self.shapes.kind))
-        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        scene, self.parts = self.scene, parts_of(self.scene)
+        self.mechanism, self.shapes, self.pairs = self.parts.mechanism, self.parts.shapes, self.parts.pairs
+        self.stops, self.capacity = self.parts.stops, self.parts.capacity
+        self.joint_damping, self.start = self.parts.joint_damping, start_of(scene)
         self.restitutions, self.frictions = restitutions_of(scene, self.pairs), frictions_of(scene)
-        self.joint_damping = joint_damping_of(scene)
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
         self.tool_dofs, self.tool_coordinates = self._tool_ranges()
         self._worlds: dict[Any, World] = {}
-        self._first: dict[Any, Any] = {}  # states and ports at the start, of which copies are used
         self._effects: dict[Any, tuple[Effect, ...]] = {}
         self._advances: dict[Any, Entry] = {}
 
@@ -124,19 +174,37 @@ class System:
         columns: list[Any] = [column[:count] for column in buffer]
         return ContactBuffer(*columns)
 
-    def world_under(self, law: Any) -> World:
-        """The constant arrays of the step under one of the engine's laws (cached)."""
+    def world_under(self, law: Any, effects: Sequence[Effect] | None = None) -> World:
+        """The constant arrays of the step under one of the engine's laws (cached).
+
+        `effects` is what `decide` gives for the law, whatever the coupling.
+        """
         key = _key(law)
         if key not in self._worlds:
-            self._worlds[key] = make_world(self, law)
+            self._worlds[key] = make_world(self, law, self.decide(law) if effects is None else effects)
         return self._worlds[key]
 
     def make_state(self) -> State:
         """A fresh state at the scene's start."""
-        if "state" not in self._first:
-            self._first["state"] = make_state(self)
-        state: State = self._first["state"].twin()
+        contact, mechanism = self.scene.contact, self.mechanism
+        rows = self.capacity * (2 if contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
+        state: State = _blank_state(
+            (len(mechanism.bodies), len(mechanism.tree_dofs), mechanism.nq, mechanism.nv, _largest_tree(mechanism)),
+            self.capacity, rows, 2 if isinstance(self.scene, SpatialScene) else 1, slides_in_impacts(self.scene),
+            largest_friction(self.scene) > 0.0 and contact.friction_law == "coulomb",
+        ).twin()
+        q, v = self.start
+        for name, values in (("q", q), ("v", v), *self._mass_at_start.items()):
+            getattr(state, name)[:] = values
         return state
+
+    @cached_property
+    def _mass_at_start(self) -> dict[str, Floats]:
+        mass = self.mechanism.mass_matrix(self.start[0])
+        lower = np.zeros_like(mass)
+        if _factored(mass, lower):
+            raise ArgumentError("scene", self.scene.name, "bodies whose mass matrix is positive definite at the start")
+        return {"mass_matrix": mass, "lower": lower}
 
     def advance_under(self, law: Any) -> Entry:
         """The compiled step of one of the engine's laws, to be called again and again (cached)."""
@@ -148,21 +216,37 @@ class System:
         `effects` is what `decide` gives for the law; default: of ImpulseAugmented().
         """
         decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
-        on = active_names(decided)
-        key = *_gains_of(coupling), on, external
-        if key not in self._first:
-            self._first[key] = _make_port(self, coupling, on, external)
-        port: Port = self._first[key].twin()
+        on = active_names(decided) & _OF_PORT
+        key = ("port", *self._of_port, *_gains_of(coupling), on, external)
+        port: Port = kept(self.parts.firsts, key, lambda: _make_port(self, coupling, on, external)).twin()
+        if self.scene.hand is not None:
+            port.wrench[:] = wrenches_of(self.scene, [0.0])[0]
         return port
+
+    @cached_property
+    def _of_port(self) -> tuple[Any, ...]:
+        """What the scene says of the hand's side, but for its force."""
+        hand, places = self.scene.hand, (values.tobytes() for values in self.start)
+        held = None if hand is None else (hand.body, repr(hand.point), hand.changes)
+        return held, self.scene.model_dump_json(include={"device", "rate"}), *places
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """What is on under a law and a coupling: the world, the port and the record are made from it."""
         if type(law) not in (ImpulseAugmented, Penalty):  # one of a user's own may say something else each time
-            return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+            return decide_for(self.scene, self._facts, law, coupling)
         key = law, *_gains_of(coupling)
         if key not in self._effects:
-            self._effects[key] = decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+            self._effects[key] = decide_for(self.scene, self._facts, law, coupling)
         return self._effects[key]
+
+    @cached_property
+    def _facts(self) -> Facts:
+        frictions = np.unique(friction_of_pairs(self.frictions, self.pairs))
+        return Facts(self.mechanism, *self.parts.pair_counts, tuple(self.restitutions.tolist()),
+                     tuple(frictions.tolist()))
+
+
+_OF_PORT = frozenset({"delay", "quantisation", "waveform", "device_damping", "device_limits"})  # effects in a port
 
 
 def _gains_of(coupling: Coupling | None) -> tuple[Any, ...]:
@@ -175,19 +259,12 @@ def _key(law: Any) -> tuple[Any, ...]:
     return law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.impulses and law.pushing
 
 
-_KEPT = 8
 _SYSTEMS: dict[int, System] = {}  # by the identity of the scene, which the system keeps alive
 
 
 def system_of(scene: Scene) -> System:
     """Return the system of a scene, the same for the same scene: a scene never changes, nor does its system."""
-    found = _SYSTEMS.pop(id(scene), None)
-    if found is None or found.given is not scene:
-        found = System(scene)
-    _SYSTEMS[id(scene)] = found  # the latest last
-    while len(_SYSTEMS) > _KEPT:
-        del _SYSTEMS[next(iter(_SYSTEMS))]
-    return found
+    return kept(_SYSTEMS, id(scene), lambda: System(scene))
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:
@@ -207,11 +284,11 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     return kind(tuple(gains.stiffness), tuple(gains.damping))
 
 
-def make_world(system: System, law: Any) -> World:
+def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
     """Collect the parameters of the scene and the switches of its effects under a law."""
     scene, contact, mechanism = system.scene, system.scene.contact, system.mechanism
     limit = np.full(mechanism.nv, np.inf)
-    on = active_names(system.decide(law))
+    on = active_names(effects)
     scaled = "device_limits" in on and law.rendering in ("scale", "spread")
     if scaled:
         limit[slice(*system.tool_dofs)] = _force_limit(scene)
@@ -224,21 +301,17 @@ def make_world(system: System, law: Any) -> World:
         broad_phase=len(system.pairs) > WORTHWHILE_PAIRS,
     )
     integrator = INTEGRATORS[law.integrator]
-    ranges = np.array(mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
     return block(World(
-        mechanism=mechanism.block, shapes=system.shapes, pairs=system.pairs,
-        broad_phase=make_broad_phase(system.shapes, system.pairs[: len(system.pairs) * switches.broad_phase]),
-        tree_of_body=mechanism.tree_of_body,
-        tree_start=np.ascontiguousarray(ranges[:, 0]), tree_stop=np.ascontiguousarray(ranges[:, 1]),
-        switches=switches, dt=system.dt, gravity=system.gravity,
+        **system.parts.of_world, broad_phase=system.parts.broad_phase(switches.broad_phase),
+        switches=kept(system.parts.firsts, ("switches", *switches), lambda: block(switches)),
+        dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
         friction_class=system.frictions.class_of_shape, friction=system.frictions.table,
         coulomb="friction" in on and contact.friction_law == "coulomb",
         friction_velocity=float(contact.friction_velocity),
         restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
-        own_restitution=restitution_by_shape(scene), approach_velocity=float(contact.approach_velocity),
+        approach_velocity=float(contact.approach_velocity),
         cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
-        joint_damping=system.joint_damping, stops=system.stops,
         per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
         stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
         semi_implicit=integrator.semi_implicit,
@@ -259,26 +332,7 @@ def slides_in_impacts(scene: Scene) -> bool:
     return largest_friction(scene) > 0.0 and scene.contact.self_collision_rows == "relative"
 
 
-def make_state(system: System) -> State:
-    """Allocate everything a step writes and place the scene at its start."""
-    scene, mechanism = system.scene, system.mechanism
-    rows = system.capacity * (2 if scene.contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
-    q, v = start_of(scene)
-    mass = mechanism.mass_matrix(q)
-    lower = np.zeros_like(mass)
-    if _factored(mass, lower):
-        raise ArgumentError("scene", scene.name, "bodies whose mass matrix is positive definite at the start")
-    state: State = _blank_state(
-        (len(mechanism.bodies), len(mechanism.tree_dofs), mechanism.nq, mechanism.nv, _largest_tree(mechanism)),
-        system.capacity, rows, 2 if isinstance(scene, SpatialScene) else 1, slides_in_impacts(scene),
-        largest_friction(scene) > 0.0 and scene.contact.friction_law == "coulomb",
-    ).twin()
-    for name, values in (("q", q), ("v", v), ("mass_matrix", mass), ("lower", lower)):
-        getattr(state, name)[:] = values
-    return state
-
-
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int, sliding: bool, rubbing: bool) -> Any:
     """A state of these sizes, of which twins are used; scenes that differ in values alone have the same."""
     bodies, trees, nq, d, largest_tree = sizes
@@ -299,7 +353,7 @@ def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
         step_friction=make_step_friction(d, capacity * rubbing, tangents, largest_tree),
         impacts=_make_log(trees, d), **vectors, **squares,
-    ))
+    )).twin()
 
 
 def _largest_tree(mechanism: Mechanism) -> int:
@@ -315,7 +369,7 @@ def _make_log(trees: int, d: int) -> Any:
     return columns("ImpactLog", {"logged": np.zeros(1, np.int64), **lines})
 
 
-def _make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Port:
+def _make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Any:
     """Allocate the hand's side: the device starts where the tool does, with its velocity.
 
     `on` are the names of the effects that are on; `external` says that the device moves by itself: it is late and
@@ -329,7 +383,7 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
     device = system.device_mechanism() if held else system.mechanism
     (v_start, v_stop), (q_start, q_stop) = system.tool_dofs, system.tool_coordinates
     q, v = (start[first:last].copy() for start, first, last in zip(
-        start_of(scene), (q_start, v_start), (q_stop, v_stop), strict=True))
+        system.start, (q_start, v_start), (q_stop, v_stop), strict=True))
     mass = device.mass_matrix(q) if held else np.zeros((0, 0))
     lower = np.zeros_like(mass)
     _factored(mass, lower)
@@ -346,7 +400,7 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
         **_actuators(scene, (q_stop - q_start, v_stop - v_start), on),
         **_pulses(scene, system.dt, v_stop - v_start, "waveform" in on),
         **zeros, **tool_zeros,
-    ))
+    )).twin()
 
 
 def _force_limit(scene: Scene) -> tuple[float, ...] | None:
@@ -360,7 +414,6 @@ def _hand(system: System, device: Any) -> dict[str, Any]:
     if hand is None:
         return {"hand_body": -1, "device_body": -1, "hand_point": point, "wrench": wrench,
                 "planned": np.zeros((0, 6))}
-    wrench[:] = wrenches_of(system.scene, [0.0])[0]
     point[: len(hand.point)] = hand.point
     return {"hand_body": system.mechanism.index(hand.body), "device_body": device.index(hand.body),
             "hand_point": point, "wrench": wrench, "planned": np.zeros((PLANNED * hand.changes, 6))}

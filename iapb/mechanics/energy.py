@@ -57,7 +57,7 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     """
     losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
     mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
-    for k in np.flatnonzero(np.any(impulse, axis=1)):
+    for k in np.unique(np.flatnonzero(impulse) // max(1, mechanism.nv)):
         matrix = mechanism.mass_matrix(q[k]) if mass_matrix is None else mass_matrix
         losses[k] = entries.impact_loss(matrix, lower, v[k], impulse[k], change)
     return losses

@@ -7,7 +7,8 @@ processor.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +42,18 @@ def mechanism_of(scene: Scene) -> Mechanism:
     it, to the last bit, have the same mechanism: nothing of it ever changes.
     """
     said = repr([[getattr(body, name, None) for name in _MECHANICAL] for body in scene.bodies])
-    found = _MECHANISMS.pop(said, None) or Mechanism(_body_in_space(body) for body in scene.bodies)
-    _MECHANISMS[said] = found  # the latest last
-    while len(_MECHANISMS) > _KEPT:
-        del _MECHANISMS[next(iter(_MECHANISMS))]
+    return kept(_MECHANISMS, said, lambda: Mechanism(_body_in_space(body) for body in scene.bodies))
+
+
+Made = TypeVar("Made")
+
+
+def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
+    """Return what a store keeps under a key, made where it is not there; it keeps the few that were asked for last."""
+    found = store.pop(key, None)
+    store[key] = found = make() if found is None else found
+    while len(store) > _KEPT:
+        store.pop(next(iter(store)), None)
     return found
 
 
@@ -295,7 +304,12 @@ def _mean_friction(first: float | None, second: float | None, otherwise: float) 
 
 def friction_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
     """Return mu of each pair (k, 2) of shapes (see `frictions_of`)."""
-    classes, table = frictions_of(scene)
+    return friction_of_pairs(frictions_of(scene), pairs)
+
+
+def friction_of_pairs(frictions: Frictions, pairs: NDArray[np.int32]) -> Floats:
+    """Return mu of each pair (k, 2) of shapes."""
+    classes, table = frictions
     return table[classes[pairs[:, 0]], classes[pairs[:, 1]]]
 
 

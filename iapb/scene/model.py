@@ -258,6 +258,7 @@ class Scene(Part):
     )
 
     _source_text: str = PrivateAttr("")
+    _remark: str = PrivateAttr("")  # of a text that is not written yet
     _file: str = PrivateAttr("")  # whose text that is, where it was read from one
 
     @field_validator("contact", mode="before")
@@ -290,7 +291,13 @@ class Scene(Part):
     @property
     def source_text(self) -> str:
         """The YAML text that gives this scene."""
+        if self._remark:
+            self._source_text, self._remark = scene_text(self, self._remark), ""
         return self._source_text
+
+    def __eq__(self, other: Any) -> bool:
+        """Whether kind, values and text are the same."""
+        return isinstance(other, Scene) and self.source_text == other.source_text and super().__eq__(other)
 
     def place_of(self, *path: str | int) -> str:
         """Return where a field stands: "file:line:column: " if the scene was read from a file, else empty."""
@@ -333,7 +340,7 @@ class Scene(Part):
             made = type(self).model_validate(plain)
         except ValidationError as failure:
             raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
-        made._source_text = scene_text(made, f"{self.name} with new values for {', '.join(values) or 'nothing'}")
+        made._remark = f"{self.name} with new values for {', '.join(values) or 'nothing'}"
         return made
 
 

@@ -260,17 +260,29 @@ def fill(outer):
 
 def test_a_twin_is_a_block_of_its_own_in_aligned_memory() -> None:
     first = block(Tree(Leaf(np.arange(3.0), np.arange(3, dtype=np.int8)), 7.0, np.ones((2, 3)), np.zeros((0, 4))))
-    copied, blank = first.twin(), first.twin(blank=True).twin()
-    assert copied.block_type is first.block_type is blank.block_type
+    copied = first.twin()
+    assert copied.block_type is first.block_type
     for one, other in zip(first.arrays(), copied.arrays(), strict=True):
         np.testing.assert_array_equal(one, other)
         assert one.dtype == other.dtype and other.ctypes.data % 64 == 0 and not np.shares_memory(one, other)
-    assert not any(array.any() for array in blank.arrays()) and blank.size == 7.0
     assert fill(copied) == 4
     np.testing.assert_array_equal(copied.inner.values, [7.0, 8.0, 9.0])
     np.testing.assert_array_equal(first.inner.values, [0.0, 1.0, 2.0])
-    assert (copied.matrix[1, 2], first.matrix[1, 2], blank.matrix[1, 2]) == (8.0, 1.0, 0.0)
+    assert (copied.matrix[1, 2], first.matrix[1, 2]) == (8.0, 1.0)
     before = copied.twin()
     del copied
     gc.collect()
     assert before.inner.values[2] == 9.0 and fill(before) == 4
+
+
+def test_a_block_on_other_arrays_writes_into_them_alone() -> None:
+    first = block(Tree(Leaf(np.arange(3.0), np.arange(3, dtype=np.int8)), 7.0, np.ones((2, 3)), np.zeros((0, 4))))
+    large = [np.full((2 + len(array), *array.shape[1:]), 5, array.dtype) for array in first.arrays()]
+    places = np.array([array.__array_interface__["data"][0] + 2 * array.strides[0] for array in large])
+    moved = first.on([array[2:] for array in large], places)
+    assert moved.block_type is first.block_type and moved.size == 7.0 and fill(moved) == 4
+    matrix, nothing, values, flags = large
+    assert values.tolist() == [5.0, 5.0, 7.0, 8.0, 9.0] and flags.tolist() == [5, 5, 0, 1, 2]
+    assert matrix[3, 2] == 12.0 and (matrix == 5.0).sum() == 11 and nothing.shape == (2, 4)
+    assert moved.inner.values is moved.arrays()[2] and np.shares_memory(moved.inner.values, values)
+    assert first.matrix[1, 2] == 1.0 and first.inner.values.tolist() == [0.0, 1.0, 2.0]

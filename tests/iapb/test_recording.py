@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.contact.laws import ImpulseAugmented
-from iapb.recording import chunk_steps
+from iapb.recording import Recorder, chunk_steps
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
@@ -53,6 +53,27 @@ def test_the_record_holds_what_each_step_did(name, coupling):
             impact += 1
     assert impact == len(run.impacts.step)
     assert len(run.contacts.gap) == run.contacts.offsets[-1] > 0
+
+
+def test_a_run_that_fits_into_a_room_is_neither_joined_nor_holds_what_is_empty():
+    simulation = Simulation(load_scene(find_scene("peg_corner")))
+    recorder = Recorder(simulation)
+    for _ in range(2):
+        assert recorder.chunk(STEPS + 512) is None
+    room = recorder._room
+    for name, columns in (("steps", ("impulse", "state")), ("contacts", ("gap",)), ("impacts", ("v_plus",))):
+        joined = recorder.joined(name)
+        for column in columns:
+            shared = np.shares_memory(joined[column], getattr(room.lines[name], column))
+            assert shared == (2 * len(joined[column]) >= len(getattr(room.lines[name], column))), column
+            parts = [getattr(getattr(record, name), column) for record in recorder.records]
+            sizes = [size if name == "steps" else record.used[int(name == "impacts")]
+                     for record, size, _ in recorder.held()]
+            whole = np.concatenate([part[:size] for part, size in zip(parts, sizes, strict=True)])
+            assert joined[column].tobytes() == whole.tobytes() and len(whole)
+    assert np.shares_memory(recorder.joined("steps")["impulse"], room.lines["steps"].impulse)
+    recorder.keep(recorder.blank(2000)[0], 0, 0.0)  # a chunk from elsewhere: all are joined again
+    assert recorder._room is None and len(recorder.joined("steps")["impulse"]) == recorder.steps == STEPS + 512
 
 
 def test_rendered_force_is_contact_forces_and_impulse_over_the_step():

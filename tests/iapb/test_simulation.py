@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
+import pickle
 from collections import Counter
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,12 @@ import pytest
 
 from iapb import compiled, recording, simulation, system
 from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
+from iapb.distrust import distrust_of
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import FREE, Run
-from iapb.scene import find_scene, load_scene, mechanism
+from iapb.scene import Scene, find_scene, load_scene, mechanism, model, scene_from_text
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of, system_of
 
@@ -83,9 +86,15 @@ def test_a_run_repeats_bit_for_bit_whatever_the_chunks(coupling, monkeypatch):
     run = simulate(PEG, law, chosen, steps=STEPS)
     assert_same(run, simulate(PEG, law, chosen, steps=STEPS))
     monkeypatch.setattr(recording, "_STEPS_PER_CHUNK", 23)
-    chunked = simulate(PEG, law, chosen, steps=STEPS)
-    assert len(chunked.chunk_steps) == -(-STEPS // 23) and chunked.chunk_steps.sum() == STEPS
-    assert_same(run, chunked)
+    rooms = count_calls(monkeypatch, {recording: "Room"})
+    for size, most in ((recording._ROOM, 1), (1.0, 16), (60.0 * recording._line_bytes(
+            recording.coordinates_of(Simulation(PEG, law, chosen)), system_of(PEG).capacity, 1), 8)):
+        rooms.clear()
+        monkeypatch.setattr(recording, "_ROOM", size)
+        chunked = simulate(PEG, law, chosen, steps=STEPS)
+        assert len(chunked.chunk_steps) == -(-STEPS // 23) and chunked.chunk_steps.sum() == STEPS
+        assert_same(run, chunked)
+        assert rooms["Room"] == most
 
 
 class Wrapped:
@@ -251,22 +260,104 @@ def count_calls(monkeypatch, owners) -> Counter[str]:
     return calls
 
 
+MADE = {compiled: "typeof", system: "Parts make_world _make_port decide_for", mechanism: "Mechanism",
+        simulation: "load_scene"}
+
+
+def forget() -> None:
+    """As if nothing had been simulated yet."""
+    for store in (system._PARTS, system._SYSTEMS, mechanism._MECHANISMS):
+        store.clear()
+    system._blank_state.cache_clear()
+
+
 def test_a_second_run_and_one_with_a_changed_value_make_only_what_is_new(monkeypatch) -> None:
     scene = load_scene(find_scene("peg_corner"))
-    first, changed = (scene.with_values({"contact.stiffness": value}) for value in (900.0, 800.0))
     path = find_scene("peg_corner")
-    for known in (scene, first, path):
+    forget()
+    for known in (scene, scene.with_values({"contact.stiffness": 900.0}), path):
         simulate(known, world="IAPB", steps=5)
     blanks = system._blank_state.cache_info().misses, recording._first_record.cache_info().misses
-    calls = count_calls(monkeypatch, {
-        compiled: "typeof", system: "make_world make_state _make_port decide_for", mechanism: "Mechanism",
-        simulation: "load_scene"})
+    calls = count_calls(monkeypatch, MADE)
     simulate(scene, world="IAPB", steps=5)
     simulate(path, world="IAPB", steps=5)
     assert not calls
-    simulate(changed, world="IAPB", steps=5)
-    assert calls == {"make_world": 1, "make_state": 1, "_make_port": 1, "decide_for": 2}
+    for values, more in {("contact.stiffness", 800.0): {}, ("hand.force.0", -0.3): {}, ("gravity", (0.0, -1.0)): {},
+                         ("bodies.peg.position.0", 0.021): {"_make_port": 1},
+                         ("walls.floor.restitution", 0.2): {"_make_port": 1, "Parts": 1},
+                         ("bodies.peg.mass", 3.0): {"_make_port": 1, "Parts": 1, "Mechanism": 1}}.items():
+        calls.clear()
+        simulate(scene.with_values(dict([values])), world="IAPB", steps=5)
+        assert calls == {"make_world": 1, "decide_for": 1} | more, values
     assert blanks == (system._blank_state.cache_info().misses, recording._first_record.cache_info().misses)
+
+
+LIMITS = "bodies.0.joint_limits"
+CHANGES = {
+    "peg_corner": [
+        {"contact.friction": 0.2}, {"contact.friction": 0.2, "contact.friction_law": "coulomb"},
+        {"contact.stiffness": 2000.0}, {"contact.damping": 10.0},
+        {"contact.restitution": 0.5}, {"contact.approach_velocity": 0.05}, {"contact.cluster_distance": 0.03},
+        {"contact.coherence_distance": 0.03}, {"walls.floor.restitution": 0.6}, {"walls.floor.friction": 0.5},
+        {"contact.friction_pairs": [{"between": ["peg", "floor"], "friction": 0.4}]},
+        {"walls.floor.point": [0.0, -0.001]}, {"walls.right_wall.normal": [1.0, 0.05]},
+        {"bodies.peg.restitution": 0.4}, {"bodies.peg.mass": 1.5}, {"bodies.peg.inertia": 0.004},
+        {"bodies.peg.shapes.0.size": [0.03, 0.0105]}, {"bodies.peg.position": [0.021, -0.0135, 0.02]},
+        {"bodies.peg.position.2": 0.0}, {"bodies.peg.position.2": -0.0}, {"bodies.peg.velocity": [-0.05, 0.02, 0.1]},
+        {"bodies.peg.joint_damping": [1.0, 1.0, 0.0]}, {"gravity": [0.0, 2.0]}, {"rate": 700.0},
+        {"hand.force": [-0.5, 0.3, 0.001]}, {"hand.point": [0.005, 0.002]},
+        {"hand.force_table": [[0.0, 0, 0, 0], [0.3, -0.2, 0.2, 0]]},
+        {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]}, {"device.delay": 3},
+        {"device.damping": [1.0, 1.0, 0.0]}, {"device.force_limit": [0.2, 0.2, 0.01]},
+        {"device.position_resolution": [1e-4, 1e-4, 0.0]},
+        {"device.waveform": "brake"},
+        {"device.damping": [1.0, 1.0, 0.0], "couplings.four_channel.stiffness": [50.0, 60.0, 0.4]},
+    ],
+    "double_pendulum": [
+        {LIMITS: [-0.3, 0.3]}, *({LIMITS: [-0.5, 0.5], **more} for more in (
+            {}, {"bodies.1.position": [1.3]}, {"bodies.1.velocity": [0.5]}, {"bodies.0.mass": 0.7})),
+    ],
+    "two_discs": [{"contact.self_collision_rows": "per_body"}, {"contact.restitution": 0.25},
+                  {"bodies.0.shapes.0.radius": 0.01}],
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_changed_value_gives_the_bits_of_a_scene_that_is_read_anew(name: str) -> None:
+    """What scenes share must not hold what one of them has changed: each after all others, and alone."""
+    scene, law = load_scene(find_scene(name)), ImpulseAugmented(rendering="scale")
+
+    def run_of(changed: Scene) -> Run:
+        coupled = changed.hand is not None and changed.couplings.four_channel is not None
+        return simulate(changed, law, coupling_of(changed, "four-channel" if coupled else "none"), steps=STEPS)
+
+    first = results_of(run_of(scene))
+    after = [run_of(scene.with_values(values)) for values in CHANGES[name]]
+    for values, run in zip(CHANGES[name], after, strict=True):
+        forget()
+        alone = run_of(scene_from_text(scene.with_values(values).source_text))
+        ours, theirs = results_of(run), results_of(alone)
+        assert ours.keys() == theirs.keys() and run.effects == alone.effects and run.distrust == alone.distrust, values
+        for array, numbers in ours.items():
+            assert numbers.tobytes() == theirs[array].tobytes(), (values, array)
+        assert any(ours[array].tobytes() != first[array].tobytes() for array in ours.keys() & first.keys()), values
+
+
+def test_what_follows_from_a_run_is_computed_when_it_is_asked_for(monkeypatch) -> None:
+    scene = load_scene(find_scene("peg_corner")).with_values({"contact.stiffness": 1e4})
+    texts = count_calls(monkeypatch, {model: "scene_text", recording: "energy_of_run distrust_of"})
+    run = simulate(scene, steps=STEPS)
+    assert not texts and not {"pose", "energy", "distrust", "scene_source"} & vars(run).keys()
+    copies = [copy.deepcopy(run), pickle.loads(pickle.dumps(simulate(scene, steps=STEPS))), replace(run, world="w")]
+    mechanics = system_of(scene).mechanism
+    for each in (run, *copies):
+        assert each.pose.tobytes() == mechanics.poses(run.q, planar=True).tobytes()
+        assert each.energy["kinetic"].tobytes() == mechanics.energies(run.q, run.v, np.zeros(3))[0].tobytes()
+        assert each.scene_source == scene.source_text and each.distrust == distrust_of(run)
+        assert_same(run, each)
+    assert run.pose is run.pose and run.energy is run.energy and texts["energy_of_run"] == 2
+    with pytest.raises(AttributeError, match="no attribute 'poses'"):
+        run.poses  # noqa: B018
 
 
 @pytest.mark.parametrize("name", ["peg_corner", "arm_pushing"])
