@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.figures.geometry import Placement, body_outlines, half_plane, outline
+from reports.figures.labels import note_beside
 from reports.figures.plot import Plot
 from reports.figures.style import FORCE, INK, MUTED, PANEL, PEG, WALL
 
@@ -43,14 +44,18 @@ def invert(axes: Any) -> None:
     axes.yaxis.set_inverted(True)
 
 
-def hand(axes: Any, scene: Mapping[str, Any], place: Placement, length: float, offset: tuple[float, float],
+def hand(axes: Any, scene: Mapping[str, Any], place: Placement, length: float,
          flat: Callable[[Any], Any] = lambda point: np.asarray(point, dtype=float)[:2]) -> None:  # fmt: skip
-    """Draw the hand's force as an arrow of some length [m] from where it holds its body, which is at `place`."""
+    """Draw the hand's force as an arrow of some length [m] from where it holds its body, which is at `place`.
+
+    Call it last: its name goes where nothing is drawn.
+    """
     force = flat(scene["hand"]["force"][:3])
     if np.hypot(*force) > 0.0:
         start = flat(place.of(scene["hand"]["point"]))
-        arrow(axes, start, length * force / np.hypot(*force))
-        note(axes, start, "hand", offset, color=FORCE)
+        along = length * force / np.hypot(*force)
+        arrow(axes, start, along)
+        note_beside(axes, start, start + along, "hand", 9, color=FORCE)
 
 
 def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Floats]:

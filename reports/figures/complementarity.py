@@ -123,7 +123,8 @@ def where_to_stop(numbers: Table) -> Drawn:
     )  # fmt: skip
     caption = (
         "A pile of spheres falls on the floor; every mark is one kind of pile, with all contacts that approach, or all "
-        f"that touch, as equalities (19). Stop using (19) where more than {limit} contacts collide at once: from there "
+        "that touch, as equalities (19); marks at the lower edge agree with complementarity to rounding. "
+        f"Stop using (19) where more than {limit} contacts collide at once: from there "
         "on its motion is never that of complementarity, and some of its impulses pull. The world IAPB-push (method "
         f"“poisson”) only pushes, agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e}"
         f", and takes {min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
@@ -132,10 +133,13 @@ def where_to_stop(numbers: Table) -> Drawn:
     return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)
 
 
+_AGREE = 1e-11  # of |v⁻|: nearer motions are one
+
+
 def _distance_over(rows: Rows, name: str, limit: float | None = None) -> str:
     with Plot(f"where-to-stop-{name.replace(' ', '-')}") as plot:
-        _by_rows(plot, rows, [(row[name], row["median distance from the LCP"]) for row in rows])
-        plot.axes.set(xlabel=name, ylabel="distance of the motions, of |v⁻|", ylim=(-0.02, None))
+        _by_rows(plot, rows, [(row[name], max(row["median distance from the LCP"], _AGREE)) for row in rows])
+        plot.log(name, "distance of the motions, of |v⁻|", "y", ylim=(0.3 * _AGREE, 3.0))
         if limit is not None:
             plot.axes.set_xscale("log")
             counts = (5, 10, 20, 50, 100, 200)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, invert, note, scale_bar
+from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, invert, scale_bar
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import body_outlines
+from reports.figures.labels import arrow_of_time, note_beside
 from reports.figures.plot import Plot
 from reports.figures.style import FORCE, MUTED, STYLES, LineStyle, line_arguments
 from reports.figures.svg import PATH, TIME
@@ -165,6 +166,7 @@ def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
                            markevery=marks(len(x), number), zorder=3 + number / 10)  # fmt: skip
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
         invert(plot.axes)
+        arrow_of_time(plot.axes)
     ends = {curve: MILLI * run.device_q[-1, :2] for curve, run in runs.items()}
     words = "; ".join(f"{curve} ends at ({x:.1f}, {y:.1f})" for curve, (x, y) in ends.items()) + "."
     return Panel(plot.svg, f"Paths of the hand in the plane, in mm: {words}",
@@ -317,9 +319,9 @@ _SIZE = (4.5, 3.8)  # inches
     "hero", "Four worlds in one corner", *UNLIMITED.values(), section="hero",
     caption="A constant force pushes a tilted peg into a corner. First picture: outlines of the peg in the ideal world "
     "(rigid contact), from start to end. Second picture, magnified: the path of the hand from shortly before the first "
-    "contact. The closer a path is to the ideal one, the more the wall feels rigid. The peg starts with a tilt of "
-    "0.015 rad. Up to this tilt IAPB is closest to ideal in x and y; for larger tilts often not, and in the angle "
-    "rarely. The map of claim C10 below shows every start.",
+    "contact; the arrow shows the direction of time. The closer a path is to the ideal one, the more the wall feels "
+    "rigid. The peg starts with a tilt of 0.015 rad. Up to this tilt IAPB is closest to ideal in x and y; for larger "
+    "tilts often not, and in the angle rarely. The map of claim C10 below shows every start.",
 )  # fmt: skip
 def hero(*given: Run) -> Drawn:
     """Draw the picture from the runs named in UNLIMITED."""
@@ -349,8 +351,8 @@ def _motion(run: Run) -> str:
         axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
         start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
         arrow(axes, start, _FORCE_LENGTH * force)
-        note(axes, start, f"hand, {np.hypot(*force):.2f} N", (0, 10), color=FORCE)
         scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
+        note_beside(axes, start, start + _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N", 9, color=FORCE)
     return canvas.svg
 
 
@@ -363,6 +365,7 @@ def _paths(runs: Mapping[str, Run]) -> str:
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
         plot.axes.set_aspect("equal", adjustable="datalim")
         invert(plot.axes)
+        arrow_of_time(plot.axes)
     return plot.svg
 
 

@@ -17,6 +17,7 @@ _GAP = 5.0  # points between a mark and its name
 _MARK = 3.0  # points around a mark that stay free
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top
+Points = NDArray[np.float64]
 
 
 def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]]) -> list[Box]:
@@ -50,30 +51,16 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
     if len(lines) < 2:
         return
     axes.figure.draw_without_rendering()  # the layout decides where curves are
-    paths = {name: _on_paper(axes, line.get_xydata()) for name, line in lines.items()}
-    left, bottom, right, top = frame = _frame(axes)
+    frame = _frame(axes)
+    places = {line: _places_of(line, frame) for line in axes.lines}
     taken: list[Box] = [_box_of(text) for text in axes.texts]
     for name, line in lines.items():
-        if any(text.startswith(name) for text in named):
+        own = places[line]
+        if any(text.startswith(name) for text in named) or not len(own):
             continue
-        own = _dense(paths[name], frame)
-        others = np.vstack([np.zeros((0, 2)), *(_dense(path, frame) for other, path in paths.items() if other != name)])
-        if not len(own):
-            continue
+        others = np.vstack([np.zeros((0, 2)), *(found for other, found in places.items() if other is not line)])
         written = name + words.get(name, "")
-        size = np.array([_LETTER * NAME_SIZE * len(written) + 2.0, NAME_SIZE + 2.0])
-        best: tuple[float, Box, Any] = (np.inf, (0.0, 0.0, 0.0, 0.0), own[0])
-        for at in own[:: max(len(own) // _PLACES, 1)]:
-            for x, y, away in _AROUND:
-                low = at + np.array([x, y]) * (away + 0.5 * size) - 0.5 * size
-                box = (*low, *(low + size))
-                if box[0] < left or box[1] < bottom or box[2] > right or box[3] > top:
-                    continue
-                cost = _covered(box, others) + 0.5 * _covered(box, own) + away / 4.0 + 40.0 * any(
-                    _overlap(box, other) for other in taken) + 10.0 * _near(at, others)  # fmt: skip
-                if cost < best[0]:
-                    best = (cost, box, at)
-        _, box, at = best
+        box, at = _least(own[:: max(len(own) // _PLACES, 1)], written, NAME_SIZE, frame, taken, own, others)
         taken.append(box)
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         far = np.hypot(*(np.clip(at, box[:2], box[2:]) - at)) > _GAP + 2.0
@@ -87,15 +74,71 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
             note.arrow_patch.set_gid(f"name={name}")
 
 
+def arrow_of_time(axes: Any) -> None:
+    """Draw an arrow along the curves, beside the first half of the first one: the way in which time goes."""
+    line = axes.lines[0]
+    axes.figure.draw_without_rendering()
+    path = _places_of(line, _frame(axes))
+    middle = len(path) // 4
+    way = path[min(middle + _ARROW, len(path) - 1)] - path[max(middle - _ARROW, 0)]
+    aside = _ASIDE * np.array([way[1], -way[0]]) / np.hypot(*way)
+    back = axes.transData.inverted()
+    tail, tip = (back.transform((path[middle] + aside + share * way) * axes.figure.dpi / 72.0) for share in (-0.5, 0.5))
+    look = {"arrowstyle": "-|>", "color": MUTED, "lw": 1.1, "mutation_scale": 9.0, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", tip, tail, zorder=8, arrowprops=look).arrow_patch.set_gid("name=")
+    axes.annotate("time", 0.5 * (tail + tip), tuple(1.2 * aside), textcoords="offset points", fontsize=NAME_SIZE,
+                  color=MUTED, ha="left" if aside[0] > 0 else "right", va="center", gid="name=")
+
+
+def note_beside(axes: Any, tail: Any, tip: Any, text: str, size: float, **how: Any) -> None:
+    """Write the name of an arrow from `tail` to `tip` where it covers least: no arrow, no edge of a body.
+
+    Call it last, when the limits of the axes stand.
+    """
+    axes.figure.draw_without_rendering()
+    frame, scale = _frame(axes), 72.0 / axes.figure.dpi
+    own = _dense(_on_paper(axes, [tail, tip]), frame)
+    edges = [patch.get_path().transformed(patch.get_transform()).vertices * scale for patch in axes.patches]
+    arrows = [_on_paper(axes, [one.xyann, one.xy]) for one in axes.texts if getattr(one, "arrow_patch", None)]
+    others = np.vstack([*(_dense(np.asarray(path), frame) for path in (*edges, *arrows)),
+                        *(_places_of(line, frame) for line in axes.lines)])
+    taken = [_box_of(other) for other in axes.texts if other.get_text()]
+    box, at = _least(own, text, size, frame, taken, own, others)
+    place = axes.transData.inverted().transform(at * axes.figure.dpi / 72.0)
+    offset = (0.5 * (box[0] + box[2]) - at[0], 0.5 * (box[1] + box[3]) - at[1])
+    axes.annotate(text, place, offset, textcoords="offset points", ha="center", va="center", fontsize=size, zorder=9,
+                  **how)  # fmt: skip
+
+
+def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[Box], own: Points,
+           others: Points) -> tuple[Box, Points]:  # fmt: skip
+    """Return where a name covers least, and the start that it belongs to.
+
+    starts : places that it may stand at; own : what it names; others : what it must not cover either
+    """
+    left, bottom, right, top = frame
+    extent = np.array([_LETTER * size * len(name) + 2.0, size + 2.0])
+    best: tuple[float, Box, Points] = (np.inf, (0.0, 0.0, 0.0, 0.0), starts[0])
+    for at in starts:
+        for x, y, away in _AROUND:
+            low = at + np.array([x, y]) * (away + 0.5 * extent) - 0.5 * extent
+            box = (*low, *(low + extent))
+            if box[0] < left or box[1] < bottom or box[2] > right or box[3] > top:
+                continue
+            cost = (2.0 * _covered(box, others) + 2.0 * _covered(box, own) + away / 4.0 + 10.0 * _near(at, others)
+                    + 40.0 * any(_overlap(box, other) for other in taken))
+            if cost < best[0]:
+                best = (cost, box, at)
+    return best[1:]
+
+
 NAME_SIZE = 8.0  # points
 _PLACES = 40  # along a curve that are tried
 # directions and distances [points] of a name from its place on the curve
-_AROUND = tuple((x, y, away) for away in (3.0, 10.0, 20.0, 32.0)
+_AROUND = tuple((x, y, away) for away in (3.0, 10.0, 20.0, 32.0, 48.0)
                 for x, y in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)))  # fmt: skip
+_ARROW, _ASIDE = 9, 8.0  # half the length of the arrow of time, in steps, and its distance from the curve [points]
 _STEP = 2.0  # points between the places of a curve that a name must not cover
-
-Points = NDArray[np.float64]
-
 
 def _on_paper(axes: Any, places: Any) -> Points:
     """Return places of the axes in points of the drawing, once it has its layout."""
@@ -112,6 +155,19 @@ def _box_of(text: Any) -> Box:
     return (left, bottom, right, top)
 
 
+def _places_of(line: Any, frame: Box) -> Points:
+    """Return the places that a line covers: along it, or those of its marks where they are not joined."""
+    from matplotlib.cbook import STEP_LOOKUP_MAP
+
+    steps = STEP_LOOKUP_MAP[line.get_drawstyle()]
+    values = np.column_stack(steps(*np.asarray(line.get_xydata(), dtype=float).T))
+    paper = np.asarray(line.get_transform().transform(values) * 72.0 / line.axes.figure.dpi)
+    if line.get_linestyle() != "None":
+        return _dense(paper, frame)
+    corners = _MARK * np.array([(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)])
+    return _inside((paper[:, None, :] + corners).reshape(-1, 2), frame)
+
+
 def _dense(path: Points, frame: Box) -> Points:
     """Return places along a path, evenly spaced, those inside the frame."""
     path = path[np.isfinite(path).all(axis=1)]
@@ -119,8 +175,12 @@ def _dense(path: Points, frame: Box) -> Points:
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
         at = np.linspace(0.0, way[-1], min(int(way[-1] / _STEP) + 2, 3000))
         path = np.column_stack([np.interp(at, way, path[:, 0]), np.interp(at, way, path[:, 1])])
-    inside = (path >= np.array(frame[:2]) - 0.5) & (path <= np.array(frame[2:]) + 0.5)
-    return np.asarray(path[inside.all(axis=1)])
+    return _inside(path, frame)
+
+
+def _inside(places: Points, frame: Box) -> Points:
+    kept = (places >= np.array(frame[:2]) - 0.5) & (places <= np.array(frame[2:]) + 0.5)
+    return np.asarray(places[kept.all(axis=1)])
 
 
 def _covered(box: Box, points: Points) -> float:

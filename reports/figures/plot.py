@@ -95,7 +95,7 @@ def plain_powers(axes: Any) -> None:
     """Label logarithmic axes with powers of ten as plain text (mathematical text is no text in an SVG)."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    for axis in (axes.xaxis, axes.yaxis):
+    for axis in (axis for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):
         axis.set_major_locator(LogLocator(numticks=7))
         axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
         axis.set_minor_locator(NullLocator())

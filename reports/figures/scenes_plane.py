@@ -64,7 +64,7 @@ def _group(run: Run, step: int, values: np.ndarray, key: str) -> str:
         draw_walls(canvas.axes, scene, reach=1.0)
         draw_bodies(canvas.axes, scene, pose)
         _contact_arrows(canvas.axes, run, step, values, longest)
-        hand(canvas.axes, scene, body_placements(scene, pose)[scene["hand"]["body"]], 0.8 * longest, (-2, -19))
+        hand(canvas.axes, scene, body_placements(scene, pose)[scene["hand"]["body"]], 0.8 * longest)
     return canvas.svg
 
 
@@ -157,6 +157,6 @@ def _start(scene: Mapping[str, Any]) -> Panel:
         draw_walls(canvas.axes, scene, reach=20 * reach)
         draw_bodies(canvas.axes, scene)
         if scene["hand"]:
-            hand(canvas.axes, scene, body_placements(scene)[scene["hand"]["body"]], 0.28 * reach, (0, 9))
+            hand(canvas.axes, scene, body_placements(scene)[scene["hand"]["body"]], 0.28 * reach)
     words = f"{scene['title']}: {len(scene['bodies'])} moving bodies, {len(scene['walls'])} walls, at the start."
     return Panel(canvas.svg, words, scene["title"])

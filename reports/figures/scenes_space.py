@@ -86,7 +86,7 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
                 _fill(canvas.axes, sight.seen, piece, order)
             if scene["hand"]:
                 place = body_placements(scene, run.pose[step])[scene["hand"]["body"]]
-                hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), (0, 9), sight.seen.flat)
+                hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), sight.seen.flat)
         moment = f"{run.time[step]:.2f} s"
         yield Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
 

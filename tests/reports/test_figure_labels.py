@@ -1,12 +1,18 @@
-"""Names beside marks do not cover one another."""
+"""Names beside marks do not cover one another; no curve runs through the name of one."""
 
 from __future__ import annotations
 
 from itertools import combinations
 
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.cbook import STEP_LOOKUP_MAP
+from matplotlib.path import Path
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
-from reports.figures.labels import label_marks
+from reports.figures.labels import label_marks, name_curves, note_beside
 from reports.figures.style import styled
 
 CROWD = [(0.5 + 0.01 * n, 0.5) for n in range(6)]
@@ -28,3 +34,56 @@ def test_no_name_lies_on_another_or_on_a_mark_or_outside(places):
     for box in boxes:
         assert not any(box[0] < x < box[2] and box[1] < y < box[3] for x, y in marks)
         assert left <= box[0] and box[2] <= right and bottom <= box[1] and box[3] <= top
+
+
+def crossed(axes: Axes) -> list[tuple[str, str]]:
+    """Return (name at a curve, what runs through it: a line's gid) of axes that are drawn."""
+    found = []
+    for text in axes.texts:
+        if not text.get_text() or not str(text.get_gid()).startswith("name="):
+            continue
+        box = Text.get_window_extent(text)  # without a leader
+        core = Bbox.from_extents(box.x0 + 1, box.y0 + box.height / 4, box.x1 - 1, box.y1 - box.height / 4)
+        for line in axes.lines:
+            steps = STEP_LOOKUP_MAP[line.get_drawstyle()]
+            places = np.column_stack(steps(*np.asarray(line.get_xydata(), dtype=float).T))
+            path = line.get_transform().transform_path(Path(places))
+            if line.get_linestyle() != "None" and path.intersects_bbox(core, False):
+                found.append((text.get_text(), str(line.get_gid())))
+    return found
+
+
+def curves(axes: Axes) -> None:
+    """Two named curves, and two bounds without a name where names would stand best."""
+    x = np.linspace(0.0, 1.0, 50)
+    axes.plot(x, 0.4 + 0.2 * x, gid="curve=first")
+    axes.plot(x, 0.6 - 0.2 * x, gid="curve=second")
+    axes.plot(x, 0.46 + 0.2 * x, "--")
+    axes.axvline(0.3)
+    axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+
+
+def test_no_line_runs_through_the_name_of_a_curve() -> None:
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0), layout="constrained").add_subplot()
+        curves(axes)
+        name_curves(axes)
+        assert [text.get_text() for text in axes.texts] == ["first", "second"] and crossed(axes) == []
+        axes.annotate("third", (0.3, 0.8), (0, 0), textcoords="offset points", ha="center", gid="name=third")
+        axes.annotate("fourth", (0.8, 0.56), (0, 0), textcoords="offset points", ha="center", va="center", gid="name=f")
+        axes.figure.draw_without_rendering()
+        assert {name for name, _ in crossed(axes)} == {"third", "fourth"}  # a planted name is noticed
+
+
+def test_the_name_of_an_arrow_stands_clear_of_bodies_and_arrow() -> None:
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=(0.0, 4.0), ylim=(0.0, 3.0))
+        axes.fill([1.9, 2.4, 2.4, 1.9], [0.5, 0.5, 1.7, 1.7])
+        axes.annotate("", (2.0, 2.5), (2.0, 1.5), arrowprops={"arrowstyle": "-|>"})
+        note_beside(axes, (2.0, 1.5), (2.0, 2.5), "hand", 9)
+        axes.figure.draw_without_rendering()
+        box = axes.texts[-1].get_window_extent()
+        edges = [axes.transData.transform_path(Path(ends)) for ends in
+                 ([(2.0, 1.5), (2.0, 2.5)], [(1.9, 0.5), (2.4, 0.5), (2.4, 1.7), (1.9, 1.7), (1.9, 0.5)])]  # fmt: skip
+        assert not any(path.intersects_bbox(box, False) for path in edges)

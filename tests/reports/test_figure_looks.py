@@ -14,12 +14,14 @@ from matplotlib.axes import Axes
 
 import reports.figures
 from iapb.run import Run
-from reports.figures import RECIPES, corner
+from reports.figures import RECIPES, corner, plot
 from reports.figures.figure import Figure, draw
+from reports.figures.labels import name_curves
 from reports.figures.style import CYCLE, LOOKS, STYLES, LineStyle
 from reports.figures.two_link_arm import arm_energies
 from tests.reports.browser.conftest import made_motion
 from tests.reports.figure_inputs import tables
+from tests.reports.test_figure_labels import crossed
 
 MOST_SERIES = 6
 # modules that choose colours themselves -> why those are no series
@@ -83,13 +85,25 @@ def inputs(make_run: Callable[..., Run]) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def seen(inputs: dict[str, Any]) -> Iterator[tuple[list[Drawn], list[Figure]]]:
+def struck() -> list[tuple[str, str, str]]:
+    """Figure, name at a curve and the line that runs through it; `seen` fills it."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def seen(inputs: dict[str, Any], struck: list[tuple[str, str, str]]) -> Iterator[tuple[list[Drawn], list[Figure]]]:
     """Every line of every figure, and the figures."""
     lines: list[Drawn] = []
     key = [""]
     figures = []
     with pytest.MonkeyPatch.context() as patch:
         recorded(patch, lines, key)
+
+        def named(axes: Axes, *words: Any) -> None:
+            name_curves(axes, *words)
+            struck.extend((key[0], *each) for each in crossed(axes))
+
+        patch.setattr(plot, "name_curves", named)
         for recipe in RECIPES:
             key[0] = recipe.key
             figure = draw(recipe, inputs)
@@ -103,6 +117,20 @@ def test_all_figures_but_drawings_and_bars_are_drawn(seen: tuple[list[Drawn], li
     drawings = {"fig01", "fig02", "fig04", "fig05", "scenes", "scenes-space"}
     absent = {recipe.key for recipe in RECIPES if not recipe.key.startswith("film-")} - drawn
     assert absent <= drawings
+
+
+def test_no_line_runs_through_a_name(
+    seen: tuple[list[Drawn], list[Figure]], struck: list[tuple[str, str, str]]
+) -> None:
+    assert len(seen[1]) > 20
+    assert struck == []
+
+
+def test_the_way_of_time_is_drawn_on_paths_of_the_hand(seen: tuple[list[Drawn], list[Figure]]) -> None:
+    panels = [(figure.key, panel) for figure in seen[1] for panel in figure.panels]
+    paths = {key: panel.svg for key, panel in panels if "path of the hand" in panel.label}
+    assert set(paths) == {"hero", "fig07", "fig09", "fig10", "fig12"}
+    assert all(">time</text>" in svg for svg in paths.values())
 
 
 def test_no_two_rows_of_the_table_look_alike() -> None:

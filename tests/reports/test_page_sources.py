@@ -73,7 +73,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count():
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held)
     assert "reproduced where tilt ≤ 0.015 rad" in first and "30 of 40; the region is 5% of the tested range" in first
-    line = first.split("the one that fails")[1].split("</li>")[0]
+    line = first.split(">the one that fails")[1].split("</li>")[0]
     assert "refuted" in line and "1 of 40, 7 cannot tell" in line
     assert "1 refuted" in page.split("11 parts:")[1].split("</p>")[0]
     assert "more" not in first.split('<ul class="parts">')[1]
