@@ -1,4 +1,4 @@
-"""Other engines on scenes whose outcome is known: MuJoCo, if it is installed, beside a rigid reference.
+"""Compare engines on scenes of known outcome: MuJoCo, if it is installed, and the rigid reference.
 
 Run it: python examples/another_engine.py
 """

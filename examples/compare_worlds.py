@@ -1,4 +1,4 @@
-"""A scene of one's own in several worlds: how far each leaves the rigid one, what it costs, and what it loses.
+"""Your own scene in several worlds: distance from the ideal world, time per step and energy of each.
 
 Run it: python examples/compare_worlds.py   (on the command line: iapb compare slope.yaml)
 """

@@ -1,4 +1,4 @@
-"""A contact law of one's own, run beside the engine's: every approaching contact is stopped by an impulse.
+"""Your own contact law beside the engine's: an impulse stops every approaching contact in each step.
 
 Run it: python examples/own_law.py
 """
@@ -16,7 +16,7 @@ from reference.contact_rows import find_rows
 
 @dataclass(frozen=True)
 class ImpulsesOnly:
-    """No springs: the bodies are stopped again in each step."""
+    """No springs: an impulse stops the bodies again in each step."""
 
     name: str = "impulses only"
     settings: dict[str, Any] = field(default_factory=dict)

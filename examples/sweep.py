@@ -1,4 +1,4 @@
-"""One scene, many values: the deepest penetration against stiffness, with impulses and without.
+"""One scene with many values: the deepest penetration over the stiffness, with and without impulses.
 
 Run it: python examples/sweep.py
 """
@@ -15,7 +15,7 @@ for stiffness in (500.0, 1000.0, 2000.0):
     depths = [max(0.0, -run_world(changed, world).contacts.gap.min()) for world in ("IAPB", "PB")]
     print(f"{stiffness:15.0f} {1e3 * depths[0]:11.3f} {1e3 * depths[1]:9.3f}")
 
-# The same as a study for `iapb sweep`, whose runs are kept and which can be stopped and resumed:
+# The same as a study for `iapb sweep`, which stores its runs and can be stopped and resumed:
 Path("stiffness.yaml").write_text("""\
 name: stiffness
 scene: peg_corner

@@ -1,4 +1,4 @@
-"""Your own resolver under pytest, with the plugin that comes with iapb: one test per law of the contract.
+"""Your own resolver under pytest, with iapb's plugin: one test per law of the contract.
 
 Run it: pytest examples/test_my_resolver.py
 """

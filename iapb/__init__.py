@@ -1,6 +1,6 @@
 """iapb: rigid contact by impulses where a contact is new and penalties while it lasts.
 
-The names below are loaded when first used, so that ``import iapb`` costs next to nothing.
+The names below are loaded when they are first used, so ``import iapb`` is fast.
 """
 
 from __future__ import annotations

@@ -36,14 +36,15 @@ RESTITUTION_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Certificate:
-    """What the exact judge found in recorded impacts.
+    """The result of judging recorded impacts exactly.
 
     Attributes
     ----------
-    impacts : how many were judged.  gains : how many of them gained kinetic energy, however little.
-    by_integers : how many the bound left open, so that integers decided.  checked : bounds confirmed by integers.
+    impacts : number of impacts judged.  gains : number of these that gained kinetic energy, even in the last bit.
+    by_integers : number of impacts that the floating-point bound could not decide and integer arithmetic did.
+    checked : number of bounds confirmed by integer arithmetic.
     first_gain : index of the first impact that gained, −1 = none.
-    largest_gain : largest relative gain (KE⁺ − KE⁻)/KE⁻, 0 where none gained.
+    largest_gain : largest relative gain (KE⁺ − KE⁻)/KE⁻, 0 if none gained.
     momentum : largest |M(v⁺ − v⁻) − recorded impulse|, of the sum of |M||v⁺ − v⁻|; NaN where none is recorded.
     span : largest |Jᵀp − recorded impulse| with the recorded contacts' normals and impulses, of the sum of sizes: the
         distance of the impulse from range(Jᵀ). NaN where friction or per-body rows leave it open.
@@ -70,7 +71,7 @@ class Certificate:
 
     @property
     def passed(self) -> bool:
-        """No impact gained energy, and what else is judged fits. NaN is "not judged": see `words`."""
+        """No impact gained energy, and every judged residual is within its tolerance (NaN: not judged)."""
         return self.gains == 0 and not self._named(lambda size: size > 1.0)
 
     def _named(self, chosen: Callable[[float], bool]) -> list[str]:
@@ -83,7 +84,7 @@ class Certificate:
         return [name for name, size in sizes.items() if chosen(size)]
 
     def words(self) -> str:
-        """What is certified, what does not fit and what is not judged, in one line."""
+        """One line that says what is certified, what fails and what is not judged."""
         wrong, open_ = self._named(lambda size: size > 1.0), self._named(np.isnan)
         if not self.impacts:
             return f"no impact, and what is recorded does not fit: {', '.join(wrong)}" if wrong else \
@@ -168,12 +169,12 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
 
 
 def certify(run: Run) -> Certificate:
-    """Judge every impact of a run exactly: energy, and whether impulses, velocities and contacts belong together.
+    """Judge every impact of a run exactly: its energy, and whether impulses, velocities and contacts are consistent.
 
-    M is made again from the recorded q by the engine's kernels, which give the same bits on every x86-64 processor. The
-    recorded digest is that of the M which the recorder made so after the run, not of the M inside the step: it shows
-    that q, scene and kernels are those of the recording. That M is the one of the impact is shown by the recorded
-    generalized impulse, which must be M(v⁺ − v⁻), to `MOMENTUM_TOLERANCE`.
+    The engine's kernels compute M again from the recorded q; they give the same bits on every x86-64 processor. The
+    digest in the record is that of the M computed in this way after the run, not of the M inside the step: if it
+    agrees, then q, scene and kernels are those of the recording. The recorded generalized impulse must be M(v⁺ − v⁻),
+    to `MOMENTUM_TOLERANCE`: this shows that M is the mass matrix of the impact.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def certify(run: Run) -> Certificate:
     ArgumentError
         The record holds a number that is not finite, or steps that the run does not have.
     IapbError
-        M, made again, is not the one whose digest is recorded.
+        The digest of the recomputed M is not the recorded one.
     """
     table = run.impacts
     _check_finite(run)

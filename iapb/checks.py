@@ -377,17 +377,17 @@ def _limits(start: Start, method: Integrator, mobility: float, rows: NDArray[np.
 
 
 def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, ...]:
-    """Say what makes a run of this scene worthless, before it is run.
+    """Find mistakes that would make a run of this scene meaningless, without running it.
 
     Parameters
     ----------
     scene : Scene
-    law : contact law; default `ImpulseAugmented()`. What a law does not use is not looked at.
+    law : contact law; default `ImpulseAugmented()`. Fields that the law does not use are not checked.
 
     Returns
     -------
     tuple of Caution
-        Empty where nothing is wrong.
+        Empty if nothing is wrong.
     """
     chosen: Any = ImpulseAugmented() if law is None else law
     start = Start(settled(scene)[0])

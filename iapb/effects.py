@@ -490,23 +490,23 @@ def decide_effects(
     scene: Scene, law: ContactLaw | str | None = None, coupling: Coupling | str | None = None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
-    """Decide every effect for a scene, and for the caller's choices where they are made.
+    """Decide which effects are on for a scene and for the caller's choices.
 
     Parameters
     ----------
     scene
         a checked scene.
     law, coupling
-        the objects, or names as they stand in a run, such as "penalty" and "four-channel". None leaves the choice
-        open: an effect is then on if some choice would need it. A law says by its attribute ``uses`` which parts of
-        the contact section it uses (`iapb.contact.laws`); one that does not is taken to use all of it.
+        the objects, or their names in a run file, such as "penalty" and "four-channel". None: an effect is on if some
+        law or coupling needs it. The attribute ``uses`` of a law names the parts of the contact section that it uses
+        (`iapb.contact.laws`); a law without it is assumed to use all of them.
     rendering
         such as "scale"; default: the law's own.
 
     Returns
     -------
     tuple of Effect
-        every effect in a fixed order: `active`, the reason, and what leaving it out would change.
+        every effect in a fixed order: whether it is active, why, and what leaving it out would change.
     """
     scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)

@@ -19,7 +19,7 @@ def shown(value: Any) -> str:
 class IapbError(Exception):
     """Root of every error that iapb raises on purpose.
 
-    Errors travel between processes with message and attributes; an attribute that cannot be pickled travels as
+    Errors can be pickled with message and attributes; an attribute that cannot be pickled is replaced by
     its text.
     """
 
@@ -44,7 +44,7 @@ def _restored(kind: type[IapbError], args: tuple[Any, ...], attributes: dict[str
 
 
 class ArgumentError(IapbError, ValueError):
-    """An argument at the public border has a value that the call cannot take."""
+    """An argument of a public function has an invalid value."""
 
     def __init__(self, argument: str, value: Any, expected: str) -> None:
         self.argument, self.value, self.expected = argument, value, expected

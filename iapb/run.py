@@ -145,10 +145,9 @@ _LATER = ("scene_source", "scene_resolved", "pose", "energy", "effects", "distru
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """One simulation: scene, law, coupling and everything that came of it (SI units).
+    """One simulation: scene, law, coupling and all recorded quantities (SI units).
 
-    What follows from the rest (`pose`, `energy`, `distrust`, how scene and effects are written) is computed when it is
-    first asked for.
+    Derived quantities (`pose`, `energy`, `distrust`, the text of scene and effects) are computed when first asked for.
     """
 
     scene_name: str

@@ -142,7 +142,7 @@ class Simulation:
     scene : Scene, its `iapb.system.System`, the path of a scene file, or the name of a scene of the project.
     law : contact law; default `ImpulseAugmented()`.
     coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
-    device : one that moves by itself (`iapb.haptics.device.Device`); default: the compiled device.
+    device : a Python device model (`iapb.haptics.device.Device`); default: the compiled device.
 
     Examples
     --------
@@ -316,7 +316,7 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
              world: str = "", steps: int | None = None,
              progress: Callable[[int, int], None] | None = None,
              checkpoint: Checkpoint | None = None, max_memory: float | None = None) -> Run:
-    """Simulate a scene under a contact law and a coupling, or in a world, and return the whole record.
+    """Simulate a scene, either with a contact law and a coupling or in a named world, and return the run.
 
     Parameters
     ----------

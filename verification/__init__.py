@@ -1,6 +1,6 @@
 """Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns records, writes no files.
 
-The names below are loaded when first used, so that ``import verification`` costs next to nothing.
+The names below are loaded when they are first used, so ``import verification`` is fast.
 """
 
 from __future__ import annotations

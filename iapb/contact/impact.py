@@ -50,7 +50,7 @@ METHODS: dict[str, Method] = {
 
 @dataclass(frozen=True)
 class Impact:
-    """What an impact does (SI units; d generalized velocities, c contacts).
+    """The result of an impact (SI units; d generalized velocities, c contacts).
 
     Attributes
     ----------
@@ -68,8 +68,8 @@ class Impact:
         left a contact closing, as rows that nearly oppose each other can (the energy does not rise then either);
         ``"cancelled"`` where no step that gains nothing was found, so that v⁺ = v⁻, or where entries of v are so far
         apart (2^1000) that the smallest are lost.
-    method, law : how it was computed, and which restitution law it obeys.
-    rows_used : the row budget that was in force (None = unlimited); a replay with it is exact.
+    method, law : the method that computed it, and the restitution law that it obeys.
+    rows_used : the row budget used (None = unlimited); the same budget reproduces the result exactly.
     """
 
     velocity: Floats
@@ -90,14 +90,14 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
                    clamp: bool | None = None, rank_tolerance: float | None = None) -> Impact:
     """Resolve a simultaneous impact: J v⁺ = −e J v⁻ for every row given, with M(v⁺ − v⁻) in range(Jᵀ).
 
-    Every row is an equality, whatever the sign of its velocity: choosing the rows that collide
-    (γ < −v_approach, paper section V) is the caller's.
+    Every row is an equality, whatever the sign of its velocity. The caller chooses the rows that collide
+    (γ < −v_approach, paper section V).
 
     Parameters
     ----------
     mass_matrix : (d, d) symmetric positive definite M (paper: D) [kg, kg m²].
     contact_jacobian : (c, d) J with one row nᵀJᵢ per contact; n unit, pointing so that J v > 0 separates.
-        c = 0 and zero, repeated or dependent rows are fine.
+        c = 0 and zero, repeated or dependent rows are allowed.
     velocity : (d,) generalized velocity v⁻ before the impact [m/s, rad/s].
     restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal values obey
         Poisson's law by two LCPs (compression, then restitution; contacts only push), which is passive for
@@ -189,7 +189,7 @@ def _entries() -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Impacts:
-    """What n impacts of d coordinates and c contacts do: the attributes of `Impact`, one line per impact.
+    """The results of n impacts of d coordinates and c contacts: the attributes of `Impact`, one row per impact.
 
     Attributes
     ----------
@@ -226,8 +226,8 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     Returns
     -------
     Impacts
-        Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts (n, c), and what
-        `Impact` has of one, for each.
+        Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts (n, c), and the other
+        attributes of `Impact` for each.
 
     Raises
     ------

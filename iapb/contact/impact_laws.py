@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FrictionalImpact:
-    """What an impact with friction does (SI units; d velocities, c contacts, m tangents each).
+    """The result of an impact with friction (SI units; d velocities, c contacts, m tangents each).
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class FrictionalImpact:
     friction_share : factor in [0, 1] by which friction was reduced so that no energy is gained and (status
         ``"reduced"``) every contact stays in its cone; 1 = not at all.
     clamp : factor of the final clamps against rounding.
-    status : ``"complete"``: p_t obeys Coulomb's law, but for that factor. ``"reduced"``: no p_t that does was found
-        (there may be none); it is then the one that dissipates most under the limits of the impact without friction,
-        within its cones, passivity and restitution as ever. ``"cancelled"``: as of `resolve_impact`.
+    status : ``"complete"``: p_t obeys Coulomb's law, up to that factor. ``"reduced"``: no p_t that obeys it was found
+        (there may be none). p_t then dissipates most within the friction limits of the frictionless impact; it stays
+        in its cones, and passivity and restitution hold as always. ``"cancelled"``: as in `resolve_impact`.
     """
 
     velocity: Floats
@@ -87,10 +87,11 @@ def resolve_frictional_impact(
 
     Notes
     -----
-    Source: the split is ours; Coulomb's law at velocity level is Moreau's (1988); the gain it prevents is Kane and
-    Levinson's (Dynamics, 1985). Which normal impulses limit friction at redundant contacts is not determined: here
-    non-negative ones near those of least norm, and where some contact truly pulls, those of least norm. Both change
-    continuously with p_t, so that the limits settle (`iapb.contact.kernels.impact_friction`).
+    Sources: Coulomb's law at velocity level is Moreau's (1988); the energy gain that this method prevents is Kane and
+    Levinson's (Dynamics, 1985); the splitting into normal and tangential part is ours. At redundant contacts the normal
+    impulses that limit friction are not unique. Here they are non-negative ones near those of least norm, or those of
+    least norm where some contact must pull. Both depend continuously on p_t, so the limits converge
+    (`iapb.contact.kernels.impact_friction`).
     """
     given = check_friction(mass_matrix, contact_jacobian, tangents, velocity, restitution, friction)
     problem, (c, m, d) = given.problem, given.tangents.shape

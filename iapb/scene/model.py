@@ -232,7 +232,7 @@ class Couplings(Part):
 
 
 class Scene(Part):
-    """A world to simulate: bodies, walls, how contacts behave, and the hand that moves the tool (SI units)."""
+    """A scene to simulate: bodies, walls, contact parameters, and the hand that moves the tool (SI units)."""
 
     name: Name = Field(description="the scene's name; runs are filed under it")
     title: Text = Field("", description="one line for reports")

@@ -275,7 +275,7 @@ def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
 
 
 def which_method(budget: float, contacts: int, coordinates: int, rounds: int = ROUNDS) -> tuple[Choice, ...]:
-    """Measure one size on this machine and return what to take, compiled and from Python.
+    """Measure one size of impact on this machine and return the best method, compiled and from Python.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     Returns
     -------
     tuple of Choice
-        Compiled, and called from Python; the one is missing for which no method ends in time.
+        The best compiled method and the best one called from Python, as far as one is fast enough.
 
     Raises
     ------

@@ -55,15 +55,15 @@ def judge_hard_cases(
     Parameters
     ----------
     methods : names of impact methods and of worlds; default all that a case is about.
-    cases : names in `HARD_CASES`, by default all of them. Cases of files that are absent are left out: ask
-        `HARD_CASES[name]()` for the reason, which it raises as `CaseAbsent`.
-    simulate : how a scene is run in a world: ``simulate(scene, world) -> Run``.
-    failures : receives what raises anything but an `IapbError`, which is a verdict; without it that passes through.
+    cases : names in `HARD_CASES`, by default all of them. Cases whose files are absent are left out;
+        `HARD_CASES[name]()` raises `CaseAbsent` with the reason.
+    simulate : function that runs a scene in a world: ``simulate(scene, world) -> Run``.
+    failures : receives exceptions other than `IapbError`, which is a verdict; without this list they propagate.
 
     Returns
     -------
     tuple of HardCaseVerdict
-        one for each pair of case and method: the verdict in a word, and the numbers that it follows from.
+        one for each pair of case and method: the verdict in a word, and the numbers behind it.
 
     Raises
     ------

@@ -313,8 +313,8 @@ def check_passivity(
     contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only push, e in [0, 1].
         ``frictional``: also Coulomb's friction; called as resolver(mass_matrix, contact_jacobian, tangents (c, m, d),
         velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
-    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract but ``exact_energy``,
-        which excuses no rounding.
+    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract except ``exact_energy``,
+        which allows no rounding error.
     impacts : random impacts. ``equality``: up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
         fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
         `impacts.ADVERSE` more come first: elastic ones on nearly equal rows. The other contracts: up to 6 coordinates
@@ -323,9 +323,10 @@ def check_passivity(
     search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
     bounds : tolerances; default: the contract's, of `verification.laws.bounds`.
     largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2 (``frictional``).
-    unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and ask
-        what holds for any law of them: no energy, M(v⁺ − v⁻) in range(Jᵀ), momentum, the same bits, own arguments.
-    patience : seconds after which no further impact is tried; then the report is not passed, and says so.
+    unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and test
+        the laws that hold for every such rule: no energy gain, M(v⁺ − v⁻) in range(Jᵀ), momentum, repeatable bits,
+        unchanged arguments.
+    patience : seconds after which no further impact is tried; the report then fails and says why.
     progress : called with (impacts done, impacts) after each.
 
     Returns
@@ -341,10 +342,11 @@ def check_passivity(
 
     Notes
     -----
-    The energy of every answer is judged, some twelve for each impact. A fault that shows in a share p of the calls is
-    found with probability 1 − (1 − p)ⁿ in n calls: with the default 5,000 impacts (n ≈ 58,000) 95 % at p = 5e-5, 16 %
-    at 3e-6. What stays unseen: faults rarer than that, gains below `bounds` (1e-7 at most), sizes beyond 40 coordinates
-    (80 for laws that double them) or 750 contacts, units beyond eight decades, and answers that follow the clock.
+    The energy of every answer is judged, about twelve answers for each impact. A fault that occurs in a share p of the
+    calls is found in n calls with probability 1 − (1 − p)ⁿ: with the default of 5,000 impacts (n ≈ 58,000) this is 95 %
+    for p = 5e-5 and 16 % for p = 3e-6. The kit does not find rarer faults, gains below `bounds` (at most 1e-7), faults
+    beyond 40 coordinates (80 for laws that double them) or 750 contacts, faults with units beyond eight decades, and
+    answers that depend on the clock.
 
     Examples
     --------

@@ -93,8 +93,8 @@ def compare_worlds(
     Returns
     -------
     Finding
-        with the tables "worlds" (a row for each), "over time", and, where there are impacts, "solvers" and "problems";
-        the answer ranks the worlds that ran to the end and are to be trusted, and names the others with the reason
+        with the tables "worlds" (a row for each), "over time", and, if there are impacts, "solvers" and "problems";
+        the answer ranks the worlds whose runs are complete and trustworthy, and names the others with the reason
 
     Raises
     ------
