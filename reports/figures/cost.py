@@ -121,7 +121,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
 
     looks = looks_of(dict.fromkeys(kernels.column("problem")))
     said = "Both compiled, timed in turns (claim C22). Below the line at 1 IAPB is the slower. "
-    with Plot("where-iapb-loses", (6.8, 2.8)) as plot:
+    with Plot("where-iapb-loses", (5.2, 2.7)) as plot:
         plot.axes.axhline(1.0, color=INK, linewidth=0.9)
         plot.axes.axhspan(1e-2, 1.0, color=FORCE, alpha=0.07, linewidth=0)
         for name, look in looks.items():
@@ -138,7 +138,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
         plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda ratio, _: f"{ratio:g}"))
         plot.axes.xaxis.set_major_locator(FixedLocator([1, 2, 4, 8, 16, 32, 64, 128, 300]))
         plot.axes.xaxis.set_major_formatter(FuncFormatter(lambda count, _: f"{count:g}"))
-    return Drawn((Panel(plot.svg, said.strip(), wide=True),), kernels, tuple(looks.items()),
+    return Drawn((Panel(plot.svg, said.strip()),), kernels, tuple(looks.items()),
                  said + _lost_on_hard_impacts(numbers) + _WHY)
 
 
@@ -435,21 +435,21 @@ _FORMS = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
 
 @recipe(
     "impact-scaling", "How one impact's time grows", "haptic-rate/scaling", "haptic-rate/fitted", section="haptic-rate",
-    caption="Medians with quartiles; thin lines are fitted powers. Every contact adds a row to the factored impact but "
-    "no more work per row than the rank asks for; the pseudo-inverse of the printed formula is of a matrix of all "
-    "contacts.",
+    caption="Medians with quartiles; lines are fitted powers. At each curve stands the exponent of the fit, and where "
+    "the curve is steepest, which the fit hides. Every contact adds a row to the factored impact but no more work per "
+    "row than the rank asks for; the pseudo-inverse of the printed formula is of a matrix of all contacts.",
 )  # fmt: skip
 def impact_scaling(numbers: Table, fitted: Table) -> Drawn:
     """Two panels."""
-    powers = {(row["method"], row["axis"]): row["exponent"] for row in fitted.records()}
+    powers = {(row["method"], row["axis"]): row for row in fitted.records()}
     panels = tuple(
         Panel(_growth(numbers, powers, axis), f"Time of one impact against the number of {axis}.",
               f"{axis}, with {held[1]} {held[0]}") for axis, held in _HELD.items()
     )  # fmt: skip
-    return Drawn(panels, numbers, tuple(_FORMS.items()))
+    return Drawn(panels, numbers, tuple((look.name, look) for look in _FORMS.values()))
 
 
-def _growth(numbers: Table, powers: Mapping[tuple[str, str], float], axis: str) -> str:
+def _growth(numbers: Table, powers: Mapping[tuple[str, str], Row], axis: str) -> str:
     held = dict([_HELD[axis]])
     with Plot(f"impact-scaling-{axis}") as plot:
         for method, look in _FORMS.items():
@@ -457,11 +457,12 @@ def _growth(numbers: Table, powers: Mapping[tuple[str, str], float], axis: str) 
             size, middle, low, high = (np.array(part) for part in zip(*sorted(rows), strict=True))
             plot.marks(zip(size, middle, strict=True), look)
             plot.axes.vlines(size, low, high, color=look.color, linewidth=1.0)
-            power = powers[method, axis]
+            row = powers[method, axis]
+            power = row["exponent"]
             level = np.exp(np.mean(np.log(middle) - power * np.log(size)))
             plot.axes.plot(size, level * size**power, color=look.color, linewidth=0.9)
-            plot.axes.annotate(f"exponent {power + 0.0:.2f}".replace("-", "−"), (size[-1], middle[-1]),
-                               textcoords="offset points", xytext=(-4, 7), ha="right", color=look.color)  # fmt: skip
+            plot.words[look.name] = (f": exponent {power:.2f}, {row['there']:.2f} from {row['steepest from']:g} to "
+                                     f"{row['to']:g}")
         plot.log(axis, "time of one impact [µs]")
     return plot.svg
 

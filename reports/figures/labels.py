@@ -21,7 +21,7 @@ Points = NDArray[np.float64]
 
 
 def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]]) -> list[Box]:
-    """Write each name beside its mark: on the right, on the left, or higher and lower until nothing is in the way.
+    """Write each name beside its mark, in the nearest place where it covers no mark, no other name and no line.
 
     Call it last, when the limits of the axes stand. Returns the boxes of the names [points].
     """
@@ -29,15 +29,24 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
     marks = [tuple(place) for place in _on_paper(axes, places)]
     frame = _frame(axes)
     taken: list[Box] = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in marks]
+    lines = _lines(axes, frame)
     boxes = []
     for name, place, (x, y) in zip(names, places, marks, strict=True):
-        box = _free(x, y, _LETTER * SIZE * len(name), taken, frame)
+        box = _free(x, y, _LETTER * SIZE * len(name), taken, lines, frame)
         taken.append(box)
         boxes.append(box)
-        near = abs(0.5 * (box[1] + box[3]) - y) < SIZE
+        near = abs(0.5 * (box[1] + box[3]) - y) < 1.5 * SIZE
         axes.annotate(name, place, (box[0] - x, box[1] - y), textcoords="offset points", fontsize=SIZE, color=INK,
                       va="bottom", arrowprops=None if near else {"arrowstyle": "-", "color": MUTED, "lw": 0.4})
     return boxes
+
+
+def _lines(axes: Any, frame: Box) -> Points:
+    """Return places along all lines that are drawn, curves and segments."""
+    found = [_places_of(line, frame) for line in axes.lines if line.get_linestyle() != "None"]
+    for collection in axes.collections:
+        found += [_dense(_on_paper(axes, path), frame) for path in getattr(collection, "get_segments", list)()]
+    return np.vstack([np.zeros((0, 2)), *found])
 
 
 def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> None:
@@ -193,17 +202,19 @@ def _near(place: Points, others: Points) -> bool:
     return bool(len(others)) and float(np.min(np.hypot(*(others - place).T))) < _GAP
 
 
-def _free(x: float, y: float, width: float, taken: Sequence[Box], frame: Sequence[float]) -> Box:
-    """The first place for a name that is free and inside of the axes; the last one tried where none is."""
-    box: Box = (0.0, 0.0, 0.0, 0.0)
+def _free(x: float, y: float, width: float, taken: Sequence[Box], lines: Points, frame: Sequence[float]) -> Box:
+    """The first place for a name inside of the axes where nothing is in the way; else the one that covers least."""
+    best: tuple[float, Box] = (np.inf, (0.0, 0.0, 0.0, 0.0))
     for step in range(24):
         lift = (step + 1) // 2 * SIZE * (1 if step % 2 else -1)  # 0, up, down, further up, ...
         for left in (x + _GAP, x - _GAP - width):
             box = (left, y + lift - 0.6 * SIZE, left + width, y + lift + 0.6 * SIZE)
             inside = box[0] >= frame[0] and box[2] <= frame[2] and box[1] >= frame[1] and box[3] <= frame[3]
-            if inside and not any(_overlap(box, other) for other in taken):
+            covered = _covered(box, lines) + 1e3 * sum(_overlap(box, other) for other in taken) + 1e6 * (not inside)
+            if covered == 0.0:
                 return box
-    return box
+            best = min(best, (covered + 0.1 * step, box))
+    return best[1]
 
 
 def _overlap(a: Box, b: Box) -> bool:

@@ -87,3 +87,19 @@ def test_the_name_of_an_arrow_stands_clear_of_bodies_and_arrow() -> None:
         edges = [axes.transData.transform_path(Path(ends)) for ends in
                  ([(2.0, 1.5), (2.0, 2.5)], [(1.9, 0.5), (2.4, 0.5), (2.4, 1.7), (1.9, 1.7), (1.9, 0.5)])]  # fmt: skip
         assert not any(path.intersects_bbox(box, False) for path in edges)
+
+
+def test_no_name_is_struck_through_by_a_line() -> None:
+    """As "clustering" was by the front of effects, and every name by the curves at the floor."""
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0), layout="constrained").add_subplot()
+        axes.plot([0.2, 0.8], [0.5, 0.5], "-o")
+        axes.vlines(0.5, 0.1, 0.9)
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        boxes = label_marks(axes, ["clustering", "coupling", "middle"], [(0.2, 0.5), (0.8, 0.5), (0.5, 0.5)])
+        left, bottom, right, top = (72.0 / axes.figure.dpi * side for side in axes.get_window_extent().extents)
+    across, up = left + 0.5 * (right - left), bottom + 0.5 * (top - bottom)
+    ends = [left + share * (right - left) for share in (0.2, 0.8)]
+    for box in boxes:
+        assert not (box[1] < up < box[3] and box[0] < ends[1] and box[2] > ends[0])
+        assert not box[0] < across < box[2]
