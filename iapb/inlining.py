@@ -9,6 +9,7 @@ load from a block is loaded once: a step of the resting peg takes six tenths of 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -34,11 +35,12 @@ class BitcodeLibrary(JITCodeLibrary):
         """Nothing is linked, optimised or made machine code."""
         self._finalized = True
 
+    @cached_property
     def needed(self) -> list[Any]:
-        """This library and all that it calls, each once."""
+        """This library and all that it calls, each once; asked for when it is finalised, so nothing is added later."""
         found: dict[Any, None] = {self: None}
         for library in self._linking_libraries:
-            found.update(dict.fromkeys(library.needed() if isinstance(library, BitcodeLibrary) else [library]))
+            found.update(dict.fromkeys(library.needed if isinstance(library, BitcodeLibrary) else [library]))
         return list(found)
 
 
@@ -76,7 +78,7 @@ class BitcodeLowering(NativeLowering):
         super().run_pass(state)
         state.library.finalize()
         key = object()
-        state.targetctx.insert_user_function(key, state.cr.fndesc, state.library.needed())
+        state.targetctx.insert_user_function(key, state.cr.fndesc, state.library.needed)
         state.cr = state.cr._replace(cfunc=key)
         return True
 
