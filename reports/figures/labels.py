@@ -112,18 +112,19 @@ def note_beside(axes: Any, tail: Any, tip: Any, text: str, size: float, **how: A
     others = np.vstack([*(_dense(np.asarray(path), frame) for path in (*edges, *arrows)),
                         *(_places_of(line, frame) for line in axes.lines)])
     taken = [_box_of(other) for other in axes.texts if other.get_text()]
-    box, at = _least(own, text, size, frame, taken, own, others)
+    box, at = _least(own, text, size, frame, taken, own, others, shared=0.0)
     place = axes.transData.inverted().transform(at * axes.figure.dpi / 72.0)
     offset = (0.5 * (box[0] + box[2]) - at[0], 0.5 * (box[1] + box[3]) - at[1])
     axes.annotate(text, place, offset, textcoords="offset points", ha="center", va="center", fontsize=size, zorder=9,
                   **how)  # fmt: skip
 
 
-def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[Box], own: Points,
-           others: Points) -> tuple[Box, Points]:  # fmt: skip
+def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[Box], own: Points, others: Points,
+           shared: float = 10.0) -> tuple[Box, Points]:  # fmt: skip
     """Return where a name covers least, and the start that it belongs to.
 
     starts : places that it may stand at; own : what it names; others : what it must not cover either
+    shared : cost of a start at which others run as well, so that the name could be theirs
     """
     left, bottom, right, top = frame
     extent = np.array([_LETTER * size * len(name) + 2.0, size + 2.0])
@@ -134,7 +135,7 @@ def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[B
             box = (*low, *(low + extent))
             if box[0] < left or box[1] < bottom or box[2] > right or box[3] > top:
                 continue
-            cost = (2.0 * _covered(box, others) + 2.0 * _covered(box, own) + away / 4.0 + 10.0 * _near(at, others)
+            cost = (2.0 * _covered(box, others) + 2.0 * _covered(box, own) + away / 4.0 + shared * _near(at, others)
                     + 40.0 * any(_overlap(box, other) for other in taken))
             if cost < best[0]:
                 best = (cost, box, at)

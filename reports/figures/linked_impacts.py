@@ -165,8 +165,9 @@ def _last_ball(numbers: Table) -> str:
             axes.plot([n for n, _ in found], values, **line_arguments(found[0][1].look))
             words = rows.removesuffix(" contacts").removesuffix(" along the row")
             mine = "per-body rows" if "per-body" in treatment else words
-            below = (0, -9) if "per-body" in treatment else (0, 8)
-            note(axes, (found[-1][0], values[-1]), mine, below, ha="right", color=found[0][1].look.color, fontsize=8)
+            falling = 0.1 < values[-1] < values[0]  # its name stands clear of it below
+            lift = (0, -9) if "per-body" in treatment or falling else (0, 8)
+            note(axes, (found[-1][0], values[-1]), mine, lift, ha="right", color=found[0][1].look.color, fontsize=8)
         axes.set(xlabel="balls in the cradle", ylabel="velocity of the last ball [m/s]", ylim=(-0.18, 1.2))
     return plot.svg
 
