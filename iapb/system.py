@@ -77,16 +77,18 @@ class Parts:
     def of_world(self) -> dict[str, Any]:
         """What of a world is the same under every law."""
         ranges = np.array(self.mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
-        return {"mechanism": self.mechanism.block, "shapes": block(self.shapes), "pairs": self.pairs,
+        return {"mechanism": self.mechanism.block, "shapes": block(self.shapes),
                 "tree_of_body": self.mechanism.tree_of_body, "joint_damping": self.joint_damping,
                 "tree_start": np.ascontiguousarray(ranges[:, 0]), "tree_stop": np.ascontiguousarray(ranges[:, 1]),
                 "own_restitution": self.own_restitution, "stops": block(self.stops)}
 
-    def broad_phase(self, used: bool) -> Any:
+    def broad_phase(self, pairs: NDArray[np.int32], used: bool) -> Any:
         """A broad phase of its own, for a world writes into it; where it is not used, a stub that nobody writes."""
-        made = kept(self.firsts, ("broad phase", used), lambda: block(make_broad_phase(
-            self.shapes, self.pairs[: len(self.pairs) * used])).twin())
-        return made.twin() if used else made
+        if not used:
+            return kept(self.firsts, "stub", lambda: block(make_broad_phase(self.shapes, self.pairs[:0])))
+        if pairs is not self.pairs:  # somebody has left some out
+            return block(make_broad_phase(self.shapes, pairs))
+        return kept(self.firsts, "broad phase", lambda: block(make_broad_phase(self.shapes, pairs)).twin()).twin()
 
 
 _PARTS: dict[str, Parts] = {}  # by what the scene says of them
@@ -302,7 +304,8 @@ def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
     )
     integrator = INTEGRATORS[law.integrator]
     return block(World(
-        **system.parts.of_world, broad_phase=system.parts.broad_phase(switches.broad_phase),
+        **system.parts.of_world, pairs=system.pairs,
+        broad_phase=system.parts.broad_phase(system.pairs, switches.broad_phase),
         switches=kept(system.parts.firsts, ("switches", *switches), lambda: block(switches)),
         dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",

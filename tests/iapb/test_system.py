@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
+from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
@@ -142,3 +145,23 @@ def test_contacts_at_a_pose_are_those_within_the_margin() -> None:
     assert len(system.contacts_at([0.0, 5.0, 0.1], np.inf).gap) == 40
     with pytest.raises(ArgumentError, match="margin"):
         system.contacts_at([0.0, 5.0, 0.1], np.nan)
+
+
+def test_pairs_that_are_left_out_of_a_system_are_left_out_of_its_world_alone():
+    """What scenes share of bodies and walls stays whole."""
+    disc = {"joint": "planar", "mass": 1.0, "inertia": 2e-4, "shapes": [{"kind": "circle", "radius": 0.02}]}
+    count = 3
+    while count * (count - 1) // 2 <= WORTHWHILE_PAIRS + 1:
+        count += 1
+    for n, used in ((3, False), (count, True)):
+        scene = load_scene(find_scene("two_discs")).with_values({"bodies": [
+            disc | {"name": f"disc_{i}", "position": [0.1 * i, 0.0, 0.0]} for i in range(n)]})
+        whole, fewer, again = System(scene), System(scene), System(scene.with_values({"contact.restitution": 0.5}))
+        fewer.pairs = np.ascontiguousarray(fewer.pairs[1:])
+        worlds = [each.world_under(Penalty()) for each in (whole, fewer, again)]
+        assert [len(world.pairs) for world in worlds] == [n * (n - 1) // 2 - left for left in (0, 1, 0)]
+        assert [world.switches.broad_phase for world in worlds] == [used] * 3
+        looked_at = [int(np.count_nonzero(world.broad_phase.allowed)) for world in worlds]
+        assert looked_at == ([len(world.pairs) for world in worlds] if used else [0, 0, 0])
+        centers = [world.broad_phase.center for world in worlds]
+        assert not used or not any(np.shares_memory(*two) for two in itertools.combinations(centers, 2))
