@@ -33,11 +33,11 @@ _SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
 @recipe(
     "agreement-map", "Where IAPB and complementarity move alike", "complementarity/map", "complementarity/two contacts",
     section="complementarity",
-    caption="First picture: a row for each kind of impact and number of redundant rows; the blue bar is the share of "
-    "impacts in which both laws give one motion, the ticks are those of e = 0, 0.5 and 1, which lie on one "
-    "another. Second picture: by how much the others differ, median and largest, for e = 0, 0.5 and 1: the "
-    "distance grows as 1 + e. Third picture: two contacts alone, whose rows have the cosine c in the kinetic "
-    "metric and which close at speeds 1 and r. They agree on and above the line r = c, and nowhere below.",
+    caption="First picture: one row for each family of impacts and number of redundant rows. The blue bar is the share "
+    "of impacts in which both laws give the same velocity; the ticks for e = 0, 0.5 and 1 coincide. Second picture: "
+    "distance between the laws in the other impacts, median and largest, for e = 0, 0.5 and 1; it is proportional to "
+    "1 + e. Third picture: two contacts with approach speeds 1 and r, whose rows have the cosine c in the kinetic "
+    "metric. The laws agree on and above the line r = c, and nowhere below.",
 )  # fmt: skip
 def agreement_map(numbers: Table, border: Table) -> Drawn:
     """Draw share and distance of the map, and the border."""
@@ -122,12 +122,12 @@ def where_to_stop(numbers: Table) -> Drawn:
               "price of impulses that only push"),
     )  # fmt: skip
     caption = (
-        "A pile of spheres falls on the floor; every mark is one kind of pile, with all contacts that approach, or all "
-        "that touch, as equalities (19); marks at the lower edge agree with complementarity to rounding. "
-        f"Stop using (19) where more than {limit} contacts collide at once: from there "
-        "on its motion is never that of complementarity, and some of its impulses pull. The world IAPB-push (method "
-        f"“poisson”) only pushes, agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e}"
-        f", and takes {min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
+        "A pile of spheres falls on the floor. Each mark is one kind of pile, in which either all approaching or all "
+        "touching contacts are equalities (19). Marks at the lower edge agree with complementarity to rounding. Do not "
+        f"use (19) where more than {limit} contacts collide at once: its velocity then always differs from that of "
+        "complementarity, and some of its impulses pull. In the world IAPB-push (method “poisson”) impulses only push. "
+        f"It agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e} and takes "
+        f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
     )
     looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
     return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)
@@ -179,10 +179,10 @@ TIMED = {
     "cost-of-contacts", "What an impact costs", "complementarity/time per impact", "complementarity/time per step",
     section="complementarity",
     caption="Median time of one impact over its number of contacts; the band reaches from the least to the largest "
-    "sample. Full lines are compiled, dashed ones are called from Python: compare like with like. A cross: "
-    "the solver answered wrongly. A triangle at the top: it was left out, too slow for fewer contacts. On a patch "
-    "all contacts beyond three are redundant, and IAPB drops them; in a pile none is, and a dense factor costs "
-    "what it costs. Last picture: one step of each world.",
+    "sample. Compare full lines (compiled) with full lines and dashed lines (called from Python) with dashed lines. A "
+    "cross: the solver's answer was wrong. A triangle at the top: the solver was left out because it was too slow for "
+    "fewer contacts. On a patch all contacts beyond three are redundant, and IAPB drops them; in a pile none is. Last "
+    "picture: time of one step of each world.",
 )  # fmt: skip
 def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     """Draw a panel for each family, and the steps."""
@@ -249,10 +249,10 @@ def _steps(numbers: Table) -> str:
 @recipe(
     "performance-profile", "Which solver solves what, and how fast", "complementarity/profile",
     section="complementarity",
-    caption="How high a curve starts: the share of problems on which the solver is the fastest. How high it ends: the "
-    "share that it solves at all, by residuals recomputed from the problem; refusals, wrong answers and what was "
-    "left out for time count as unsolved. Times are of the solve alone, each solver warmed before: for Siconos "
-    "its compiled solve, for the others their call from Python. At most six curves; the numbers have all solvers.",
+    caption="The height at which a curve starts is the share of problems on which the solver is fastest; the height at "
+    "which it ends is the share that it solves at all. Residuals recomputed from the problem decide; refusals, wrong "
+    "answers and problems left out for time count as unsolved. Times are of the solve alone, after a warm-up: the "
+    "compiled solve of Siconos, a call from Python of the others. At most six curves; the numbers have all solvers.",
 )  # fmt: skip
 def performance_profile(numbers: Table) -> Drawn:
     """Draw a panel for each collection and kind of problem; the solvers of the two kinds are numbered apart."""
@@ -303,9 +303,9 @@ _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over ti
 @recipe(
     "rigid-convergence", "The rigid world converges to event-driven truth", "complementarity/convergence",
     section="complementarity",
-    caption="The largest error of three steps near each mark, before impacts accumulate. Parallel to the dashed line: "
-    "errors in proportion to the step, which is all that a scheme can do that does not locate impacts. The six scenes "
-    "with the largest errors are drawn; the numbers have all.",
+    caption="Each mark is the largest error of three time steps near it, before impacts accumulate. Curves parallel to "
+    "the dashed line have errors proportional to the step, the best order of a scheme that does not locate impacts. "
+    "The six scenes with the largest errors are drawn; the numbers have all.",
 )  # fmt: skip
 def rigid_convergence(numbers: Table) -> Drawn:
     """Draw positions and velocities."""

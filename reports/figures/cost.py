@@ -168,11 +168,11 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
 
 @recipe(
     "impact-accuracy", "What a microsecond buys", "work_precision", section="accuracy",
-    caption="Lower left is better. Each mark is the median of nine hard impacts of that size, the thin line above it "
-    "reaches to the largest error; a curve joins what stopping early buys (IAPB after 1, 2, 4 ... rows, Gauss-Seidel "
-    "after 1, 4, 16 ... sweeps). Filled: compiled; empty: called from Python. The grey steps join what no other method "
-    "beats in both. A red ring: it made energy in some of the nine; a cross at the rim: it failed on some, or took "
-    "more than 10 ms.",
+    caption="Lower left is better. Each mark is the median of nine hard impacts of that size; the thin line above it "
+    "reaches to the largest error. A curve joins the results of one method stopped early (IAPB after 1, 2, 4 ... rows, "
+    "Gauss-Seidel after 1, 4, 16 ... sweeps). Filled marks: compiled; empty marks: called from Python. The grey steps "
+    "join the marks that no other method beats in both time and error. A red ring: the method created energy in some "
+    "of the nine. A cross at the rim: it failed on some or took more than 10 ms.",
 )  # fmt: skip
 def impact_accuracy(numbers: Table) -> Drawn:
     """A panel per size."""
@@ -220,9 +220,9 @@ _TOLERANCES = (1e-3, 1e-6, 1e-9)
 
 @recipe(
     "budget-share", "How many hard impacts a budget solves", "work_precision", section="accuracy",
-    caption="Higher and further left is better: of the 54 hard impacts of all sizes, the share that a method has "
-    "solved to the given error, without making energy, when the budget is over. A curve that ends below 100 % fails on "
-    "the rest whatever the time: it stays too inexact, makes energy, finds no solution or needs more than 10 ms.",
+    caption="Share of the 54 hard impacts of all sizes that a method solves to the given error within the time budget, "
+    "without creating energy; higher and further left is better. A curve that ends below 100 % never solves the rest: "
+    "the method stays too inexact, creates energy, finds no solution or needs more than 10 ms.",
 )  # fmt: skip
 def budget_share(numbers: Table) -> Drawn:
     """A panel per tolerance."""
@@ -402,9 +402,9 @@ def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float 
 
 @recipe(
     "anytime", "What each row of the budget buys", "haptic-rate/budgets", section="accuracy",
-    caption="Plastic impacts stopped after so many rows, the largest unmet one first. What is not yet resolved falls "
-    "with every row, and at the rank to rounding; the energy taken never exceeds what the whole impact takes, so no "
-    "budget is unsafe.",
+    caption="Plastic impacts that stop after a budget of rows, which are taken in order of the largest residual. The "
+    "residual falls with every row, and to rounding at the rank. The energy taken never exceeds that of the complete "
+    "impact, so every budget is passive.",
 )  # fmt: skip
 def anytime(numbers: Table) -> Drawn:
     """Residual and energy."""
@@ -435,9 +435,10 @@ _FORMS = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
 
 @recipe(
     "impact-scaling", "How one impact's time grows", "haptic-rate/scaling", "haptic-rate/fitted", section="haptic-rate",
-    caption="Medians with quartiles; lines are fitted powers. At each curve stands the exponent of the fit, and where "
-    "the curve is steepest, which the fit hides. Every contact adds a row to the factored impact but no more work per "
-    "row than the rank asks for; the pseudo-inverse of the printed formula is of a matrix of all contacts.",
+    caption="Medians with quartiles; lines are fitted powers. Each curve is labelled with the exponent of its fit, and "
+    "with the range in which it is steepest, which the fit hides. Each contact adds one row to the factored impact, "
+    "and the work per row depends only on the rank. The printed formula forms the pseudo-inverse of a matrix of all "
+    "contacts.",
 )  # fmt: skip
 def impact_scaling(numbers: Table, fitted: Table) -> Drawn:
     """Two panels."""
@@ -488,11 +489,11 @@ def effect_steps(numbers: Table, machine: str) -> Drawn:
         axes.set_yticks(places, [row["scene"].replace("_", " ") for row in rows])
     told = "; ".join(f"{row['scene']} {row['step']:.2g} µs, with all on {row['all on']:.2g} µs" for row in rows[::-1])
     return Drawn((Panel(plot.svg, told, wide=True),), numbers, caption=(
-        "Bar: a recorded step of the scene in the world IAPB, with the effects that it calls for. Red mark: the same "
-        "with every switch of the step on; the effects added find nothing to do. The way from bar to mark is what a "
-        "scene saves by what it does not ask for. Right: how much less the step takes without one effect, the three "
-        "largest (the numbers have all); below the noise of nine rounds none is given. Shares need not add up: without "
-        f"its hand force, say, a tool touches nothing. The time of a step is measured here alone: {machine}."))
+        "Bar: time of a recorded step of the scene in the world IAPB, with the effects that it needs. Red mark: the "
+        "same with every effect switched on; the added effects change nothing. The distance from bar to mark is the "
+        "time saved by leaving out unneeded effects. Right: the share of the step that leaving out one effect saves, "
+        "for the three largest above the noise of nine rounds (the numbers have all). Shares need not add up: for "
+        f"example, a tool without hand force touches nothing. Only this page measures the time of a step: {machine}."))
 
 
 _NOTHING = 1e-4  # [mm] where an error of zero is drawn
@@ -500,9 +501,10 @@ _NOTHING = 1e-4  # [mm] where an error of zero is drawn
 
 @recipe(
     "effect-costs", "What leaving an effect out saves, and what it breaks", "effect_costs", section="effects",
-    caption="Each mark is one effect left out of a scene that calls for it: to the right it saves time, upwards it "
-    "takes the tool away from where it should be. Filled marks, joined: no other effect saves more for less error. "
-    "Marks on the lowest line change nothing on this run; those at 0 % save less than the noise of the clock.",
+    caption="Each mark is one effect left out of a scene that needs it: further right saves more time, further up "
+    "means a larger error in the position of the tool. Filled, joined marks: no other effect saves more time for a "
+    "smaller error. Marks on the lowest line change nothing in this run; marks at 0 % save less than the noise of the "
+    "clock.",
 )  # fmt: skip
 def effect_costs(numbers: Table) -> Drawn:
     """A panel per scene."""

@@ -46,9 +46,9 @@ RACE_COLUMNS = (
     Column("it moved", timed=True),
 )
 RACE_NOTE = (
-    "Frictionless (condim 1), same masses, forces and step; MuJoCo's other options are its defaults. Ours is recorded, "
-    "MuJoCo's is not. Ratios and their quartiles are of rounds. Contacts are means over the steps that were timed. "
-    "Moved: largest change of a coordinate while timed, m or rad."
+    "Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. The "
+    "engine's steps are recorded, MuJoCo's are not. Ratios are computed for each round of timing; median and quartiles "
+    "are given. Contacts are means over the timed steps. Moved: largest change of a coordinate while timed, m or rad."
 )
 
 

@@ -190,7 +190,7 @@ def summary(effects: Mapping[str, Table]) -> Table:
         rows += [(scene, row["effect"], row["time saved"], row["position"], "yes" if row["effect"] in front else "no")
                  for row in measured]  # fmt: skip
     return Table(columns, tuple(rows), digits=3,
-                 note="Best of its error: no other effect saves more time at the cost of no larger error. "
+                 note="Best of its error: no other effect saves more time without a larger error. "
                       f"A time saved of 0: {_BELOW}.")  # fmt: skip
 
 
@@ -208,8 +208,8 @@ def steps(effects: Mapping[str, Table]) -> Table:
         times = (on[0][key] for key in ("step", "all on", "faster than real time"))
         rows.append((scene, len(on), *times, told or f"each {_BELOW}"))
     return Table(columns, tuple(sorted(rows, key=lambda row: row[2])), digits=3,
-                 note=f"Medians of {ROUNDS} rounds. A share is what the step takes less without the effect; those "
-                      f"that are not named are {_BELOW}, or cannot be left out. Shares need not add up.")
+                 note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect. Effects "
+                      f"that are not named are {_BELOW} or cannot be left out. Shares need not add up.")
 
 
 def _beats(other: Row, row: Row) -> bool:

@@ -113,8 +113,8 @@ def work_precision(
             slow |= {(row["method"], row["work"]) for row in found if row["outcome"] == TOO_SLOW}
             if progress is not None:
                 progress(done, len(chosen) * len(problems))
-    note = ("Medians in random order, a warm call before each, processor time of the thread; errors against exact "
-            "rational arithmetic, in the kinetic metric. A negative gain is a loss and counts as none.")
+    note = ("Median CPU times of the thread; methods run in random order, with a warm-up call before each. Errors are "
+            "relative to exact rational arithmetic, in the kinetic metric. A loss of energy counts as a gain of zero.")
     return table_of(METHOD_COLUMNS, records, digits=3, note=note, timed_rows=True)
 
 
@@ -380,7 +380,8 @@ def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 25) -> Tab
                         "then after": slowest, "spread": 100.0 * (medians[slowest] / medians[fastest] - 1.0)})
     columns = (Column("method", condition=True), Column("least", "µs", timed=True), Column("after", timed=True),
                Column("most", "µs", timed=True), Column("then after", timed=True), Column("spread", "%", timed=True))
-    note = f"Medians of {rounds} rounds, each over its middle, {contacts} contacts, {coordinates} coordinates."
+    note = (f"{contacts} contacts, {coordinates} coordinates; median of {rounds} rounds, relative to the median of "
+            "each round. Least and most: the methods timed just before.")  # fmt: skip
     return table_of(columns, records, digits=3, note=note)
 
 

@@ -127,8 +127,8 @@ def impact_cost(
                 rows += attempt(f"{case.family} of {count} contacts", timing, failures) or []
         if progress is not None:
             progress("time per impact", done + 1, len(contacts))
-    return table_of(COST_COLUMNS, rows, digits=3, note="From M, J, v to v⁺, one thread, in turns. Kernels are called "
-                    "from compiled code, all others from Python, their checks included.")  # fmt: skip
+    return table_of(COST_COLUMNS, rows, digits=3, note="Time from M, J and v to v⁺ on one thread; methods are timed in "
+                    "turns. Kernels are called from compiled code, all others from Python, checks included.")
 
 
 def _time_case(

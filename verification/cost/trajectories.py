@@ -123,8 +123,8 @@ COLUMNS = (
     Column("note", timed=True),
 )
 NOTE = (
-    "Position in lengths of the body (sup norm), velocity in largest speeds (L¹, at samples a millisecond apart), "
-    "energies in largest kinetic energies."
+    "Errors: position in the sup norm, relative to the body's length; velocity in L¹ over samples a millisecond apart, "
+    "relative to the largest speed; energies relative to the largest kinetic energy."
 )
 BELOW = "below the truth's bound"
 Record = dict[str, Any]

@@ -109,7 +109,7 @@ def _found(tables: Tables) -> Finding:
 def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
     found = _found(tables)
     assert {part.verdict for part in found.parts} == {found.verdict} == {REPRODUCED}
-    assert "0.05 times MuJoCo's as box (8 contacts" in found.parts[0].sentence
+    assert "0.05 times MuJoCo's time with box (8 contacts" in found.parts[0].sentence
     assert "600 at d = 3 (60 by the printed formula)" in found.parts[5].sentence
     assert found.timed and not found.parts[-2].timed
 
@@ -120,9 +120,9 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({"steps against MuJoCo": _races(0.4)}, "contacts found 60 %"),
         ({"scaling": _times(5.0)}, "5 times as long"),
         ({"solvers": _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
-        ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "iapb --help takes 0.90 s"),
+        ({"start": Table(START_COLUMNS, (("iapb --help", 0.9, 0.8, 1, 0.5),))}, "takes 0.90 s of wall time"),
         ({"bodies": _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2.00"),
-        ({"bodies": _bodies(20, 200, step=float, tested=lambda n: n * n)}, "pairs tested"),
+        ({"bodies": _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
         ({"order bias": titled(("method", "spread"), [("IAPB", 14.0)])}, "at most 14 % (IAPB)"),
         ({"budgets": table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
     ],
@@ -130,7 +130,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
 def test_a_miss_is_called_one(tables: Tables, change: Tables, words: str) -> None:
     missed = [part for part in _found(tables | change).parts if part.verdict == MIXED]
     assert len(missed) == 1 and words in missed[0].sentence
-    assert missed[0].miss or "any number of rows" in missed[0].sentence  # the first page has a clause on it
+    assert missed[0].miss or "a budget of rows" in missed[0].sentence  # the first page has a clause on it
 
 
 def test_an_absent_engine_is_named(tables: Tables) -> None:
