@@ -476,17 +476,19 @@ def effect_steps(numbers: Table, machine: str) -> Drawn:
     """A bar per scene, a mark where every switch is on, and the shares in words."""
     rows = numbers.records()[::-1]
     places, longest = range(len(rows)), max(row["all on"] for row in rows)
-    with Plot("effect-steps", (6.8, 0.3 * len(rows) + 0.6)) as plot:
+    with Plot("effect-steps", (6.8, 0.3 * len(rows) + 0.8)) as plot:
         axes = plot.axes
         axes.barh(places, [row["step"] for row in rows], height=0.5, color=BLUE, alpha=0.45)
         axes.plot([row["all on"] for row in rows], places, "|", color=FORCE, markersize=11, markeredgewidth=2)
         for place, row in zip(places, rows, strict=True):
             largest = ", ".join(row["shares of the step"].split(", ")[:3])
             axes.text(1.8 * longest, place, largest, va="center", fontsize=7.0, color=MUTED).set_in_layout(False)
-        plot.log("time of a step [µs]", "", "x", xlim=(0.1, 4e4 * longest), ylim=(-0.6, len(rows) - 0.4))
+        axes.text(1.8 * longest, len(rows) - 0.3, "share of the step that an effect takes", va="bottom", fontsize=7.5,
+                  color=INK).set_in_layout(False)
+        plot.log("time of a step [µs]", "", "x", xlim=(0.1, 1.5e5 * longest), ylim=(-0.6, len(rows) + 0.2))
         axes.grid(visible=False)
         axes.set_xticks([10.0**k for k in range(-1, int(np.log10(longest)) + 1)])
-        axes.set_yticks(places, [row["scene"].replace("_", " ") for row in rows])
+        axes.set_yticks(places, [f"{row['scene'].replace('_', ' ')}: {row['step']:.2g} µs" for row in rows])
     told = "; ".join(f"{row['scene']} {row['step']:.2g} µs, with all on {row['all on']:.2g} µs" for row in rows[::-1])
     return Drawn((Panel(plot.svg, told, wide=True),), numbers, caption=(
         "Bar: time of a recorded step of the scene in the world IAPB, with the effects that it needs. Red mark: the "

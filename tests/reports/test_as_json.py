@@ -93,7 +93,7 @@ def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
 
 
 def test_bench_and_figures(answer, tmp_path, monkeypatch):
-    choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0)
+    choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
     monkeypatch.setattr("reports.commands.bench.which_method", lambda *_: (choice,))
     status, found = answer("bench", "--budget", "50us")
     assert status == 0 and found["choices"][0]["method"] == "factored"
