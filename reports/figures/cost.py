@@ -54,13 +54,13 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
 
 @recipe(
     "which-method", "Which method for my budget?", "work_precision", section="accuracy",
-    caption="Find the row of your impact and the column of your time. A cell names the compiled method that solves all "
-    "of nine hard impacts of that size in time and without a gain of energy, or most of them, and below it its largest "
-    "error relative to |v⁻|. Its colour is the method's, as in the pictures below: strong for an error below 1e-9, "
-    "pale for one up to 1e-3. “none”: nothing solves half of the nine to 1e-3 in this time; “nearest” is the largest "
-    "error of what at least ends in time without making energy. The numbers name that method, and those to call from "
-    "Python. The nine: M of condition 1, 1e3 and 1e6, rows apart by 1, 1e-3 and 1e-6 of themselves, e = 0, 1/2 and 1; "
-    "d is the number of coordinates.",
+    caption="Find the row of your impact and the column of your time budget. A cell names the compiled method that "
+    "solves all or most of nine hard impacts of that size in time and without a gain of energy; below the name is its "
+    "largest error relative to |v⁻|. The colour is that of the method in the pictures below: strong for an error below "
+    "1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” is then "
+    "the largest error of the best method that ends in time without creating energy. The numbers name that method, "
+    "and the best methods called from Python. The nine impacts: condition number of M 1, 1e3 and 1e6; relative "
+    "distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
     """A cell per size and budget."""
@@ -104,10 +104,10 @@ def power_of_error(value: float) -> str:
 
 
 _WHY = (
-    "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is made. With one "
-    "or two contacts that fixed work is most of the time. On a pile no row can be dropped, so that it is done for "
-    "every contact, where Lemke's method needs one pivot for each. On a patch all rows but three are dropped, and IAPB "
-    "wins."
+    "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is created. With "
+    "one or two contacts this fixed work takes most of the time. In a pile no row is redundant, so IAPB does this work "
+    "for every contact, while Lemke's method needs one pivot for each. On a patch all rows but three are redundant, "
+    "and IAPB is faster."
 )
 
 
@@ -120,7 +120,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     looks = looks_of(dict.fromkeys(kernels.column("problem")))
-    said = "Both compiled, timed in turns (claim C22). Below the line at 1 IAPB is the slower. "
+    said = "Both methods are compiled and timed in turns (claim C22). Below the line at 1 IAPB is slower. "
     with Plot("where-iapb-loses", (5.2, 2.7)) as plot:
         plot.axes.axhline(1.0, color=INK, linewidth=0.9)
         plot.axes.axhspan(1e-2, 1.0, color=FORCE, alpha=0.07, linewidth=0)
@@ -146,12 +146,12 @@ def _lost_on(name: str, kernels: Table) -> str:
     """Where IAPB clearly costs more on one family of impacts, and how much at worst."""
     slower = [row for row in kernels.records() if holds(row) is False]
     faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
-    won = f"at best Lemke takes {faster['ratio']:.3g} times as long ({faster['contacts']} contacts). "
+    won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({faster['contacts']} contacts). "
     if not slower:
-        return f"On {name} IAPB loses nowhere clearly; {won}"
+        return f"On {name} IAPB is clearly slower at no size; {won}"
     worst, sizes = min(slower, key=lambda row: float(row["ratio"])), [row["contacts"] for row in slower]
-    return (f"On {name} IAPB loses at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} "
-            f"contacts: at worst it takes {1 / worst['ratio']:.2g} times as long as Lemke ({worst['contacts']} "
+    return (f"On {name} IAPB is slower at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} "
+            f"contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke ({worst['contacts']} "
             f"contacts); {won}")  # fmt: skip
 
 
@@ -161,8 +161,8 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
         here = lost.where(contacts=c).records()
         best = max(here, key=lambda row: float(row["ratio"]))
         cases = len({row["problem"] for row in here})
-        said += (f"Of the nine hard impacts with {c} contact{'s' * (c > 1)} IAPB loses on {cases}, at worst to "
-                 f"{best['solver']}, by {best['ratio']:.2g} times. ")
+        said += (f"On {cases} of the nine hard impacts with {c} contact{'s' * (c > 1)} another solver is faster at the "
+                 f"same accuracy: {best['solver']} by up to {best['ratio']:.2g} times. ")
     return said or "On the hard impacts above no compiled solver is as exact as IAPB in less time. "
 
 
@@ -262,14 +262,14 @@ _NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4")
 _INTEGRATORS = {method: STYLES[name] for method, name in zip(INTEGRATORS, _NAMES, strict=True)}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
 _READ = (
-    "Lower left is better. Each mark is a run with one step; finer steps are further right. The number at a curve is "
-    "what ten times the accuracy costs on that scene, in times the computing time: a power fitted to exactly the "
-    f"filled marks (thick straight line). Hollow marks are left out of it: there a finer step divides the error by "
-    f"less than {GAINED:g}. “Then level” or “stays at”: no step mends this error; the model of contact decides it. "
-    "“Too few runs”: finer steps took longer than allowed. The grey steps join the runs that nothing beats in both "
-    "time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at the lower rim: "
-    "the error is below what the exact motion itself is known to (about 1e-10), because the step meets the instant of "
-    "impact by chance; it is left out too. "
+    "Lower left is better. Each mark is a run with one time step; finer steps are further right. The number at a curve "
+    "is the factor by which the computing time grows for ten times the accuracy on that scene: a power fitted to the "
+    "filled marks (thick straight line). Hollow marks are not fitted, because there a finer step divides the error by "
+    f"less than {GAINED:g}. “Then level” or “stays at”: no shorter step reduces this error, which comes from the "
+    "contact model. “Too few runs”: finer steps took longer than allowed. The grey steps join the runs that no other "
+    "run beats in both time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at "
+    "the lower rim: the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end "
+    "at the instant of impact; it is not fitted either. "
 )
 
 
@@ -277,9 +277,9 @@ _READ = (
     "trajectory-precision", "What accuracy of a whole motion costs, by world", "haptic-rate/motions",
     section="accuracy",
     caption=_READ + "Worlds: IAPB and PB by semi-implicit Euler, compiled; ideal: rigid contacts by a QP per step, "
-    "from Python. CBuc is not drawn: it differs from ideal by its coupling to a device, and no device moves here, so "
-    "its motion is that of ideal. Energy made: the most by which kinetic and potential energy exceed those at the "
-    "start, of the largest kinetic energy.",
+    "from Python. CBuc is not drawn: it differs from ideal only in its coupling to a device, and these scenes have no "
+    "device. Energy made: the largest excess of kinetic plus potential energy over its value at the start, relative to "
+    "the largest kinetic energy.",
 )  # fmt: skip
 def trajectory_precision(motions: Table) -> Drawn:
     """The worlds: a table in words, and a panel per scene."""
@@ -289,9 +289,9 @@ def trajectory_precision(motions: Table) -> Drawn:
 @recipe(
     "integrator-precision", "What a better integrator buys in a whole motion", "haptic-rate/motions",
     section="accuracy",
-    caption="The same runs for each integrator of IAPB and PB, with a front of their own. An integrator of higher "
-    "order is as exact only between impacts: the step in which an impact falls decides, so that Runge-Kutta 4 costs "
-    "four evaluations and gains little. Marks and numbers as above.",
+    caption="The same runs for each integrator of IAPB and PB, with grey steps of their own. An integrator of higher "
+    "order is more exact only between impacts. The step that contains an impact dominates the error, so Runge-Kutta 4 "
+    "needs four evaluations and gains little. Marks and numbers as above.",
 )  # fmt: skip
 def integrator_precision(motions: Table) -> Drawn:
     """The integrators, in the same way."""

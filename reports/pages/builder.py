@@ -130,9 +130,9 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     counts = [f"{shown.holds.count(True)} of {len(shown.rows) - shown.holds.count(None)} in {coordinate}"
               for coordinate in COORDINATES for shown in [grid.where(coordinate=coordinate)]]
     caption = (
-        "Each mark is one start of the peg, simulated in four worlds: a dot where IAPB follows the ideal hand closest, "
-        f"a cross where PB or CBuc does. IAPB is the closest in {', '.join(counts)}. It wins where the peg starts "
-        "nearly flat. The picture above starts at a tilt of 0.015 rad, at the edge of that region."
+        "Each mark is one start of the peg, simulated in four worlds. A dot: the hand in IAPB is closest to that in "
+        f"the ideal world. A cross: PB or CBuc is closer. IAPB is closest in {', '.join(counts)}, mostly at small "
+        "tilts. The picture above starts at a tilt of 0.015 rad, the largest of that region."
     )
     return _map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "coordinate", ranked=True)
 

@@ -16,10 +16,10 @@ from verification.claims.c11_forces import LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 
 ERRATA = (
-    "The energy lost, (18) and (24), lacks a factor ½. The inverse in (37) is not the pseudo-inverse. Impulses by (13) "
-    "and (14) do not keep momentum. The printed formula can gain energy by rounding."
+    "The energy loss in (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. Impulses by (13) "
+    "and (14) do not conserve momentum. The printed formula can gain energy by rounding."
 )
-LIMIT = "Springs and time steps are not exact: see what we miss."
+LIMIT = "This does not hold for springs and time stepping: see what we miss."
 MISSES_SHOWN = 5
 # Topics whose misses come first: what gains energy or moves wrongly, then what differs, then what is slow.
 GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
@@ -65,8 +65,8 @@ def _forces(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     rows = [row for row in table.where(part=LARGE).records() if row["coordinate"] != "theta" and row["PB"]]
     if rows:
         ratio = median(row["IAPB"] / row["PB"] for row in rows)
-        yield ratio > 1.0, (f"At a new contact, impulses push the hand {ratio:.2g} times as hard as springs alone do "
-                            f"(median of {len(rows)} cases).")  # fmt: skip
+        yield ratio > 1.0, (f"At a new contact, the force on the hand is {ratio:.2g} times as large with impulses as "
+                            f"with springs alone (median of {len(rows)} cases).")  # fmt: skip
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
@@ -75,13 +75,13 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     tilts = [bound for part in claim.parts if part.region and not part.name.startswith("theta")
              for name, _, _, bound in part.region.bounds if name == "tilt" and bound is not None]  # fmt: skip
     if tilts:
-        yield True, (f"The path of the hand then comes closest to that at a rigid wall, if the peg starts nearly flat: "
-                     f"up to {degrees(min(tilts)):.1f}° of tilt.")  # fmt: skip
-        yield False, "Beyond that tilt, springs alone often come as close or closer."
+        yield True, ("With impulses, the path of the hand is closer to that at a rigid wall than with springs alone or "
+                     f"CBuc, if the peg starts with a tilt of at most {degrees(min(tilts)):.1f}°.")  # fmt: skip
+        yield False, "For larger tilts, the path with springs alone is often as close or closer."
     elif claim.parts:
-        yield False, "In no range of starts was the path of the hand found to be the closest to that at a rigid wall."
+        yield False, "In no range of starts is the path of the hand with impulses the closest to that at a rigid wall."
     if any(part.verdict == REFUTED and part.name.startswith("theta") for part in claim.parts):
-        yield False, "In rotation, impulses usually do not come closest."
+        yield False, "In rotation, the path with impulses is usually not the closest."
 
 
 def facts(evidence: Evidence) -> tuple[Fact, ...]:
