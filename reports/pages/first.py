@@ -117,7 +117,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     """The gravest misses, a line each; the others stand with their topics, further down the page."""
     answered = [topic for topic in topics if topic.answer]
     missed = sorted((topic for topic in answered if topic.verdict in (MIXED, REFUTED)), key=_gravity)
-    lines = [(_capital(topic.miss) or f"{topic.title}: {topic.verdict}", topic.key) for topic in missed]
+    lines = [(_line(topic), topic.key) for topic in missed]
     rest = len(lines) - MISSES_SHOWN
     shown = (*lines[:MISSES_SHOWN], *([(f"and {rest} more", "asked")] if rest > 0 else ()))
     lacking = [topic.title for topic in answered if topic.verdict == NOT_COMPUTED]
@@ -130,5 +130,8 @@ def _gravity(topic: Finding) -> int:
     return GRAVEST.index(topic.key) if topic.key in GRAVEST else len(GRAVEST)
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+def _line(topic: Finding) -> str:
+    """The first miss of a topic, and how many more it has; its verdict where no part says what it misses."""
+    clauses = [part.miss for part in topic.parts if part.miss] or [f"{topic.title}: {topic.verdict}"]
+    more = f", and {len(clauses) - 1} more" if len(clauses) > 1 else ""
+    return clauses[0][:1].upper() + clauses[0][1:] + more

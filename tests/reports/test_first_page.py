@@ -75,3 +75,6 @@ def test_the_gravest_misses_come_first_and_the_rest_are_counted() -> None:
     assert fact.items[:3] == (("Miss of hard-cases", "hard-cases"), ("Title of engines: mixed", "engines"),
                               ("Miss of scene-ledger", "scene-ledger"))  # fmt: skip
     assert fact.items[-1] == ("and 2 more", "asked") and fact.text == ""
+    slow = finding_of("haptic-rate", "t", "", "a", [Part("p.", MIXED, miss=f"{n} is slow") for n in "abc"])
+    (fact,) = facts(Evidence(topics=(slow,)))[-1:]
+    assert fact.items == (("A is slow, and 2 more", "haptic-rate"),)  # a line each, however much a topic misses

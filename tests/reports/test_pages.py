@@ -300,7 +300,7 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     table = table_of([Column(key) for key in piles[0]], piles)
     topic = finding_of("complementarity", "Piles", "", "No.", (Part("n.", REFUTED),), {"piles": table})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
-    assert "IAPB is the closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "where more than 14 contacts collide at once" in page and "with complementarity to 3e-04" in page
+    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
+    assert "where more than 14 contacts collide at once" in page and f"with complementarity to {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
