@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.compiled import block, columns, copy_into, kernel
+from iapb.compiled import address_of, block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.distrust import distrust_of
 from iapb.effects import Effect
@@ -105,7 +105,7 @@ class Room:
         self.lines = _lines(steps, *self._sizes, np.empty)
         self._arrays = [self.counts, *chain(*self.lines.values())]
         self._table = [0] * (1 + len(STATES + STEPS)) + [1] * len(CONTACTS) + [2] * len(IMPACTS)
-        self._places = np.array([array.__array_interface__["data"][0] for array in self._arrays])
+        self._places = np.array([address_of(array) for array in self._arrays])
         self._strides = np.array([array.strides[0] for array in self._arrays])
         self.chunks = 0
         self.used = [0, 0, 0]  # steps, contacts and impacts that are kept
@@ -121,7 +121,7 @@ class Room:
         used, sizes = np.zeros(2, np.int64), (steps, steps * contacts, steps * trees)
         arrays = [array[self.used[t] : self.used[t] + sizes[t]]
                   for array, t in zip(self._arrays, self._table, strict=True)]
-        places = np.array([used.__array_interface__["data"][0], *self._places])
+        places = np.array([address_of(used), *self._places])
         places[1:] += self._strides * np.array(self.used)[self._table]
         self._open = _first_record(steps, coordinates, contacts, trees).on([used, *arrays], places)
         made: Record = self._open

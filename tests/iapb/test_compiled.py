@@ -18,7 +18,7 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
-from iapb.compiled import Block, block, copy_into, kernel
+from iapb.compiled import Block, address_of, block, copy_into, kernel
 
 ENGINE = Path(iapb.run.__file__).parent
 
@@ -286,3 +286,11 @@ def test_a_block_on_other_arrays_writes_into_them_alone() -> None:
     assert matrix[3, 2] == 12.0 and (matrix == 5.0).sum() == 11 and nothing.shape == (2, 4)
     assert moved.inner.values is moved.arrays()[2] and np.shares_memory(moved.inner.values, values)
     assert first.matrix[1, 2] == 1.0 and first.inner.values.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_the_address_of_an_array_is_that_of_its_first_entry() -> None:
+    whole = np.arange(12.0).reshape(3, 4)
+    fixed = whole.copy()
+    fixed.setflags(write=False)
+    for array in (whole, whole[1:], whole[:, 1:], whole.T, fixed, np.zeros((0, 3)), np.zeros((2, 0)), np.ones(3, bool)):
+        assert address_of(array) == array.__array_interface__["data"][0]
