@@ -54,7 +54,7 @@ class ImpulseAugmentedEngine:
 class RigidWorld:
     """Rigid contacts at velocity level: one QP per step."""
 
-    title = "rigid world (ours)"
+    title = "ideal world (ours)"
 
     def version(self) -> str:
         """Our own."""

@@ -301,7 +301,7 @@ _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over ti
 
 
 @recipe(
-    "rigid-convergence", "The rigid world converges to event-driven truth", "complementarity/convergence",
+    "rigid-convergence", "The ideal world converges to the event-driven solution", "complementarity/convergence",
     section="complementarity",
     caption="Each mark is the largest error of three time steps near it, before impacts accumulate. Curves parallel to "
     "the dashed line have errors proportional to the step, the best order of a scheme that does not locate impacts. "

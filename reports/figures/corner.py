@@ -331,7 +331,7 @@ def hero(*given: Run) -> Drawn:
     ends = ", ".join(f"{name} {distance:.2f} mm" for name, distance in apart.items())
     panels = (
         Panel(_motion(runs["ideal"]), "A tilted peg moves to the lower right and comes to rest in a corner.",
-              "the motion in the rigid world, to scale"),
+              "the motion in the ideal world, to scale"),
         Panel(_paths(runs), "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
               f"{ends}.", "the path of the hand, magnified, equal scales"),
     )  # fmt: skip
