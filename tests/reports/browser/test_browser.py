@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,13 @@ import pytest
 PHONE = (400, 800)
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[3] / "out" / "report.html"
+MOST_PRINTED = 6  # pages of paper for the first page
+ANSWERED = ("✓ Holds.", "✕ Fails.", "Is it safe?", "What we miss", "Test your own")  # within two screens of a phone
+BELOW = """([texts, depth]) => texts.filter((text) => {
+    const found = [...document.querySelectorAll(".first .answer, .first dt, .first .ways a")]
+        .find((part) => part.textContent.replace(/\\s+/g, " ").startsWith(text));
+    return !found || found.getBoundingClientRect().bottom + scrollY > depth;
+})"""
 
 # What a page must be at any width; each returns what is wrong.
 DEAD_ANCHORS = """() => [...document.querySelectorAll("a[href^='#']")].map((a) => a.getAttribute("href").slice(1))
@@ -185,3 +193,13 @@ def test_the_report_that_is_here(see: Callable[..., Any], width: int) -> None:
         for path in pages_of(REAL):
             sight.page.goto(path.as_uri())
             check_page(sight)
+
+
+@pytest.mark.skipif(not REAL.is_file(), reason="no out/report.html here; `make reproduce` makes one")
+@pytest.mark.parametrize(("size", "screens"), [((1400, 900), 1), ((400, 860), 2)])
+def test_the_first_screens_answer_and_the_print_is_short(
+    see: Callable[..., Any], size: tuple[int, int], screens: int
+) -> None:
+    with see(REAL, size) as sight:
+        assert sight.page.evaluate(BELOW, [ANSWERED, screens * size[1]]) == []
+        assert len(re.findall(rb"/Type\s*/Page[^s]", sight.page.pdf(format="A4"))) <= MOST_PRINTED
