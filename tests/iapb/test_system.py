@@ -12,7 +12,7 @@ from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.scene import find_scene, load_scene, scene_names
-from iapb.system import System, coupling_of
+from iapb.system import System, coupling_of, parts_of
 
 PEG = load_scene(find_scene("peg_corner"))
 ARM = load_scene(find_scene("arm_pushing"))
@@ -165,3 +165,10 @@ def test_pairs_that_are_left_out_of_a_system_are_left_out_of_its_world_alone():
         assert looked_at == ([len(world.pairs) for world in worlds] if used else [0, 0, 0])
         centers = [world.broad_phase.center for world in worlds]
         assert not used or not any(np.shares_memory(*two) for two in itertools.combinations(centers, 2))
+
+
+def test_scenes_with_and_without_self_collisions_share_no_pairs() -> None:
+    scene = load_scene(find_scene("arm_obstacles"))
+    assert scene.contact.self_collisions
+    pairs = [len(parts_of(each).pairs) for each in (scene, scene.with_values({"contact.self_collisions": False}))]
+    assert pairs[0] > pairs[1]
