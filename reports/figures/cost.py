@@ -414,7 +414,7 @@ def anytime(numbers: Table) -> Drawn:
         sizes.setdefault(name, []).append(row)
     panels = (
         Panel(_budgets(sizes, "median residual", "log"), "Residual against the share of rows done.", "median residual"),
-        Panel(_budgets(sizes, "share of the loss", "linear"), "Energy lost in the impact against the share of rows done.",
+        Panel(_budgets(sizes, "share of the loss", "linear"), "Energy lost against the share of rows done.",
               "energy lost, over the loss of the complete impact"),
     )  # fmt: skip
     return Drawn(panels, numbers, tuple(looks_of(sizes).items()))

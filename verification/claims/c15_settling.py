@@ -74,8 +74,8 @@ CLAIM = peg_claim(
     place="Section VII, Fig. 12 and 13 (an experiment there; an emulated device here)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s.",
-    tolerance="Strictly fewer bounces, and strictly sooner; a tie does not count. A separate part tests "
-    "whether IAPB bounces at most as often. A trial decides nothing where the peg bounces, or settles, in neither world.",
+    tolerance="Strictly fewer bounces, and strictly sooner; a tie does not count. A separate part tests whether "
+    "IAPB bounces at most as often. A trial decides nothing where the peg bounces, or settles, in neither world.",
     columns=COLUMNS,
     trials=trials,
     holds=holds,
