@@ -1,6 +1,6 @@
 """The claims ledger: each claim of the paper as a computation with a verdict over a range of conditions.
 
-One file per claim. `check_claims` runs them; `CLAIMS` has them by id.
+Each claim has its own file. `check_claims` checks the claims; `CLAIMS` maps each id to its claim.
 """
 
 from __future__ import annotations
@@ -54,16 +54,16 @@ def check_claims(
     asked: Asked | None = None,
     ahead: Ahead | None = None,
 ) -> tuple[Finding, ...]:
-    """Check the paper's claims and return one finding each; what raises is among the failures of its claim.
+    """Check the paper's claims and return one finding each; exceptions are recorded as failures of their claim.
 
     Parameters
     ----------
-    run : (scene, world, rendering) -> Run, called once per different simulation
+    run : (scene, world, rendering) -> Run; called once for each distinct simulation
     depth : "quick" (about a minute) or "full"
     ids : the claims to check; default all
-    progress : called as progress(claims done, claims in all, id of the next)
-    asked : called as asked(scene, world, rendering) whenever a claim uses a run, also one made for an earlier claim
-    ahead : makes many runs at once, where there are cores for it (see `Study`)
+    progress : called as progress(number of claims done, number of claims, id of the next claim)
+    asked : called as asked(scene, world, rendering) whenever a claim uses a run, even if an earlier claim made that run
+    ahead : makes many runs at once on several cores (see `Study`)
 
     Raises
     ------

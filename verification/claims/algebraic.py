@@ -1,4 +1,4 @@
-"""What the algebraic claims share: batches of random impacts, an error and a bound per batch."""
+"""Parts shared by the algebraic claims: each trial compares the error of a batch of random impacts with a bound."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLUMNS = (
 
 
 class Batch(NamedTuple):
-    """Random impacts of one family at one restitution, and the seed they were drawn with."""
+    """Random impacts of one family at one restitution, and the seed with which they were drawn."""
 
     impacts: list[ImpactCase]
     family: Family
@@ -40,14 +40,14 @@ class Batch(NamedTuple):
 
 
 class Measure(NamedTuple):
-    """One part of an algebraic claim: the worst error of a batch, and the largest that it allows."""
+    """One part of an algebraic claim: the largest error of a batch, and the largest error allowed."""
 
     error: Callable[[Batch], float]
     bound: Callable[[Batch], float]
 
 
 class Exact(NamedTuple):
-    """Parts computed in rationals, where no error is allowed: on a quarter as many impacts in whole numbers."""
+    """Parts in rational arithmetic, which allow no error; a batch has a quarter as many impacts, with integers only."""
 
     families: Sequence[Family]
     restitution: float
@@ -57,7 +57,7 @@ class Exact(NamedTuple):
 def cases_of(
     families: Sequence[Family], restitutions: Sequence[float], parts: Iterable[str], exact: Exact | None = None
 ) -> list[tuple[str, Family, float]]:
-    """Return (part, family, restitution) of every batch."""
+    """Return (part, family, restitution) of every batch, the exact parts last."""
     plain = product(families, restitutions, parts)
     rational = product(exact.families, [exact.restitution], exact.errors) if exact else ()
     return [(part, family, e) for family, e, part in chain(plain, rational)]
@@ -70,7 +70,7 @@ def trial_of(
     """Return the row of one batch of `count` impacts."""
     part, family, e = case
     rational = exact is not None and part in exact.errors
-    count = max(count // 4, 4) if rational else count  # of three batches at least ten impacts decide
+    count = max(count // 4, 4) if rational else count  # at least 4 impacts, so that three batches have at least ten
     impacts = list((whole_numbers if rational else draw)(family, count, study.seed))
     batch = Batch(impacts, family, e, study.seed)
     measure = Measure(exact.errors[part], lambda _: 0.0) if exact and rational else parts[part]
@@ -88,7 +88,7 @@ def algebraic_claim(
 ) -> Claim:  # fmt: skip
     """Return a claim on batches of random impacts; `words` are the other fields of Claim.
 
-    impacts : in one batch, by depth; draw : (family, count, seed) -> the impacts of a batch
+    impacts : number of impacts in one batch, by depth; draw : (family, count, seed) -> the impacts of a batch
     """
     return Claim(
         columns=COLUMNS, cases=lambda study: cases_of(families, restitutions, parts, exact), holds=within_bound,
@@ -97,17 +97,17 @@ def algebraic_claim(
 
 
 def within_bound(row: Row) -> bool | None:
-    """A batch holds where its worst error is within its bound; an unknown error never is."""
+    """Return whether the largest error of a batch is at most its bound; False if the error is not a number."""
     return bool(row["error"] <= row["bound"])
 
 
 def energy_bound(batch: Batch) -> float:
-    """Relative energy gain that rounding alone may show: 10 d ε √κ(M), the resolver's promise."""
+    """Relative energy gain that rounding alone may cause: 10 d ε √κ(M), the bound that the resolver documents."""
     return 10.0 * batch.family.coordinates * EPSILON * float(np.sqrt(batch.family.condition_number))
 
 
 def solve_bound(batch: Batch) -> float:
-    """Relative error of quantities that go through one solve with M or through W: 100 d ε κ(M)."""
+    """Relative error allowed for quantities computed with one solve with M or with W: 100 d ε κ(M)."""
     return 100.0 * batch.family.coordinates * EPSILON * batch.family.condition_number
 
 
@@ -117,7 +117,7 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
 
 
 def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) -> Floats:
-    """Relative energy gain of each impact, in double-double arithmetic, plus the bound of its error."""
+    """Relative energy gain of each impact in double-double arithmetic, plus the error bound of that arithmetic."""
     masses = np.stack([instance.mass_matrix for instance in instances])
     before = np.stack([instance.velocity for instance in instances])
     gain, uncertainty = bulk_energy_gain(masses, before, np.stack(velocities))
@@ -125,7 +125,7 @@ def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) 
 
 
 def quadratic_form(instance: ImpactCase) -> float:
-    """vᵀ Jᵀ W† J v [J], W = J M⁻¹ Jᵀ, from the independent rows alone: the form of (18) and (24) without a factor."""
+    """vᵀ Jᵀ W† J v [J] with W = J M⁻¹ Jᵀ, from the independent rows: the form of (18) and (24) without a factor."""
     rows = instance.contact_jacobian[: instance.rank]
     closing = rows @ instance.velocity
     delassus = rows @ np.linalg.solve(instance.mass_matrix, rows.T)
@@ -133,13 +133,13 @@ def quadratic_form(instance: ImpactCase) -> float:
 
 
 def worst(values: Iterable[float]) -> float:
-    """Largest of the values; infinite where one is not a number."""
+    """Largest of the values; infinite if a value is not a number."""
     array = np.fromiter(values, np.float64)
     return float(np.max(np.where(np.isnan(array), np.inf, array), initial=0.0))
 
 
 def summary(table: Table, part: str) -> str:
-    """`at most e (allowed b) in n impacts` of one part of a claim."""
+    """Return the text `at most e (allowed b) in n impacts` for one part of a claim."""
     rows = table.where(part=part).records()
     if not rows:
         return "not computed"

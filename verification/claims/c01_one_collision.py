@@ -1,4 +1,4 @@
-"""C01: one collision never increases the kinetic energy, and what it takes is a quadratic form (Theorem 1)."""
+"""C01: one collision never increases the kinetic energy; the energy lost is a quadratic form (Theorem 1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""C02: the same for redundant simultaneous collisions (Theorem 2)."""
+"""C02: redundant collisions never increase the kinetic energy; the energy lost is a quadratic form (Theorem 2)."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ FAMILIES = tuple(
 
 
 def _bound(batch: Batch) -> float:
-    """Both ways solve with M and, in effect, with W of the independent rows."""
+    """Return 100 d ε max(κ(M), κ(W)): both methods solve with M and with W, the Delassus matrix of independent rows."""
     condition = max(batch.family.condition_number, *(np.linalg.cond(_delassus(case)) for case in batch.impacts))
     return float(100.0 * batch.family.coordinates * EPSILON * condition)
 
@@ -57,14 +57,14 @@ def _distance(instance: ImpactCase, e: float, method: str) -> float:
 
 
 def _wrong_inverse(batch: Batch) -> float:
-    """Impacts in which the pseudo-inverse without rounding gives another state."""
+    """Number of impacts in which the pseudo-inverse in rational arithmetic gives another velocity."""
     e = Fraction(batch.restitution)
     return float(sum(pseudo_inverse_velocity(*case.arrays, e) != exact_impact(*case.arrays, e).velocity
                      for case in batch.impacts))  # fmt: skip
 
 
 def _wrong_rows(batch: Batch) -> float:
-    """Impacts in which the rows in opposite order give another state."""
+    """Number of impacts in which the rows in reverse order give another velocity."""
     wrong, e = 0, Fraction(batch.restitution)
     for mass, rows, velocity in (case.arrays for case in batch.impacts):
         first = exact_impact(mass, rows, velocity, e).velocity
@@ -73,7 +73,7 @@ def _wrong_rows(batch: Batch) -> float:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     return (
         f"Number of states that differ in rational arithmetic: {summary(table, EXACT)}; with another choice of "
         f"independent rows: {summary(table, OTHER_ROWS)}. Relative difference in doubles, printed formula: "

@@ -38,7 +38,7 @@ def _exact_change(batch: Batch) -> float:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     return (
         f"Relative change of energy in doubles: {summary(table, DOUBLES)}. Change of energy [J] in rational "
         f"arithmetic: {summary(table, EXACT)}."

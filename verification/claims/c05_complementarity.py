@@ -1,4 +1,4 @@
-"""C05: for one contact the impulse is that of the complementarity formulation."""
+"""C05: for one contact the impulse equals that of the complementarity formulation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SOLVERS = ("daqp", "lemke")
 
 
 def _difference(batch: Batch, solver: str) -> float:
-    """Worst |p − p_LCP| relative to p_LCP, p_LCP the multiplier of Newton's LCP at one approaching contact."""
+    """Largest |p − p_LCP| / p_LCP, where p_LCP is the multiplier of Newton's LCP at one approaching contact."""
     return worst(_of_one(approaching(case), batch.restitution, solver) for case in batch.impacts)
 
 
@@ -28,7 +28,7 @@ def _of_one(case: ImpactCase, e: float, solver: str) -> float:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     parts = [f"{solver}: {summary(table, f'LCP by {solver}')}" for solver in SOLVERS]
     return f"Relative difference of the impulses, for each LCP solver: {'; '.join(parts)}."
 

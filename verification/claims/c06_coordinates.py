@@ -24,14 +24,14 @@ from verification.impacts import Family, Floats, ImpactCase, draw_of_rank
 DOUBLES = "random change of coordinates, in doubles"
 EXACT = "shear by whole numbers, in rationals"
 MASS_CONDITION = 1e2
-# condition numbers of the coordinate change: metres to millimetres beside radians is about 1e3
+# Condition numbers of the change of coordinates. From metres to millimetres, with radians kept, it is about 1e3.
 FAMILIES = tuple(
     Family(d, contacts, rank, k) for d, contacts, rank in ((3, 1, 1), (3, 6, 3), (6, 12, 4)) for k in (1e0, 1e3)
 )
 
 
 def _draw(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
-    """The family's condition number is that of the change of coordinates, not of M."""
+    """Draw impacts with κ(M) = MASS_CONDITION; the family's condition number is that of the change of coordinates."""
     return draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed)
 
 
@@ -40,7 +40,7 @@ def _bound(batch: Batch) -> float:
 
 
 def _worst_distance(batch: Batch) -> float:
-    """q = T r: the impact solved for q̇, and solved for ṙ and brought back."""
+    """Largest distance of two outcomes for q = T r: solved for q̇, and solved for ṙ and transformed back."""
     family = batch.family
     rng = np.random.default_rng([batch.seed, family.coordinates, family.contacts])
     changes = [random_change(rng, family.coordinates, family.condition_number) for _ in batch.impacts]
@@ -66,11 +66,11 @@ def _distance(instance: ImpactCase, change: Floats, e: float) -> float:
 
 
 def _different(batch: Batch) -> float:
-    """Outcomes that differ, without rounding."""
+    """Number of outcomes that differ in rational arithmetic."""
     different, e = 0, batch.restitution
     for mass, rows, velocity in (case.arrays for case in batch.impacts):
         shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
-        unshear = np.round(np.linalg.inv(shear))  # whole numbers, as the determinant is 1
+        unshear = np.round(np.linalg.inv(shear))  # integers, because the determinant is 1
         here = np.array(exact_impact(mass, rows, velocity, e).velocity)
         there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, e).velocity
         back = shear.astype(int).astype(object) @ np.array(there)
@@ -79,7 +79,7 @@ def _different(batch: Batch) -> float:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     return (
         f"Relative difference of the outcomes after transforming back: {summary(table, DOUBLES)}. Number of outcomes "
         f"that differ in rational arithmetic: {summary(table, EXACT)}."

@@ -1,4 +1,4 @@
-"""C07: a plastic collision takes all or part of the kinetic energy, depending on geometry (Fig. 3)."""
+"""C07: a plastic collision removes all or part of the kinetic energy, depending on the geometry (Fig. 3)."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ ANGLES = (0.0, 0.5, 1.0, 2.0)
 PLACES = (0.1, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0)
 VELOCITY = np.array([1.0, 1.0])
 
-# A share below this is rounding of an energy of 2 J through one 2 x 2 factorization.
+# Rounding of one 2 x 2 factorization, as a share of an energy of about 2 J.
 ROUNDING = 1e-12
 
 
 def cases(study: Study) -> list[tuple[str, float, float]]:
-    """The arm of Fig. 2 struck across its second link, at A and B, elsewhere, and with the elbow bent."""
+    """Impacts across the second link of the arm of Fig. 2: at A, B and other places, and with the elbow bent."""
     return [case for case in product((RODS, POINTS), ANGLES, PLACES) if case != (POINTS, 0.0, 1.0)]
 
 
 def trials(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str, Any]]:
-    """One impact."""
+    """Yield the trial of one impact."""
     reading, angle, place = case
     expected = ALL if case == (RODS, 0.0, PLACE_B) else SOME
     yield {"reading": reading, "place along the second link": place, "expected": expected,
@@ -51,7 +51,7 @@ def trials(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str, A
 
 
 def arm_of(study: Study, reading: str) -> Mechanism:
-    """The mechanism of the arm: uniform rods as in the scene, or all of a link's mass at its end."""
+    """Return the mechanism of the arm: uniform rods as in the scene, or the whole mass of each link at its end."""
     scene = study.scene("two_link_arm_a")
     if reading == POINTS:
         for name in ("upper_arm", "forearm"):
@@ -74,7 +74,7 @@ def strike(arm: Mechanism, place: float, angle: float, restitution: float) -> di
 
 
 def holds(row: Row) -> bool | None:
-    """All of the energy where that is expected, some of it but not all elsewhere."""
+    """Return whether the impact removes all energy where that is expected, and only a part of it elsewhere."""
     share = row["share lost"]
     if row["expected"] == ALL:
         return bool(abs(share - 1.0) <= ROUNDING)
@@ -82,7 +82,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     straight = {"angle of the second link": 0.0}
     texts = []
     for reading in (RODS, POINTS):

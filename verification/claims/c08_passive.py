@@ -1,4 +1,4 @@
-"""C08: the resolution is passive for every e in [−1, 1], and so are scaled and spread impulses (section VI)."""
+"""C08: the resolution is passive for every e in [−1, 1]; scaled and spread impulses are passive too (section VI)."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ IMPACTS = {"quick": 8, "full": 150}
 
 
 def cases(study: Study) -> list[tuple[Any, ...]]:
-    """Random impacts with e of either sign, and every impact of the peg at a limited device."""
+    """Random impacts with e from −1 to 1, and all impacts of the peg on a device with force limits."""
     return [*cases_of(FAMILIES, RESTITUTIONS, [RANDOM]), *((part,) for part in RENDERED)]
 
 
 def trials(study: Study, case: tuple[Any, ...]) -> Iterator[dict[str, Any]]:
-    """One batch of random impacts, or the impacts of all runs of the peg."""
+    """Yield the trial of one batch of random impacts, or of the impacts of all runs of the peg."""
     if case[0] == RANDOM:
         part, family, e = case
         yield trial_of(study, (part, family, e), IMPACTS[study.depth], {RANDOM: Measure(_gain, energy_bound)})
@@ -61,13 +61,13 @@ def _gain(batch: Batch) -> float:
 
 
 def _largest_gain(trace: Trace) -> float:
-    """Largest energy gain of an impact relative to the energy before it."""
+    """Largest energy gain of an impact of the run, relative to the energy before that impact."""
     before = trace.kinetic_energy[trace.impact_step]
     return worst(-trace.energy_lost / before)
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     rendered = "; ".join(f"{part} {summary(table, part)}" for part in RENDERED)
     return f"Relative energy gain: {RANDOM} {summary(table, RANDOM)}; {rendered}."
 

@@ -1,4 +1,4 @@
-"""C09: with e = −1 the simulation is the penalty-based one (section VI)."""
+"""C09: with e = −1 the simulation equals the penalty-based simulation (section VI)."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ FAMILIES = (Family(1, 1, 1, 1e0), Family(3, 6, 3, 1e2), Family(6, 20, 4, 1e4), F
 IMPACTS = {"quick": 20, "full": 300}
 
 JUST_ABOVE = float(np.nextafter(-1.0, 0.0))
-# An impulse of 1e-16 of the prescribed one moves the 2 kg peg by 1e-17 m; contacts may magnify that [m, rad].
+# An impulse 1e-16 times the normal one moves the 2 kg peg by 1e-17 m; contacts may amplify this distance [m, rad].
 SAME_TRAJECTORY = 1e-11
 
 
 def cases(study: Study) -> list[Family | Condition]:
-    """Impacts with e = −1, and runs of the peg with e = −1, and just above it."""
+    """Families of impacts with e = −1, and starts of the peg, which run with e = −1 and just above."""
     return [*FAMILIES, *study.starts()]
 
 
 def trials(study: Study, case: Family | Condition) -> Iterator[dict[str, Any]]:
-    """One batch of impacts, or the two trajectories from one start against the penalty's, by coordinate."""
+    """Yield the trial of one batch; or, per coordinate, the distances of two trajectories from that of PB."""
     if isinstance(case, Family):
         impacts = list(draw_of_rank(case, IMPACTS[study.depth], study.seed))
         moved = worst(float(np.abs(resolve_impact(*i.arrays, -1.0).velocity - i.velocity).max()) for i in impacts)
@@ -64,13 +64,13 @@ def trials(study: Study, case: Family | Condition) -> Iterator[dict[str, Any]]:
 
 
 def _run_with(scene: Scene, restitution: float) -> Run:
-    """Run IAPB with a negative e. Scene files are not allowed one, so this run is not for a store."""
+    """Run IAPB with a negative e. Scene files may not have a negative e, so this run is not stored."""
     contact = scene.contact.model_copy(update={"restitution": restitution})
     return run_directly(scene.model_copy(update={"contact": contact}), "IAPB", "full")
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     impacts, exactly, almost = (table.where(part=part) for part in (RESOLVER, TRAJECTORY, ALMOST))
     once = almost.where(coordinate="x")
     return (

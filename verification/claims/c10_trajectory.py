@@ -14,19 +14,19 @@ from verification.scenes.trace import COORDINATES
 if TYPE_CHECKING:
     from verification.claims.study import Study
 
-# The paper's threshold (every contact that approaches collides) on the starts of all claims, on the full grid, and on a
-# subset of that grid; ours.
+# The groups of trials. With the paper's threshold every approaching contact collides: the starts of all claims, the
+# full grid, and a subset of that grid. The group LARGER has our larger thresholds.
 PAPERS, LARGER = "approach velocity 1e-6 m/s", "approach velocity above 1e-6 m/s"
 FULL, EVEN = f"{PAPERS}, full grid", f"{PAPERS}, evenly spaced tilts"
 
 
 def cases(study: Study) -> tuple[Condition, ...]:
-    """The starts of all claims, and the full grid at the paper's threshold, of which a subset is also counted apart."""
+    """The starts of all claims, the full grid at the paper's threshold, and its subset with evenly spaced tilts."""
     return tuple(dict.fromkeys((*study.starts(), *full_grid(), *even_grid())))
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start in the four worlds, by coordinate, in each group that it belongs to; a fresh one in all."""
+    """Yield one trial per coordinate and group of a start; a fresh start belongs to all groups of its threshold."""
     groups = [LARGER]
     if condition.approach_velocity == Condition().approach_velocity:
         members = {PAPERS: study.starts(), FULL: full_grid(), EVEN: even_grid()}
@@ -36,13 +36,13 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def draw(study: Study, region: Region) -> list[Condition]:
-    """Fresh starts, each with the paper's threshold and with one of ours."""
+    """Draw fresh starts; each appears twice, with the paper's approach velocity and with the drawn one."""
     found = study.fresh(cases(study), region, FRESH)
     return [*(replace(start, approach_velocity=Condition().approach_velocity) for start in found), *found]
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     ratios = ", ".join(f"{median_ratio(table, name, 'PB'):.2f} in {name}" for name in COORDINATES)
     return (
         f"The distance of IAPB to ideal, divided by that of PB, has these medians: {ratios}. The share of starts in "
@@ -52,7 +52,7 @@ def finding(table: Table) -> str:
 
 
 def _counts(table: Table, group: str) -> str:
-    """In how many of the starts that can tell IAPB is the closest, by coordinate."""
+    """Return, per coordinate, the number of starts in which IAPB is closest and the number of decided starts."""
     texts = []
     for coordinate in COORDINATES:
         trials = table.where(threshold=group, coordinate=coordinate)

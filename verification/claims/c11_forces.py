@@ -26,14 +26,14 @@ COLUMNS = (
 )
 WORLDS = ("IAPB", "PB", "CBuc")
 
-# Slower than 1 mm/s the contact dampers still carry up to 50 N s/m x 1 mm/s = 0.05 N of the hand's 0.4 N.
+# At 1 mm/s, the largest speed that counts as settled, the dampers carry 50 N s/m x 1 mm/s = 0.05 N of the hand's 0.4 N.
 BALANCED = 0.05  # [N]
-# Peaks and momenta below this [N, N m, N s, N m s] are rounding: nothing pushed along this coordinate at all.
+# Peaks and momenta below this [N, N m, N s, N m s] are rounding: no force acts along this coordinate.
 NOTHING = 1e-9
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start: peaks, resting forces and the momentum given so far, per coordinate."""
+    """Yield the trials of one start per coordinate: peak forces, resting forces, distances of the force integrals."""
     ideal = study.trace(condition, "ideal")
     traces = {world: study.trace(condition, world) for world in WORLDS}
     window = comparison_window([ideal, *traces.values()])
@@ -50,7 +50,7 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool | None:
-    """Peak above PB's; resting force opposite to the hand's; momentum nearer to ideal than PB's and CBuc's."""
+    """Return whether IAPB has a higher peak than PB, balances the hand, or has the force integral closest to ideal."""
     if row["part"] == BALANCE:
         return None if row["IAPB"] is None else bool(abs(row["IAPB"] + row["hand"]) <= BALANCED)
     if max(row[world] for world in WORLDS) < NOTHING:
@@ -61,7 +61,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for coordinate, unit in (("x", "N"), ("y", "N"), ("theta", "N m")):
         trials = table.where(part=LARGE, coordinate=coordinate)

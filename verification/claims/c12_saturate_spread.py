@@ -1,4 +1,4 @@
-"""C12: at a device of limited force, saturating the impulses loses most and spreading them loses least (Fig. 9)."""
+"""C12: on a device with force limits, saturated impulses lose most performance, spread ones least (Fig. 9)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COLUMNS = (
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start and device limit in three renderings, per coordinate."""
+    """Yield the trials of one start and device limit, per coordinate, with the distances of three renderings."""
     full = study.trace(condition, "IAPB")
     traces = {rendering: study.trace(condition, "IAPB", rendering) for rendering in RENDERINGS}
     window = comparison_window([full, *traces.values()])
@@ -42,7 +42,7 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool | None:
-    """Saturating strictly the worst, or spreading strictly the best; None where no limit was reached."""
+    """Return whether saturating is strictly worst, or spreading strictly best; None if no impulse reaches the limit."""
     lost = [row[rendering] for rendering in RENDERINGS]
     if row["impacts limited"] == 0.0 or max(lost) < INDISTINGUISHABLE:
         return None
@@ -52,7 +52,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for coordinate, unit, factor in (("x", "µm", 1e6), ("y", "µm", 1e6), ("theta", "mrad", 1e3)):
         trials = table.where(part=f"{coordinate}: {MOST}")

@@ -1,4 +1,4 @@
-"""C13: with F_limit, IAPB (impulses spread) stays closest to ideal and penetrates less than PB (Fig. 10)."""
+"""C13: with force limits, IAPB (impulses spread) stays closest to ideal and penetrates less than PB (Fig. 10)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COLUMNS = (*columns("force_limit"), *DISTANCE_COLUMNS)
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start and device limit, the impulses of IAPB spread over steps, per coordinate."""
+    """Yield the trials of one start and device limit, per coordinate; IAPB spreads its impulses over steps."""
     yield from distances(study, condition, "spread")
     depths = {
         "IAPB": deepest_penetration(study.trace(condition, "IAPB", "spread")),
@@ -32,14 +32,14 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool | None:
-    """Nearest to ideal in this coordinate; or less deep than PB."""
+    """Return whether IAPB is closest to ideal in this coordinate, or penetrates less than PB."""
     if row["coordinate"] == PENETRATION:
         return bool(row["IAPB"] < row["PB"])
     return closest(row)
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     depths = table.where(coordinate=PENETRATION)
     ratios = ", ".join(f"{median_ratio(table, name, 'PB'):.2f} in {name}" for name in COORDINATES)
     medians = [1e3 * float(np.median(depths.column(world))) for world in ("IAPB", "PB")]

@@ -24,26 +24,26 @@ COLUMNS = (
     Column("PB"),
 )
 
-# A hundredth of what a fingertip feels, about 0.05 N (and the same at the peg's half length, in N m) [N, N m].
+# A hundredth of the smallest force that a fingertip feels (0.05 N); for theta, that force at the peg's half length.
 NOT_FELT = {"x": 5e-4, "y": 5e-4, "theta": 5e-6}
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start and device limit, the impulses of IAPB spread over steps, per coordinate."""
+    """Yield the trials of one start and device limit, per coordinate; IAPB spreads its impulses over steps."""
     limited, penalty = peak_force(study.trace(condition, "IAPB", "spread")), peak_force(study.trace(condition, "PB"))
     for i, coordinate in enumerate(COORDINATES):
         yield condition.record() | {"coordinate": coordinate, "IAPB": float(limited[i]), "PB": float(penalty[i])}
 
 
 def holds(row: Row) -> bool | None:
-    """Above PB's peak; None where neither would be felt."""
+    """Return whether the peak of IAPB is above that of PB; None if neither peak can be felt."""
     if max(row["IAPB"], row["PB"]) < NOT_FELT[row["coordinate"]]:
         return None
     return bool(row["IAPB"] > row["PB"])
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for coordinate in COORDINATES:
         trials = table.where(coordinate=coordinate)

@@ -27,7 +27,7 @@ COLUMNS = (
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start, without limits and with the impulses spread."""
+    """Yield the trials of one start: without device limits, and with limits and spread impulses."""
     penalty = study.trace(condition, "PB")
     for rendering in ("full", "spread"):
         ours = study.trace(condition, "IAPB", rendering)
@@ -38,13 +38,13 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def _settled(trace: Trace) -> float:
-    """Settling time [s]; infinite where the peg still moves at the end."""
+    """Settling time [s]; infinite if the peg still moves at the end."""
     time = settling_time(trace)
     return np.inf if time is None else time
 
 
 def holds(row: Row) -> bool | None:
-    """Less than PB, ties fail; None where nothing bounces in either world, or neither settles."""
+    """Return whether IAPB has less than PB (`NO_MORE`: at most as much); None if both never bounce, or never settle."""
     ours, theirs = row["IAPB"], row["PB"]
     if ours == theirs == (np.inf if row["part"] == SETTLES else 0):
         return None
@@ -52,7 +52,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for rendering in ("full", "spread"):
         hops, settling = (table.where(part=part, rendering=rendering) for part in (FEWER, SETTLES))

@@ -1,4 +1,4 @@
-"""C16: scaling and spreading keep tool and device together on impact, saturating does not (section VI)."""
+"""C16: scaling and spreading keep tool and device together on impact; saturating does not (section VI)."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ COLUMNS = (
     Column("impacts limited"),
 )
 
-# Tool and device start alike and get the same forces: what remains is rounding over 1536 steps. A micrometre (or
-# microradian) is a thousand times more, and a hundredth of what saturation leaves.
+# Tool and device start alike and get the same forces, so they differ only by rounding over 1536 steps. A micrometre (or
+# microradian) is a thousand times larger than this, and a hundredth of the separation by saturation.
 TOGETHER, APART = 1e-9, 1e-6
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One start and device limit in three renderings."""
+    """Yield the trials of one start and device limit, one per rendering."""
     limited = share_limited(study.trace(condition, "IAPB", "scale"))
     for rendering in RENDERINGS:
         x, y, theta = map(float, largest_separation(study.trace(condition, "IAPB", rendering)))
@@ -38,7 +38,7 @@ def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool | None:
-    """Together to rounding, or, saturated, visibly apart; None where no impulse reached the limit."""
+    """Return whether tool and device stay together, or separate if saturated; None if no impulse reached the limit."""
     if row["impacts limited"] == 0.0:
         return None
     apart = max(row["distance"], row["angle"])
@@ -46,7 +46,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for rendering in RENDERINGS:
         trials = table.where(rendering=rendering)

@@ -25,13 +25,13 @@ COLUMNS = (
     Column("PB, lost within 20 ms", "J"),
 )
 
-# The state before the first impact has not felt the walls: not one bit may differ beyond the energy's own rounding.
+# No wall has acted before the first impact, so its state is the same for all walls; only the energy's rounding differs.
 SAME = 1e-12
-SHORTLY = 0.020  # [s] after first contact: what a penalty takes in the time it needs to stop the peg
+SHORTLY = 0.020  # [s] after first contact: about the time that a penalty force needs to stop the peg
 
 
 def trials(study: Study, condition: Condition) -> Iterator[dict[str, Any]]:
-    """One wall against the paper's."""
+    """Yield the trials of one wall, compared with the paper's wall."""
     default = Condition()
     reference = replace(condition, stiffness=default.stiffness, damping=default.damping)
     ours, theirs = study.trace(condition, "IAPB"), study.trace(reference, "IAPB")
@@ -47,20 +47,20 @@ def _first_loss(trace: Trace) -> float:
 
 
 def _lost_shortly(trace: Trace) -> float:
-    """Kinetic energy of the tool at first contact minus that of SHORTLY later [J]."""
+    """Kinetic energy of the tool at first contact minus that SHORTLY later [J]."""
     start = min(trace.first_contact, len(trace.time) - 1)
     end = min(start + round(SHORTLY / trace.dt), len(trace.time) - 1)
     return float(trace.kinetic_energy[start] - trace.kinetic_energy[end])
 
 
 def holds(row: Row) -> bool | None:
-    """The loss is that of the reference walls; None where there was no impact."""
+    """Return whether the loss equals that at the reference walls; None if the reference has no impact."""
     lost, reference = row["lost"], row["of the reference"]
     return bool(abs(lost - reference) <= SAME * reference) if reference > 0.0 else None
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for tilt in dict.fromkeys(table.column("tilt")):
         first, every = (table.where(tilt=tilt, part=part) for part in (FIRST, ALL))

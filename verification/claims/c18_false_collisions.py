@@ -21,7 +21,7 @@ CLUSTERING = "clustering alone"
 CLUSTER = {"quick": (0.0, 4.0, 6.0), "full": (0.0, 2.0, 4.0, 6.0, 10.0)}  # [mm]
 COHERENCE = {"quick": (0.0, 1.0, 2.0, 4.0, 6.0, 10.0), "full": (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)}  # [mm]
 DAMPING = (10.0, 20.0, 40.0, 60.0)  # [N s/m]
-FRESH = 40  # sockets that confirm a region; those short of the next facet are no trial of ours
+FRESH = 40  # sockets drawn to confirm a region; each part uses those that belong to it
 RATES = {"quick": (1000.0,), "full": (500.0, 1000.0, 2000.0)}  # [Hz]
 
 COLUMNS = (
@@ -41,7 +41,7 @@ COLUMNS = (
 
 
 class Socket(NamedTuple):
-    """A ball in the socket: distances of the filters [mm], damping [N s/m] and rate [Hz]."""
+    """A ball in the socket: rate [Hz], contact damping [N s/m], and the distances of the two filters [mm]."""
 
     rate: float
     damping: float
@@ -50,14 +50,14 @@ class Socket(NamedTuple):
 
 
 def cases(study: Study) -> list[Socket]:
-    """Every pair of distances, over damping and rate."""
+    """Every pair of filter distances with at least one filter, at every damping and rate."""
     depth = study.depth
     every = (Socket(*case) for case in product(RATES[depth], DAMPING, CLUSTER[depth], COHERENCE[depth]))
     return [case for case in every if case.cluster or case.coherence]
 
 
 def draw(study: Study, region: Region) -> list[Socket]:
-    """Fresh sockets: each condition between its ends."""
+    """Draw fresh sockets, each condition uniformly between the ends of the region."""
     rng, depth = np.random.default_rng(study.seed), study.depth
     ends = (region.ends("rate", RATES[depth]), region.ends("damping", DAMPING),
             region.ends("cluster_distance", CLUSTER[depth]), region.ends("coherence_distance", COHERENCE[depth]))
@@ -65,7 +65,7 @@ def draw(study: Study, region: Region) -> list[Socket]:
 
 
 def trials(study: Study, case: Socket) -> Iterator[dict[str, Any]]:
-    """The ball with these filters against the ball without any."""
+    """Yield the trial that compares the ball with these filters to the ball without filters."""
     plain, filtered = (_found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case))
     yield {"cluster_distance": case.cluster, "coherence_distance": case.coherence, "damping": case.damping,
            "rate": case.rate} | _row(plain, filtered, case.coherence, case.rate)  # fmt: skip
@@ -93,7 +93,7 @@ def _row(plain: FalseCollisions, filtered: FalseCollisions, coherence: float, ra
 
 
 def holds(row: Row) -> bool | None:
-    """No false collision is left; None where there was none, or where the paper's own condition is not met."""
+    """Return whether no false collision remains; None if there was none, or if the paper's condition is not met."""
     if row["false collisions without filters"] == 0:
         return None
     if row["part"] != CLUSTERING and row["coherence_distance"] <= row["speed × step"]:
@@ -102,7 +102,7 @@ def holds(row: Row) -> bool | None:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     failures = table.where(part=REACHES).that(False)
     clustering = table.where(part=CLUSTERING)
     return (
@@ -117,7 +117,7 @@ def finding(table: Table) -> str:
 
 
 def _bouncing(failures: Table) -> str:
-    """Where a long enough distance does not help, and in how many of these trials the ball had left the facets."""
+    """Return where a sufficient distance fails, and the number of these trials in which the ball left the facets."""
     if not failures.rows:
         return ""
     off = sum(steps > 0 for steps in failures.column("steps off the facets"))

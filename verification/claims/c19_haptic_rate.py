@@ -14,11 +14,11 @@ from verification.finding import Region, Row, Table
 if TYPE_CHECKING:
     from verification.claims.study import Study
 
-FRESH = 15  # sizes that confirm a region
+FRESH = 15  # number of sizes drawn to confirm a region
 
 
 def draw(study: Study, region: Region) -> Iterator[Row]:
-    """Fresh sizes inside a region."""
+    """Yield the trials of fresh sizes inside a region."""
     rng = np.random.default_rng(study.seed)
     ends = (region.ends("coordinates", COORDINATES), region.ends("contacts", CONTACTS))
     for _ in range(FRESH):
@@ -27,12 +27,12 @@ def draw(study: Study, region: Region) -> Iterator[Row]:
 
 
 def holds(row: Row) -> bool | None:
-    """At most one call in a thousand takes longer than 1 ms."""
+    """Return whether at most one call in a thousand takes longer than 1 ms."""
     return bool(row["late calls"] <= ALLOWED)
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = [f"{method}: " + ", ".join(f"{count} at d = {d}" for d, count in most.items())
              for method, most in most_contacts(table).items()]  # fmt: skip
     return ("Largest number of contacts at which 99.9 % of the impacts take less than 1 ms, on this machine: "

@@ -1,4 +1,4 @@
-"""C20: virtual damping is bounded by physical damping, stiffness and step: b >= KT/2 + |B| (section VII)."""
+"""C20: physical damping, stiffness and step bound the virtual damping: b >= KT/2 + |B| (section VII)."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ COLUMNS = (
 )
 
 STIFFNESSES = (250.0, 1000.0, 4000.0, 16000.0)
-DEVICE_DAMPINGS = (0.0, 0.5, 1.25, 2.0, 5.0)  # of KT/2: below 1 no wall of this stiffness is passive
-DAMPINGS = (0.0, 0.5, 0.95, 1.05, 2.0)  # of the bound b − KT/2
-ROUNDING = 1e-11  # of the turnover: the sums of 4000 steps, each rounded to 2e-16 of it
+DEVICE_DAMPINGS = (0.0, 0.5, 1.25, 2.0, 5.0)  # times KT/2: below 1 no wall of this stiffness is passive
+DAMPINGS = (0.0, 0.5, 0.95, 1.05, 2.0)  # times the bound b − KT/2
+ROUNDING = 1e-11  # share of the turnover: the sums of 4000 steps, each rounded to 2e-16 of it
 _STEPS = 2000
 
 
 def cases(study: Study) -> list[tuple[float, ...]]:
-    """The motion that a wall feeds most (see `hand_port.quickest_motion`), against walls on both sides of the bound."""
+    """Walls on both sides of the bound; trials use the motion that gains most energy (`hand_port.quickest_motion`)."""
     return [
         (rate, stiffness, device, share)
         for rate in (512.0, 1000.0) for stiffness in STIFFNESSES for device in DEVICE_DAMPINGS
@@ -38,7 +38,7 @@ def cases(study: Study) -> list[tuple[float, ...]]:
 
 
 def trials(study: Study, case: tuple[float, ...]) -> Iterator[dict[str, Any]]:
-    """One wall; its damping is a share of b − KT/2, or of KT/2 where that is negative and no damping is allowed."""
+    """Yield the trial of one wall; its damping is a multiple of b − KT/2, or of KT/2 if b <= KT/2."""
     rate, K, device, share = case
     half = 0.5 * K / rate
     b = device * half
@@ -52,7 +52,7 @@ def trials(study: Study, case: tuple[float, ...]) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool:
-    """Energy comes out of the wall beyond the bound, and none within it."""
+    """Return whether energy comes out of a wall beyond the bound, or no energy comes out of a wall within it."""
     leaks = row["energy from the wall"] > ROUNDING * row["wall's turnover"]
     share = row["virtual damping"]
     allowed = share is not None and share <= 1.0
@@ -60,7 +60,7 @@ def holds(row: Row) -> bool:
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     within = [row for row in table.records() if row["virtual damping"] is not None and row["virtual damping"] <= 1.0]
     undamped = table.where(**{"device damping": 0.0})
     most = max(undamped.column("energy from the wall"))

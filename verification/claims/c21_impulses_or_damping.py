@@ -20,7 +20,7 @@ SAME, EQUAL_GAIN, BEST = (
     "penalties, same damping", "penalties, damping with the impulse's force", "penalties, best larger damping"
 )  # fmt: skip
 
-FRESH = 5  # walls of each loop that confirm a region
+FRESH = 5  # number of walls per loop drawn to confirm a region
 
 COLUMNS = (
     Column("against", part=True),
@@ -35,13 +35,13 @@ COLUMNS = (
 
 
 def cases(study: Study) -> list[tuple[StabilityMap, StabilityMap]]:
-    """Each loop: impulses at the paper's damping, and penalties."""
+    """One pair of stability maps per loop: with penalties, and with impulses."""
     maps = stability_maps(study.depth)
-    return list(zip(maps[::2], maps[1::2], strict=True))  # the two laws of a loop follow each other
+    return list(zip(maps[::2], maps[1::2], strict=True))  # the maps of the two laws of a loop follow each other
 
 
 def draw(study: Study, region: Region) -> list[tuple[StabilityMap, StabilityMap]]:
-    """Fresh walls inside a region, for every loop: stiffnesses drawn by decades."""
+    """Draw fresh walls inside a region for every loop, uniformly in the logarithm of the stiffness."""
     stiffness, damping = grid(study.depth)
     low, high = region.ends("stiffness", stiffness.tolist())
     rng, found = np.random.default_rng(study.seed), []
@@ -54,7 +54,7 @@ def draw(study: Study, region: Region) -> list[tuple[StabilityMap, StabilityMap]
 
 
 def trials(study: Study, case: tuple[StabilityMap, StabilityMap]) -> Iterator[dict[str, Any]]:
-    """The walls of one loop: impulses at the paper's damping against three penalties."""
+    """Yield the trials of the walls of one loop: impulses at the paper's damping against three penalties."""
     penalty, impulses = case
     loop, raised = penalty.loop, penalty.damping[penalty.damping >= PAPER_DAMPING]
     times = np.array([penalty.settling(damping) for damping in raised])
@@ -72,7 +72,7 @@ def trials(study: Study, case: tuple[StabilityMap, StabilityMap]) -> Iterator[di
 
 
 def _equal_gain(penalty: StabilityMap) -> tuple[float, np.ndarray]:
-    """The damping whose force on touching is the impulse's, (1 + e) m/T, and when walls with it settle [s]."""
+    """Return the damping whose force at first contact equals the impulse's, (1 + e) m/T, and the settling times [s]."""
     loop = penalty.loop
     gain = (1.0 + loop.restitution) * loop.mass / loop.step
     contact = touch_walls(loop, penalty.stiffness, np.full_like(penalty.stiffness, gain), PENALTY)
@@ -80,13 +80,13 @@ def _equal_gain(penalty: StabilityMap) -> tuple[float, np.ndarray]:
 
 
 def holds(row: Row) -> bool | None:
-    """Impulses settle no later than the best raised damping; None where neither ever settles."""
+    """Return whether impulses settle no later than the rival penalty; None if neither settles."""
     ours, theirs = row["impulses settle after"], row["penalty settles after"]
     return None if np.isinf(ours) and np.isinf(theirs) else bool(ours <= theirs)
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for rival in (SAME, EQUAL_GAIN, BEST):
         decided = [row for row in table.where(against=rival).records() if holds(row) is not None]

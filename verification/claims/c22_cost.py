@@ -27,14 +27,14 @@ COLUMNS = (
 )
 CONTACTS = (1, 2, 3, 4, 6, 8, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 128, 192, 300)
 ROUNDS = {"quick": 7, "full": 15}
-FRESH = 18  # sizes that confirm a region, those of CONTACTS among them left out
-# Ratios nearer to 1 cannot tell: with ten busy processes on two cores the medians moved by up to 7 %.
+FRESH = 18  # number of sizes drawn to confirm a region; sizes in CONTACTS are then left out
+# Ratios nearer to 1 decide nothing: with ten busy processes on two cores the medians moved by up to 7 %.
 CLEAR = 1.1
-SAME_VELOCITY = 1e-5  # of |v⁻| between Lemke's answer and daqp's
+SAME_VELOCITY = 1e-5  # largest difference of Lemke's and daqp's answers, relative to |v⁻|
 
 
 class Impact(NamedTuple):
-    """One problem to be timed."""
+    """One problem to be timed: its kind and its number of contacts."""
 
     problem: str
     contacts: int
@@ -52,13 +52,13 @@ def draw(study: Study, region: Region) -> list[Impact]:
 
 
 def trials(study: Study, case: Impact) -> Iterator[dict[str, Any]]:
-    """One size: both kernels in turns, and the ratio of their times round by round."""
+    """Yield the trial of one size: time both kernels in turns, and divide their times round by round."""
     impact = PARTS[case.problem](case.contacts, np.random.default_rng([study.seed, case.contacts]))
     calls: dict[str, Call] = {"complementarity": LemkeCall(impact), "IAPB": KernelCall(impact)}
     row: dict[str, Any] = {"problem": case.problem, "contacts": case.contacts}
     found = {name: call().copy() for name, call in calls.items()}  # also loads their machine code
     apart = np.linalg.norm(found["complementarity"] - solver_call(impact, "daqp")())
-    if apart <= SAME_VELOCITY * np.linalg.norm(impact.velocity):  # what is not solved has no time
+    if apart <= SAME_VELOCITY * np.linalg.norm(impact.velocity):  # an unsolved problem gets no time
         times = take_turns({name: sampler(call) for name, call in calls.items()}, ROUNDS[study.depth])
         ratio = times["complementarity"].over(times["IAPB"])
         row |= {"decades": float(np.log10(ratio.median)), "ratio": ratio.median, "lower quartile": ratio.lower,
@@ -67,14 +67,14 @@ def trials(study: Study, case: Impact) -> Iterator[dict[str, Any]]:
 
 
 def holds(row: Row) -> bool | None:
-    """Complementarity clearly costs more, or clearly less; None where the quartiles reach into what is not clear."""
+    """Return True if complementarity clearly costs more, False if it clearly costs less, None in between."""
     if row["ratio"] is None:
         return None
     return True if row["lower quartile"] >= CLEAR else False if row["upper quartile"] <= 1.0 / CLEAR else None
 
 
 def finding(table: Table) -> str:
-    """One sentence."""
+    """Return the result in words, with numbers."""
     texts = []
     for part in dict.fromkeys(table.column("problem")):
         trials = table.where(problem=part)

@@ -1,6 +1,6 @@
-"""Claim: what is claimed, the cases it is tried on, and how one trial decides.
+"""Claim: a statement of the paper, the cases on which it is tested, and the rule that decides one trial.
 
-Its Finding follows from the trials by the rule of `verification.finding`, for every claim alike: nobody types it in.
+The rule of `verification.finding` computes the Finding of every claim from its trials. No verdict is written by hand.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ class Claim:
 
     Attributes
     ----------
-    id : key of the ledger, C01 to C22
+    id : key of the claim in the ledger, C01 to C22
     statement : the claim in our words; place : where the paper makes it
-    quantity : what is measured; tolerance : when a trial counts as holding, and why there
-    columns : what a trial consists of; the columns marked `part` split the claim into parts
-    cases : what is tried; trials : (study, case) -> the trials of one case
-    holds : one trial -> True, False, or None where it cannot tell; a pure function of the row
+    quantity : what is measured; tolerance : the limit up to which a trial holds, and the reason for it
+    columns : the columns of a trial; the columns marked `part` split the claim into parts
+    cases : study -> the cases to test; trials : (study, case) -> the trials of one case
+    holds : one trial -> True, False, or None if the trial cannot decide; a pure function of the row
     finding : judged trials -> one sentence with numbers
-    runs : (world, rendering) of the runs that a trial uses, where cases are conditions of the peg
-    draw : (study, region) -> fresh cases inside a region, for its confirmation; None where there are none
-    axes : two condition columns over which the outcome is best drawn, and the column that splits the maps
+    runs : (world, rendering) of the runs that a trial uses; empty unless the cases are conditions of the peg
+    draw : (study, region) -> fresh cases inside a region, which confirm it; None if the claim has no fresh cases
+    axes : the two condition columns that are the axes of the plotted maps, and the column that splits the maps
     """
 
     id: str
@@ -61,7 +61,7 @@ class Claim:
     axes: tuple[str, ...] = ()
 
     def measure(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
-        """Return the judged trials of all cases, or of these."""
+        """Return the judged trials of the given cases; by default of all cases."""
         chosen = tuple(self.cases(study) if cases is None else cases)
         study.make_ahead(chosen if self.runs else (), self.runs)
         return self.judge(table_of(self.columns, study.each(chosen, partial(self.trials, study))))
@@ -72,16 +72,16 @@ class Claim:
         return replace(table, holds=outcomes, timed_rows=any(column.timed for column in table.columns))
 
     def check(self, study: Study) -> Finding:
-        """Measure, judge and conclude; regions are confirmed on fresh trials."""
+        """Measure and judge all trials and return the finding; fresh trials confirm its regions."""
         return self.conclude(self.measure(study), study)
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
-        """Return the finding of judged trials; without a study no fresh trials are drawn."""
+        """Return the finding of judged trials; without a study it draws no fresh trials."""
         parts = [judge_part(name, trials, self._fresh(study, name)) for name, trials in by_part(table).items()]
         return self._found(self.finding(table), parts, table)
 
     def not_computed(self) -> Finding:
-        """Return the finding of a claim of which nothing was measured."""
+        """Return the finding of a claim that has no measured trials."""
         return self._found("", [Part("Not computed.", NOT_COMPUTED)], Table(self.columns))
 
     def _found(self, answer: str, parts: Iterable[Part], table: Table) -> Finding:
@@ -90,7 +90,7 @@ class Claim:
         return replace(found, details=details | {"conditions": ranges(table)}, axes=self.axes)
 
     def _fresh(self, study: Study | None, name: str) -> Callable[[Region], Table] | None:
-        """The function that draws and judges fresh trials of a part inside a region."""
+        """Return the function that draws and judges fresh trials of a part inside a region."""
         draw = self.draw
         if study is None or draw is None:
             return None
@@ -104,7 +104,7 @@ class Claim:
 
 
 def by_part(table: Table) -> dict[str, Table]:
-    """Return the trials of each part of a claim by its name; one part of no name where it has no parts."""
+    """Return the trials of each part by the part's name; a claim without parts has one part named ""."""
     marked = [column.key for column in table.columns if column.part]
     names = [", ".join(row[key] for key in marked) for row in table.records()]
     return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {"": table}

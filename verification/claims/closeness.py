@@ -1,4 +1,4 @@
-"""Claims on the peg in the corner, and how close the worlds' device trajectories come to "ideal" (C10, C13)."""
+"""Claims on the peg in the corner, and the distances of the device trajectories from "ideal" (C10, C13)."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ COLUMNS = (
     Column("CBuc, largest"),
 )
 
-# Fresh starts that confirm a region: one that fails in a tenth of its starts would be confirmed once in 24 times.
+# Number of fresh starts that confirm a region. If a tenth of its starts fail, a region is confirmed once in 24 times.
 FRESH = 30
-# Distances below this [m, rad] are nothing that a hand or a figure could tell apart (a tenth of a micrometre): a
-# coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat, cannot tell.
+# Neither a hand nor a figure shows distances below this [m, rad] (a tenth of a micrometre). A trial decides nothing in
+# a coordinate in which every world is that close to ideal, such as the angle of a peg that lies flat.
 INDISTINGUISHABLE = 1e-7
 
 
 def peg_claim(*, limited: bool = False, **words: Any) -> Claim:
     """Return a claim on every start of the peg, with device limits or without; `words` are the other fields of Claim.
 
-    FRESH starts between those are drawn to confirm a region.
+    To confirm a region, FRESH starts are drawn at random inside it.
     """
 
     def cases(study: Study) -> tuple[Condition, ...]:
@@ -63,14 +63,14 @@ def distances(study: Study, condition: Condition, rendering: str) -> Iterator[di
 
 
 def closest(row: Row) -> bool | None:
-    """IAPB is nearer to ideal (RMS) than PB and than CBuc; None where all are indistinguishable from it."""
+    """Return whether IAPB is nearer to ideal (RMS) than PB and CBuc; None if all are indistinguishable from ideal."""
     if max(row["IAPB"], row["PB"], row["CBuc"]) < INDISTINGUISHABLE:
         return None
     return bool(row["IAPB"] < min(row["PB"], row["CBuc"]))
 
 
 def median_ratio(table: Table, coordinate: str, other: str) -> float:
-    """Median of distance(IAPB) / distance(other) over the trials of a coordinate that can tell."""
+    """Median of distance(IAPB) / distance(other) over the decided trials of a coordinate."""
     rows = [row for row, held in zip(table.records(), table.holds, strict=True)
             if held is not None and row["coordinate"] == coordinate]  # fmt: skip
     return float(np.median([row["IAPB"] / row[other] for row in rows])) if rows else np.nan

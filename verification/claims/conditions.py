@@ -1,7 +1,8 @@
 """The conditions of the peg in the corner that the paper leaves open, as ranges (paper Fig. 4, section VI).
 
-A trial starts from a tilt, a clearance to the wall and a travel to the floor: how far the peg's nearest corners
-are from the two when the hand begins to push. Then come friction, stiffness and damping of the walls.
+A trial starts from a tilt, a clearance and a travel. The clearance is the distance from the wall to the peg's nearest
+corner when the hand begins to push; the travel is the same distance from the floor. The other conditions are friction,
+stiffness and damping of the walls, the approach velocity from which a contact collides, and the device's force limit.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from verification.scenes.trace import HALF_SIZE
 
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
-# What the worlds do not see: one run of theirs serves all values.
+# The conditions that each world ignores: one run of a world serves all values of these conditions.
 _RIGID_IGNORES = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")
 IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_velocity", "force_limit"), "IAPB": ()}
 
@@ -27,7 +28,7 @@ class Condition:
     """One variation of the peg scene; friction, stiffness and damping are those of the walls.
 
     tilt [rad]; clearance to the wall and travel to the floor [m]; stiffness [N/m]; damping [N s/m];
-    approach_velocity from which on a contact collides [m/s]; force_limit of the device, multiple of the paper's
+    approach_velocity above which a contact collides [m/s]; force_limit of the device as a multiple of the paper's limit
     """
 
     tilt: float = 0.015
@@ -40,24 +41,24 @@ class Condition:
     force_limit: float = 1.0
 
     def __str__(self) -> str:
-        """What differs from the paper's start."""
+        """Return the values that differ from the paper's start, as text."""
         default = Condition()
         changed = (f"{name} {value:g}" for name, value in asdict(self).items() if value != getattr(default, name))
         return ", ".join(changed) or "the paper's start"
 
     def seen_by(self, world: str, rendering: str) -> Condition:
-        """The same trial as a world sees it: what it ignores takes its default."""
+        """Return the condition with the default for every value that the world ignores."""
         default, ignored = Condition(), IGNORED[world]
         if rendering == "full":
             ignored = (*ignored, "force_limit")
         return replace(self, **{name: getattr(default, name) for name in ignored})
 
     def record(self) -> dict[str, float]:
-        """The condition by column name."""
+        """Return the values of the condition by column name."""
         return asdict(self)
 
     def place(self, scene: Scene) -> Scene:
-        """The scene under this condition."""
+        """Return the scene with the values of this condition."""
         half = np.array(HALF_SIZE)
         c, s = abs(np.cos(self.tilt)), abs(np.sin(self.tilt))
         x = self.clearance + half[0] * c + half[1] * s
@@ -78,19 +79,19 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
-# A subset for what depends on the grid: the full tilts that lie at even distances; those above crowd at small ones.
+# Evenly spaced tilts, a subset of the full ones (most of which are small): they show how results depend on the grid.
 EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
-# 1e-6 takes every contact that approaches at all, as the paper does. An old contact that creeps into its wall under
-# the hand approaches too, by up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value leaves such contacts out.
+# With 1e-6 every approaching contact collides, as in the paper. An existing contact that the hand pushes slowly into
+# its wall also approaches, at up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value excludes such contacts.
 APPROACH_VELOCITIES = (1e-3, 1e-2)
-TIGHT = 0.3  # of the paper's limits: below the penalty forces of a hard landing
+TIGHT = 0.3  # times the paper's limits: below the penalty forces of a hard landing
 STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
 DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 
 
 def start_conditions(depth: str) -> tuple[Condition, ...]:
-    """Every tilt, clearance and approach velocity, other travels at three tilts, other frictions at every tilt."""
+    """Return all tilts x clearances x approach velocities, more travels at three tilts, more frictions at all tilts."""
     grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
     few = (0.0, 0.03, 0.1)
     travels = [Condition(tilt, travel=travel) for tilt in few for travel in TRAVELS[depth]]
@@ -100,34 +101,34 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
 
 
 def full_grid() -> tuple[Condition, ...]:
-    """Every tilt and clearance of the full depth, at the paper's approach threshold."""
+    """Return every tilt and clearance of the full depth, at the paper's approach velocity."""
     return tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
 
 
 def even_grid() -> tuple[Condition, ...]:
-    """The starts of the full grid whose tilts lie at even distances."""
+    """Return the starts of the full grid whose tilts are evenly spaced."""
     return tuple(start for start in full_grid() if start.tilt in EVEN_TILTS)
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
-    """The starting conditions with the paper's device limits, some also with tighter ones (C12 to C14, C16)."""
+    """Return the starting conditions with the paper's device limits, and some with tighter limits (C12 to C14, C16)."""
     default = Condition()
     starts = [start for start in start_conditions(depth) if start.approach_velocity == default.approach_velocity]
     plain = [start for start in starts if start == replace(default, tilt=start.tilt)]
     return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
 
-PATIENCE = 1000  # a region with a hundredth of all starts is missed so often once in 23,000 draws
+PATIENCE = 1000  # 1000 starts in a row miss a region with a hundredth of all starts once in 23,000 draws
 
 
 def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) -> list[Condition]:
-    """Return conditions drawn at random inside a region, each of them between the ends of what was tested.
+    """Return `count` conditions drawn at random inside a region and inside the range of the tested conditions.
 
-    Tilt, clearance and travel come from one sequence for all claims, which no search has seen: the first `count` that
-    lie inside. So regions that overlap share the runs of the rigid worlds, which see nothing else. The other
-    conditions are drawn between the region's ends, the approach velocity by decades. All vary at once; four digits are
-    kept, so that they repeat anywhere. A region so thin that the sequence misses it for `PATIENCE` starts running gets
-    starts of its own.
+    Tilt, clearance and travel come from one random sequence that all claims share: its first `count` starts inside the
+    region. No region was chosen from these starts. Overlapping regions share the runs of the rigid worlds, which ignore
+    all other conditions. The other conditions are drawn between the region's ends, the approach velocity uniformly in
+    its logarithm. All conditions vary at once. Values are rounded to four digits, so that every machine gets the same
+    ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that region.
     """
     rng, found = np.random.default_rng(seed), list[Condition]()
     ends = {name: region.ends(name, [getattr(condition, name) for condition in tested]) for name in UNITS}
@@ -150,7 +151,7 @@ def _between(low: float, high: float, share: float, by_decades: bool = False) ->
 
 
 def wall_conditions() -> tuple[Condition, ...]:
-    """Stiffness and damping of the walls, at two tilts (C17)."""
+    """Return every stiffness and damping of the walls at two tilts (C17)."""
     return tuple(
         Condition(tilt, stiffness=stiffness, damping=damping)
         for tilt in (0.0, 0.1) for stiffness in STIFFNESSES for damping in DAMPINGS
@@ -162,7 +163,7 @@ UNITS = {
     "approach_velocity": "m/s", "force_limit": "F_limit",
 }  # fmt: skip
 
-# Where the peg starts, from the least to the largest value tested at any depth: all that a rigid world sees.
+# Range of the values tested for the start of the peg. A rigid world ignores all other conditions.
 START = {name: (min(values["full"]), max(values["full"]))
          for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))}  # fmt: skip
 BY_DECADES = ("approach_velocity",)

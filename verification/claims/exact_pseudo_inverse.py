@@ -1,6 +1,6 @@
-"""The printed formula (21) without rounding: the Moore-Penrose inverse of a rational Delassus matrix.
+"""The printed formula (21) in rational arithmetic: the Moore-Penrose inverse of a rational Delassus matrix.
 
-W = C R with C the independent columns and R the reduced echelon form; W† = Rᵀ(R Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ.
+W = C R, where C has the independent columns and R is the reduced echelon form; W† = Rᵀ(R Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ.
 Source: Ben-Israel and Greville, Generalized Inverses (2003), theorem 1.5 (MacDuffee).
 """
 
@@ -17,7 +17,7 @@ from reference.exact import rational_matrix
 def pseudo_inverse_velocity(
     mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: Fraction
 ) -> tuple[Fraction, ...]:
-    """v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v, in rationals."""
+    """Return v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v in rational arithmetic."""
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
     rows = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
     inverse = pseudo_inverse(rows * mass.solve(rows.transpose()))

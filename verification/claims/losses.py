@@ -1,4 +1,4 @@
-"""Energy lost in random impacts against the quadratic form of (18) and (24): shared by C01 and C02."""
+"""Compare the energy lost in random impacts with the quadratic form of (18) and (24); C01 and C02 use this."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ RESTITUTIONS = (0.0, 0.5, 0.9, 1.0)
 
 
 def loss_claim(id: str, statement: str, place: str, families: Sequence[Family], impacts: Mapping[str, int]) -> Claim:
-    """Return the claim that the loss is the form, as printed and with the factor ½ that the print lacks."""
+    """Return the claim that the loss equals the quadratic form: as printed, and with the factor ½ missing in print."""
     first = [family for family in families if family.condition_number == families[0].condition_number]
 
     def finding(table: Table) -> str:
@@ -65,7 +65,7 @@ def _gains(batch: Batch) -> Floats:
 
 
 def _shares(batch: Batch) -> Floats:
-    """(1 − e²) of the form, relative to the energy before."""
+    """(1 − e²) times the quadratic form, relative to the energy before the impact."""
     forms = np.array([quadratic_form(case) for case in batch.impacts])
     energy = np.array([kinetic_energy(case.mass_matrix, case.velocity) for case in batch.impacts])
     return np.asarray((1.0 - batch.restitution**2) * forms / energy)
@@ -76,10 +76,10 @@ def _exact(batch: Batch) -> float:
 
 
 def _exact_misfit(instance: ImpactCase, e: Fraction) -> Fraction:
-    """Loss minus ½(1 − e²) vᵀJᵀW†Jv, both without rounding."""
+    """Loss minus ½(1 − e²) vᵀJᵀW†Jv, in rational arithmetic."""
     mass, rows, velocity = instance.arrays
     after = exact_impact(mass, rows, velocity, e)
     plastic = exact_impact(mass, rows, velocity, 0)
-    # e = 0 sends v to v − Pv, so vᵀM(v − v⁺) = vᵀMPv is the form itself: independent of the loss at e.
+    # With e = 0, v⁺ = v − Pv, so vᵀM(v − v⁺) = vᵀMPv is the quadratic form, computed independently of the loss at e.
     form = -sum((Fraction(x) * p for x, p in zip(velocity, plastic.generalized_impulse, strict=True)), Fraction(0))
     return after.energy_before - after.energy_after - (1 - e * e) * form / 2

@@ -1,9 +1,9 @@
-"""Study: runs the scenes that the claims call for, each once, and hands out their traces.
+"""Study: runs each scene that the claims need once, and returns its trace.
 
     check_claims()                              every claim with `reference.worlds.run_world`
     check_claims(run=lambda scene, world, rendering: ...)     with runs from a store
 
-Nothing is written here; whoever wants the runs kept passes a `run` that keeps them.
+This module writes no files. To keep the runs, pass a `run` that stores them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Wanted = tuple[Scene, str, str]
 Ahead = Callable[[Sequence[Wanted]], Iterable[Run | None]]
 Asked = Callable[[Scene, str, str], None]
 
-SEED = 20050601  # of the random instances; the month the paper appeared
+SEED = 20050601  # seed of the random impacts and conditions: the month in which the paper appeared
 
 
 def run_directly(scene: Scene, world: str, rendering: str) -> Run:
@@ -36,14 +36,14 @@ def run_directly(scene: Scene, world: str, rendering: str) -> Run:
 
 @dataclass
 class Study:
-    """What a claim computes with.
+    """The runs, conditions and cached results that the claims use.
 
     run : (scene, world, rendering) -> Run
-    depth : "quick" or "full", how fine the conditions are
-    seed : of the random impacts
-    asked : called whenever a claim uses a run, also one that was made for an earlier claim
-    ahead : makes many runs at once, one per triple in their order; None where one fails, which is then asked of `run`
-    failures : receives the cases that raise; without it their exceptions pass through
+    depth : "quick" or "full"; "full" has more conditions and more impacts
+    seed : seed of the random impacts and of the fresh conditions
+    asked : called whenever a claim uses a run, even if an earlier claim made that run
+    ahead : (scene, world, rendering) triples -> one Run each, in the same order; for a None, `run` is called later
+    failures : receives the cases that raise an exception; if it is None, the exceptions propagate
     """
 
     run: Runner = run_directly
@@ -60,25 +60,25 @@ class Study:
         check_depth(self.depth)
 
     def scene(self, name: str) -> Scene:
-        """A scene that comes with the project."""
+        """Return a scene of the project by name."""
         if name not in self._scenes:
             self._scenes[name] = load_scene(find_scene(name))
         return self._scenes[name]
 
     def starts(self) -> tuple[Condition, ...]:
-        """The starting conditions of the peg at this depth."""
+        """Return the starting conditions of the peg at this depth."""
         return start_conditions(self.depth)
 
     def limited(self) -> tuple[Condition, ...]:
-        """The starting conditions of the peg at this depth, with limits of the device."""
+        """Return the starting conditions of the peg at this depth, with force limits of the device."""
         return limited_conditions(self.depth)
 
     def fresh(self, tested: Sequence[Condition], region: Region, count: int) -> list[Condition]:
-        """Conditions drawn inside a region, between the ends of those tested."""
+        """Return `count` conditions drawn at random inside a region and inside the range of those tested."""
         return drawn(tested, region, self.seed, count)
 
     def trace(self, condition: Condition, world: str, rendering: str = "full") -> Trace:
-        """The peg under a condition in a world, run once for all conditions that this world cannot tell apart."""
+        """Return the trace of the peg; conditions that differ only in values the world ignores share one run."""
         seen = condition.seen_by(world, rendering)
         key = (seen, world, rendering)
         if self.asked is not None:
@@ -89,7 +89,7 @@ class Study:
         return self._traces[key]
 
     def make_ahead(self, conditions: Iterable[Condition], runs: Iterable[tuple[str, str]]) -> None:
-        """Make the runs (world, rendering) of these conditions that are still missing, where there is an `ahead`."""
+        """Make the missing runs (world, rendering) of these conditions with `ahead`; without `ahead` do nothing."""
         if self.ahead is None:
             return
         wanted = [(condition.seen_by(*run), *run) for condition in conditions for run in runs]
@@ -98,22 +98,22 @@ class Study:
         self._traces |= {key: trace_of(run) for key, run in zip(missing, found, strict=True) if run is not None}
 
     def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
-        """What `compute` returns, computed once for each key."""
+        """Return the result of `compute`, which is called only once for each key."""
         if key not in self._results:
             self._results[key] = compute()
         return cast(Result, self._results[key])
 
     def place(self, condition: Condition) -> Scene:
-        """The peg scene under a condition."""
+        """Return the peg scene under a condition."""
         if condition not in self._scenes:
             self._scenes[condition] = condition.place(self.scene("peg_corner"))
         return self._scenes[condition]
 
     @property
     def runs_done(self) -> int:
-        """Simulations asked for so far."""
+        """Number of distinct runs obtained so far."""
         return len(self._traces)
 
     def each(self, cases: Iterable[Case], trials: Callable[[Case], Iterable[Result]]) -> Iterator[Result]:
-        """Yield the trials of each case; a case that raises is among the `failures`, where there is such a list."""
+        """Yield the trials of each case; a case that raises is added to `failures` if that list is given."""
         return of_each(cases, trials, self.failures)
