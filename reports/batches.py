@@ -1,7 +1,7 @@
-"""Work in parts: what is done is not done again, and who does the rest makes no difference to what comes of it.
+"""Work in parts: finished parts are not computed again, and the results do not depend on the scheduler.
 
-Whoever has parts to do knows which are done (`do_missing`), and hands the others to a scheduler: `here`,
-`processes(count)` or `cluster(address)`. Ctrl-C is the parent's, which ends its workers; what was kept stays.
+`do_missing` skips the finished parts and hands the others to a scheduler: `here`, `processes(count)` or
+`cluster(address)`. Only the parent process handles Ctrl-C: it ends its workers. Results kept before that stay.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ def do_missing(
 
     Parameters
     ----------
-    compute : makes the result of a part; in another process, where the scheduler says so
+    compute : makes the result of a part, in this or another process, as the scheduler decides
     keep : called as keep(part, result), in this process
     done : whether the result of a part is kept already
-    progress : called as progress(size done, size in all)
-    size : of a part
+    progress : called as progress(size done, total size)
+    size : returns the size of a part
     """
     every = list(parts)
     missing = [part for part in every if not done(part)]
@@ -66,7 +66,7 @@ def here(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple
 
 
 def processes(workers: int) -> Scheduler:
-    """Compute in `workers` processes of this machine; results come as they are done."""
+    """Compute in `workers` processes of this machine; results come in the order in which they finish."""
 
     def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
         left = iter(parts)
@@ -91,9 +91,9 @@ def cluster(address: str) -> Scheduler:
     Raises
     ------
     MissingDependencyError
-        Without dask.distributed (extra ``cluster``).
+        dask.distributed is not installed (extra ``cluster``).
     ArgumentError
-        Where no scheduler answers.
+        No scheduler answers.
     """
 
     def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
@@ -125,7 +125,7 @@ def _client(address: str) -> Any:
 
 
 def _on_cluster(client: Any, compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
-    """Keep _CLUSTER_AHEAD parts on their way; pure=False: the work writes a file."""
+    """Keep _CLUSTER_AHEAD parts submitted. pure=False, because `compute` writes a file."""
     from distributed import as_completed
 
     left, part_of = iter(parts), dict[str, Any]()
@@ -144,10 +144,11 @@ def _on_cluster(client: Any, compute: Callable[[Any], Any], parts: Iterable[Any]
 
 @contextmanager
 def starting_a_process() -> Iterator[None]:
-    """Keep Ctrl-C from a process that is started inside, for good.
+    """Block SIGINT permanently in every process that is started inside this context.
 
-    A child inherits what its parent's thread has blocked. One that ignored it only once it runs would be hit while
-    it imports: a traceback, and a pool whose lock a dying worker held waits for ever.
+    A child inherits the signals that its parent's thread has blocked. If the child blocked SIGINT only after its
+    start, Ctrl-C could stop it during its imports: it would print a traceback, and if it held the lock of the pool,
+    the pool would wait for ever.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -157,7 +158,7 @@ def starting_a_process() -> Iterator[None]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Starts its workers as they are needed, in `submit`."""
+    """A process pool that starts its workers on demand, in `submit`, with SIGINT blocked."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
         with starting_a_process():
@@ -165,7 +166,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _begin(told: Any, parent: int) -> None:
-    """Initialise a worker, which otherwise would wait for ever for a parent that was killed."""
+    """Initialise a worker; it exits when its parent is gone, instead of waiting for it for ever."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -178,14 +179,14 @@ def _begin(told: Any, parent: int) -> None:
 
 @contextmanager
 def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Give `count` processes that start Python anew; whatever ends this early ends them, at once.
+    """Yield a pool of `count` processes with the start method "spawn"; any exception terminates them at once.
 
-    The first to compile a kernel says so.
+    The first worker that compiles a kernel prints a message.
 
     Raises
     ------
     IapbError
-        A worker was killed, as happens where memory runs out.
+        A worker was killed, for example because memory ran out.
     """
     others, context = set(active_children()), get_context("spawn")
     told = context.Value("b", False)

@@ -1,4 +1,4 @@
-"""Functions of other people's modules, found by ``package.module:function``."""
+"""Import user functions by name, ``package.module:function``."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from iapb.names import nearest
 
 
 def function_named(argument: str, name: str, form: str = "package.module:function") -> Callable[..., Any]:
-    """Import a function; the working directory counts as a place to look.
+    """Import a function; the working directory is searched, too.
 
     Parameters
     ----------
-    argument : what the name was given as, such as ``--resolver``
+    argument : the command-line option that the name was given for, such as ``--resolver``
     name : module, colon, function
-    form : how a name looks, for messages
+    form : the expected form of the name, for error messages
 
     Raises
     ------
     ArgumentError
-        The name has another form, its module cannot be imported, or has no such function.
+        The name has another form, the module cannot be imported, or the module has no such function.
     """
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):

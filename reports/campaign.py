@@ -1,10 +1,10 @@
-"""The laws at length, with their batches on the disk: what was done is not done again, and what broke a law is kept.
+"""The full verification campaign, stored batch by batch: batches are computed once, counterexamples are kept.
 
     out/verify/<key>/impacts-000000000.h5 …      a table per batch: law, cases, failures, worst residual
     out/verify/<key>/counterexamples/…           runs, for `iapb inspect`: impacts (as FCLIB too) and trajectories
 
-The key is a hash of the code, the resolver and the tolerances, so that a changed line starts afresh. A batch is written
-aside and renamed: a killed process leaves whole batches only.
+The key is a hash of the code, the resolver and the tolerances, so that a change of the code starts a new campaign. A
+batch is written to a temporary file and renamed: a killed process leaves complete batches only.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ KEPT_PER_LAW = 1000
 
 
 class Campaign:
-    """Batches of one request in a folder of their own."""
+    """The batches of one request, in their own folder."""
 
     def __init__(self, out: Path, request: CampaignRequest) -> None:
         self.request, self.folder = request, out / request.key()
         mark_store(self.folder)
 
     def path_of(self, batch: Batch) -> Path:
-        """The file of a batch; its size is in the name, for the last one of a part may be short."""
+        """Return the file of a batch. The name contains the batch size, as the last batch of a part may be shorter."""
         return self.folder / f"{batch.part.replace(' ', '_')}-{batch.first:09d}-{batch.count}.h5"
 
     def run(self, batches: Iterable[Batch], progress: Callable[[str, int, int], None]) -> None:
-        """Do the batches that are not there yet, part by part."""
+        """Compute the batches that have no file yet, part by part."""
         parts: dict[str, list[Batch]] = {}
         for batch in batches:
             parts.setdefault(batch.part, []).append(batch)
@@ -54,7 +54,10 @@ class Campaign:
                        progress=partial(progress, part), size=lambda batch: batch.count)  # fmt: skip
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
-        """Counterexamples first: a batch that is there has all of its own, up to KEPT_PER_LAW in the whole folder."""
+        """Write the counterexamples, at most KEPT_PER_LAW per law in the folder, then the table of the batch.
+
+        Because of this order, every batch file has its counterexamples beside it.
+        """
         kept = Counter(path.stem.rsplit("-", 1)[-1] for path in self.counterexamples())
         for found in outcome.found:
             kept[found.law] += 1
@@ -63,7 +66,7 @@ class Campaign:
         write_table(self.path_of(batch), _table(batch, outcome))
 
     def counts(self, batches: Iterable[Batch]) -> dict[str, dict[str, LawCount]]:
-        """Sums over the batches that are there, by part and law."""
+        """Return the counts summed over the stored batches, by part and law."""
         sums: dict[str, dict[str, LawCount]] = {}
         for batch in batches:
             if self.path_of(batch).is_file():
@@ -73,17 +76,17 @@ class Campaign:
         return sums
 
     def seconds(self, batches: Iterable[Batch]) -> float:
-        """Time that all batches took, one after the other [s]."""
+        """Return the sum of the computing times of all batches [s]."""
         paths = [self.path_of(batch) for batch in batches]
         return sum(float(read_table(path)["seconds"][0]) for path in paths if path.is_file())
 
     def counterexamples(self) -> list[Path]:
-        """Files of what broke a law."""
+        """Return the files of all counterexamples."""
         return sorted((self.folder / "counterexamples").glob("*.h5"))
 
 
 def outcome_of(request: CampaignRequest, batch: Batch) -> BatchOutcome:
-    """Do one batch; in a process of its own it finds its resolver by name."""
+    """Compute one batch. The resolver is imported by its name, so this also works in a worker process."""
     return do_batch(batch, request.subject())
 
 

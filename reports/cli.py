@@ -1,4 +1,4 @@
-"""The command `iapb`: every command is one file in reports/commands and one entry here."""
+"""The command `iapb`: each subcommand is one file in reports/commands and one entry here."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _not_given() -> None:
 
 
 def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn Ctrl-C into Abort, which typer hands on to `main`; by itself it would end with 130 and say nothing."""
+    """Turn KeyboardInterrupt into typer.Abort, which reaches `main`; typer itself would exit with 130 silently."""
 
     @wraps(command)
     def call(*arguments: Any, **options: Any) -> Any:
@@ -105,12 +105,12 @@ _BARS = re.compile(r"(\x1b\[(?:[0-9;]*m|[0-9]*[ABK]|\?25[hl])|\r)")
 
 
 class Harmless:
-    """A stream on which no text of a file can give the terminal orders: those are spelled out, as ``\\x1b``.
+    """A text stream that escapes terminal control sequences, as ``\\x1b``, so that file contents cannot trigger them.
 
     Parameters
     ----------
-    stream : a stream of texts
-    kept : orders that pass where the stream is a terminal; it matches them as one group
+    stream : the text stream to write to
+    kept : matches, as one group, the control sequences that pass unchanged if the stream is a terminal
     """
 
     def __init__(self, stream: Any, kept: re.Pattern[str]) -> None:
@@ -127,7 +127,7 @@ class Harmless:
 
 
 def harmless(text: str) -> str:
-    """Return a text with every order to a terminal spelled out."""
+    """Return a text in which every terminal control character is escaped."""
     return _ORDERS.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
@@ -163,7 +163,7 @@ STOPPED = "stopped; files that were complete stay"
 
 
 def _failed(given: list[str], status: int, sentence: str) -> int:
-    """Print an error, with --json also as an object on standard output; return the status."""
+    """Print an error and return the status. With --json, also print it as an object on standard output."""
     print(f"iapb: {harmless(sentence)}", file=sys.stderr)
     _as_json(given, status, sentence)
     return status
@@ -175,15 +175,15 @@ def _as_json(given: list[str], status: int, sentence: str) -> None:
 
 
 def _end_politely(*_: object) -> None:
-    """SIGTERM, as of a batch system or a time limit, counts as Ctrl-C: files are kept. In the background, where a shell
-    ignores Ctrl-C, it does too."""
+    """Handle SIGTERM (from a batch system or a time limit) like Ctrl-C, so that finished files are kept. This also
+    works in a background job, where the shell makes the process ignore SIGINT."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         raise KeyboardInterrupt
     signal.raise_signal(signal.SIGINT)
 
 
 def _refuse_empty(arguments: list[str]) -> None:
-    """Refuse an empty value, as a shell makes of a variable that is not set: as a path it would be this folder."""
+    """Refuse empty values: a shell makes one of an unset variable, and as a path it would mean this folder."""
     for i, text in enumerate(arguments):
         before = arguments[i - 1] if i and arguments[i - 1].startswith("--") else f"argument {i + 1}"
         name = before if not text else text[:-1]
@@ -192,16 +192,17 @@ def _refuse_empty(arguments: list[str]) -> None:
 
 
 def _sentence(error: IapbError | OSError) -> str:
-    """What went wrong; an error of the system as "file: why", without its number."""
+    """Return the message of an error; for an OSError "file: reason", without the error number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror}"
     return str(error)
 
 
 def _usage(given: list[str], error: Exception) -> int:
-    """Print a mistake in the command line and return its status; anything else is a fault of ours.
+    """Print a usage error and return its status; raise any other error again, because it is a bug.
 
-    Such a mistake is known by its `show` and `exit_code`: typer brings a click of its own, or uses the one installed.
+    Usage errors are recognised by their attributes `show` and `exit_code`, not by their class: typer uses either its
+    own copy of click or the installed one.
     """
     if isinstance(error, typer.Abort):
         return _failed(given, 130, STOPPED)

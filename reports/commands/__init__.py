@@ -1,1 +1,1 @@
-"""The commands of `iapb`, one file each; heavy imports wait inside the functions, so that --help is instant."""
+"""The commands of `iapb`, one file each. Slow imports are inside the functions, so that --help answers at once."""

@@ -1,4 +1,4 @@
-"""The option `--json`: one JSON object on standard output in place of sentences; exit statuses stay as they are."""
+"""The option `--json` prints one JSON object on standard output instead of sentences; exit statuses do not change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 
 @contextmanager
 def facts_of(json_: bool) -> Iterator[dict[str, Any]]:
-    """Yield a record to fill. With --json it is printed at the end, and sentences go to standard error meanwhile."""
+    """Yield a dictionary to fill. With --json it is printed at the end; until then, sentences go to standard error."""
     facts: dict[str, Any] = {}
     if not json_:
         yield facts
@@ -35,7 +35,7 @@ def facts_of(json_: bool) -> Iterator[dict[str, Any]]:
 
 
 def print_json(value: Any) -> None:
-    """Print a value as JSON: records by their fields, arrays as lists, what JSON has no number for as null."""
+    """Print a value as JSON: dataclasses by their fields, arrays as lists, NaN and infinity as null."""
     print(json.dumps(_plain(value), indent=1, ensure_ascii=False, allow_nan=False))
 
 

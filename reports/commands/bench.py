@@ -1,4 +1,4 @@
-"""`iapb bench`: what accuracy costs in time, and every ratio that was asked for, all within one run."""
+"""`iapb bench`: accuracy against computing time, and speed ratios, all measured in one run."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 def seconds_of(text: str) -> float:
-    """A time with its unit, such as 50us or 0.5ms."""
+    """Return a time given with its unit, such as 50us or 0.5ms, in seconds."""
     found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ns|us|µs|ms|s)\s*", text)
     try:
         return float(found[1]) * UNITS[found[2]]  # type: ignore[index]
@@ -86,7 +86,7 @@ def seconds_of(text: str) -> float:
 
 
 def _answer(budget: float, contacts: int, coordinates: int, facts: dict[str, Any]) -> None:
-    """The answer in one sentence per way of calling, and where it was measured."""
+    """Print the recommended method in one sentence for each way of calling, and the machine of the measurement."""
     found = which_method(budget, contacts, coordinates)
     facts.update(processor=processor(), choices=found)
     for choice in found:

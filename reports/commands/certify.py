@@ -1,4 +1,4 @@
-"""`iapb certify RUN…`: every recorded impact judged exactly: did it gain energy, do impulse and velocity fit?"""
+"""`iapb certify RUN…`: check every recorded impact exactly, for energy gain and for consistent impulse and velocity."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def certify(
 
 
 def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
-    """Certify the files and write their impacts to `export`, which stays as it was where one cannot be read."""
+    """Certify the files and write their impacts to `export`; if a file cannot be read, `export` is not changed."""
     if export.exists() and (not export.is_file() or any(path.exists() and path.samefile(export) for path in paths)):
         raise ArgumentError("--export", str(export), "a file of its own, none of those that are certified")
     with written_aside(export.resolve(), replace=True) as aside, aside.open("w", encoding="utf-8") as target:
@@ -55,7 +55,7 @@ def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
 
 
 def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:
-    """What is certified of each file, with its residuals and how it was decided, and the first gain."""
+    """Print the certificate of each file: its residuals, how it was decided, and the first energy gain."""
     for path, one in found.items():
         print(f"{path}: {one.words()}")
         residuals = {"M(v⁺ − v⁻) − impulse": one.momentum, "impulse − Jᵀp": one.span,
@@ -75,7 +75,7 @@ def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:
 
 
 def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:
-    """Return the certificate of a run file, or of an archive of impacts of any engine; `export` takes its impacts."""
+    """Return the certificate of a run file or of an impact archive of any engine; write its impacts to `export`."""
     if path.suffix != ".npz":
         run = read_run(path)
         certificate, lines = certify_run(run), exported_run(run)

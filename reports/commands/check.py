@@ -1,4 +1,4 @@
-"""`iapb check SCENE`: what would make a run of the scene worthless, before it is run."""
+"""`iapb check SCENE`: find problems that would make a run of the scene worthless, before the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`iapb compare`: a scene in several worlds; or IAPB beside complementarity on impacts, scenes and problem files."""
+"""`iapb compare`: a scene in several worlds, or IAPB against complementarity on impacts, scenes and problem files."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _require_problems(folder: Path) -> None:
 
 
 def _export(folder: Path) -> int:
-    """Write the problems that the study always has, one file each."""
+    """Write the built-in problems of the study, one file each."""
     problems = [stored.problem for stored in own_problems()]
     for problem in problems:
         title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII
@@ -133,7 +133,7 @@ def _problems_alone(folders: Iterable[Path], progress: Any) -> tuple[Finding, li
 
 
 def _keep(found: Finding, place: Path, figure: str) -> None:
-    """Store the results, and the figure beside them."""
+    """Store the results and, in the same folder, the figure."""
     place.parent.mkdir(parents=True, exist_ok=True)
     if place.suffix == ".json":
         place.write_text(json.dumps(plain_finding(found), ensure_ascii=False), encoding="utf-8")
@@ -148,7 +148,7 @@ def _keep(found: Finding, place: Path, figure: str) -> None:
 
 
 def plain_finding(found: Finding) -> dict[str, Any]:
-    """Return what was found as JSON has it: texts, numbers and tables; null where a number is not finite."""
+    """Return a finding as plain JSON values: texts, numbers and tables; null for a number that is not finite."""
     parts = [{"name": part.name, "verdict": part.verdict, "sentence": part.sentence} for part in found.parts]
     tables = {name: {"columns": list(table.titles), "rows": [[_cell(value) for value in row] for row in table.cells]}
               for name, table in found.tables.items()}  # fmt: skip
@@ -179,7 +179,7 @@ def _print(found: Finding, lines: Sequence[str], place: Path, figure: str) -> No
 
 
 def _scene_lines(found: Finding) -> list[str]:
-    """One page: distances, energy and time by world, then what the solvers say of the impacts."""
+    """Return one page of text: distances, energy and time by world, then the results of the solvers on the impacts."""
     table, against = found.tables["worlds"], found.details["against"]
     lines = [found.title, sentence(found.answer)]
     lines += [sentence(f"{row['world']} ignores {row['ignores']}.") for row in table.records() if row["ignores"]]
@@ -205,7 +205,7 @@ def _scene_lines(found: Finding) -> list[str]:
 
 
 def _unsolved(problems: Table) -> list[str]:
-    """Which solver did not solve what, and why, once for each solver and outcome."""
+    """Return one line for each solver and failing outcome: which problems it did not solve, and why."""
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in problems.records():
         if row["outcome"] not in ("solved", "missing"):
@@ -229,7 +229,7 @@ def _study_lines(found: Finding, studies: Sequence[ProblemStudy]) -> list[str]:
 
 
 def _costs(table: Table) -> Table:
-    """A row per kind of impact and size, a column per solver; what was not solved says so."""
+    """Return a table with a row per kind of impact and size and a column per solver; unsolved cells say so."""
     cells: dict[tuple[Any, ...], dict[str, Any]] = {}
     for row in table.records():
         time = row["median"]
@@ -242,7 +242,7 @@ def _costs(table: Table) -> Table:
 
 
 def _problem_lines(study: ProblemStudy) -> list[str]:
-    """Problems with those who did not solve them, by name, and the profile of times."""
+    """Return the problems, each with the names of the solvers that did not solve it, and the profile of times."""
     rows: list[tuple[Any, ...]] = []
     for line in study.lines:
         others = [f"{name} {found}" for name, found in line.verdicts if found in ("refused", "failed")]

@@ -1,4 +1,4 @@
-"""`iapb effects SCENE`: which effects a scene calls for, why, and what leaving one out would change."""
+"""`iapb effects SCENE`: list which effects a scene needs, why, and what leaving one out would change."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def effects(
 
 
 def _measure(source: Any, world: str, json_: bool) -> None:
-    """A table of what each effect costs and changes, and which ones give least error for the time they save."""
+    """Print the cost and the influence of each effect, and for which no other saves more time at no larger error."""
     if world not in ("IAPB", "PB"):
         raise ArgumentError("world", world, "IAPB or PB with --measure: the worlds of the compiled engine")
     with stage_progress() as progress:

@@ -1,4 +1,4 @@
-"""`iapb inspect FILE`: what a run file holds, from the file alone: a simulation, or an impact that broke a law."""
+"""`iapb inspect FILE`: describe a run file (a simulation, or an impact that broke a law) from its contents alone."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def inspect(
 
 
 def _as_json(run: Run, count: int) -> dict[str, Any]:
-    """The run, its first impacts, its energy at the end and its effects."""
+    """Return the run, its first impacts, its energy at the end and its effects as plain values."""
     table = run.impacts
     names = ("rows", "rank", "energy_lost", "scale", "clamp", "approaching")
     listed = [{"time": run.time[table.step[i]]} | {name: getattr(table, name)[i] for name in names}
@@ -77,7 +77,7 @@ def _list_impacts(run: object, count: int) -> None:
 
 
 def describe_impact(broken: BrokenImpact, file: Path) -> None:
-    """Say which law was broken, by what, how it was found, and give the test to paste."""
+    """Print which law was broken, by which resolver, how it was found, and a test to paste."""
     case = broken.struck.case
     print(f"An impact of {broken.resolver} that breaks a law, {broken.law}: {broken.statement}.")
     print(f"Residual {broken.value:.6g}, allowed {broken.tolerance:.6g}.")

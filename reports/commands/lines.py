@@ -15,13 +15,13 @@ _BETWEEN = "  "
 
 
 def sentence(text: str, mark: str = "") -> str:
-    """Return a sentence wrapped, its further lines indented as far as the mark is long."""
+    """Return a wrapped sentence after its mark; the following lines are indented by the length of the mark."""
     return textwrap.fill(text, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark), break_on_hyphens=False,
                          break_long_words=False)  # fmt: skip
 
 
 def table_lines(table: Table, keys: int = 1) -> list[str]:
-    """Return a table as lines; one that is too wide goes on below, its first `keys` columns repeated."""
+    """Return a table as lines. A table that is too wide continues below, with its first `keys` columns repeated."""
     columns = [[_unit_whole(title), *(_text(row[k], table.digits) for row in table.cells)]
                for k, title in enumerate(table.titles)]  # fmt: skip
     kept = [column for k, column in enumerate(columns) if k < keys or any(cell != "-" for cell in column[1:])]
@@ -33,7 +33,7 @@ def table_lines(table: Table, keys: int = 1) -> list[str]:
 
 
 def _unit_whole(title: str) -> str:
-    """A heading whose unit is not broken."""
+    """Return a heading whose unit cannot be split by a line break."""
     return re.sub(r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
 
 
@@ -46,7 +46,7 @@ def _text(value: Any, digits: int) -> str:
 
 
 def _wrapped(column: Sequence[str]) -> list[list[str]]:
-    """Each cell as lines; a heading is no wider than its longest word or the widest cell."""
+    """Return each cell as lines; a heading is at most as wide as its longest word or the widest cell."""
     cells = [textwrap.wrap(cell, _WIDEST) or [""] for cell in column[1:]]
     widest = max([len(line) for cell in cells for line in cell] + [len(word) for word in column[0].split()], default=1)
     return [textwrap.wrap(column[0], max(widest, 1)), *cells]

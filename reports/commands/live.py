@@ -1,4 +1,4 @@
-"""`iapb live SCENE`: simulate a scene in real time, with a device, a mouse and eyes on it."""
+"""`iapb live SCENE`: simulate a scene in real time, with a device, a mouse and a viewer."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def live(
 
 
 def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, log: RunLog, to: TextIO) -> str:
-    """Do the ticks, with a viewer where there is a port for it, said to a stream; return what stopped them."""
+    """Run the ticks and return what stopped them. With a `port`, start a viewer and print its address to `to`."""
     rows = calibrated(simulation, simulation.system.dt) if budget else None
     length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
     if port is None:
@@ -93,7 +93,7 @@ def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, lo
 
 
 def describe(pace: Pace) -> None:
-    """Say in sentences how the loop kept to the clock."""
+    """Print in sentences how well the loop kept its deadlines."""
     print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
     for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
         half, ninety, hundredth, thousandth, worst = map(duration, times)

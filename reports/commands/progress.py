@@ -1,4 +1,4 @@
-"""How far a long piece of work is: bars on a terminal, plain lines in a log; and a word when kernels are compiled."""
+"""Progress of long work: bars on a terminal, plain lines in a log, and a message when kernels are compiled."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def step_progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show which stage is at work and how far it is: progress(stage, done, total)."""
+    """Show which stage is running and how far it is: progress(stage, done, total)."""
     with _shown() as progress:
         yield progress
 
 
 @contextmanager
 def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, int, int], None]]:
-    """Show stages; one that has `begun` before its first report is shown at once on a terminal."""
+    """Show the progress of stages; on a terminal, the stage `begun` is shown before its first report."""
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:
         with compiling_told(to_stderr), _reminded(StageLog(to_stderr, begun)) as log:
@@ -60,7 +60,7 @@ def _bars(console: Any, transient: bool) -> Progress:
 
 
 class _Number(ProgressColumn):
-    """How many are done of how many, as soon as that is known."""
+    """A progress column with the numbers "done" and "total", once the total is known."""
 
     def render(self, task: Any) -> Text:
         """Return the text beside the bar."""
@@ -68,26 +68,26 @@ class _Number(ProgressColumn):
 
 
 class StageLog:
-    """Progress as lines: one as a stage begins, and one for each reminder that finds it still at work.
+    """Progress as lines: one when a stage begins, and one for each reminder while the stage is still running.
 
     Parameters
     ----------
     write : takes a line
-    begun : a stage that has been told of already
+    begun : a stage that has been announced already
     """
     def __init__(self, write: Callable[[str], None], begun: str = "") -> None:
         self._write, self._stages, self._start = write, {begun}, time.monotonic()
         self._now, self._reminded = ("", 0, 0), ""
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Take note of how far a stage is."""
+        """Record how far a stage is."""
         self._now = (stage, done, total)
         if stage not in self._stages:
             self._stages.add(stage)
             self._write(f"{stage} ...")
 
     def remind(self) -> None:
-        """Say how far the work is, unless its stage has begun since the last time or is done."""
+        """Print how far the work is, unless its stage is done or was not the current one at the last reminder."""
         stage, done, total = self._now
         if stage == self._reminded and done < total:
             self._write(f"{stage}: {done:,} of {total:,} after {(time.monotonic() - self._start) / 60.0:.1f} min")
@@ -96,7 +96,7 @@ class StageLog:
 
 @contextmanager
 def _reminded(log: StageLog) -> Iterator[StageLog]:
-    """Remind a log every SILENCE from a thread of its own: a single step of the work may take minutes."""
+    """Call `remind` every SILENCE seconds from a separate thread, because a single step may take minutes."""
     over = Event()
 
     def remind() -> None:

@@ -1,4 +1,4 @@
-"""`iapb prove [NAME]`: check the proofs, or print one so that it can be followed without the code."""
+"""`iapb prove [NAME]`: check all proofs, or print one so that a reader can follow it without the code."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _failed(theorem: Theorem) -> bool:
 
 
 def _print_json(names: Sequence[str], second_tool: bool, asked: Sequence[Theorem]) -> None:
-    """Print verdicts, and what Coq says; end with 1 where one is not proved or refused."""
+    """Print the verdicts and the answers of Coq; end with 1 if a statement is not proved or Coq refuses one."""
     records = [check(name) for name in names]
     opinions = [second_opinion(load(name)) for name in names if second_tool and name in CERTIFIED]
     print_json({"statements": [{"name": one.name, "title": one.title, "verdict": one.verdict, "seconds": one.seconds}
@@ -69,7 +69,7 @@ def _print_json(names: Sequence[str], second_tool: bool, asked: Sequence[Theorem
 
 
 def _ask_second_tool(names: tuple[str, ...]) -> None:
-    """Print what Coq says of each statement; end with 1 if it refuses one."""
+    """Print the answer of Coq to each statement; end with 1 if Coq refuses one."""
     opinions = []
     for name in names:
         opinions.append(opinion := second_opinion(load(name)))

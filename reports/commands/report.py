@@ -52,7 +52,7 @@ def report(
 
 
 def print_difference(found: Difference, tolerance: float) -> None:
-    """Print a table by part of the report, what differs most, and the sentences."""
+    """Print a table by part of the report, the largest differences, and a summary in sentences."""
     by_part = Table("part", *(name for name, _ in PARTS), title="Table and words by part of the report")
     by_part.columns[0].no_wrap, by_part.columns[0].min_width = True, 15
     for row in parts(found):

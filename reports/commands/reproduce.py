@@ -57,7 +57,7 @@ def reproduce(
 
 
 def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
-    """Compute all evidence, or read what is there; write the report and what goes beside it; say the verdicts."""
+    """Compute all evidence or read stored results, write the report and its companion files, print the verdicts."""
     started = time.perf_counter()
     took: dict[str, float] = {}
     with stage_progress() as progress:
@@ -95,7 +95,7 @@ def print_contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]
 
 
 def _end_where_something_failed(failed: Sequence[FailedCases], facts: dict[str, Any]) -> None:
-    """The last lines: what was not computed, why, and where the tracebacks are; then the command ends with 1."""
+    """If cases failed, print which, why, and where their tracebacks are, and end the command with status 1."""
     facts["failed"] = failed
     if not failed:
         return
@@ -111,7 +111,7 @@ def _end_where_something_failed(failed: Sequence[FailedCases], facts: dict[str, 
 
 
 def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) -> Callable[[str, int, int], None]:
-    """Progress that adds up in `took` how long each stage is at work: stages come one after the other."""
+    """Return a progress function that also adds up the time of each stage in `took`; stages run one after the other."""
     last = time.perf_counter()
 
     def timed(stage: str, done: int, total: int) -> None:
@@ -126,8 +126,8 @@ def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) ->
 def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     """Compute everything again, at the report's depth, into `out` or a temporary folder, and compare.
 
-    Runs must be the same to the last bit where code, packages and processor are; elsewhere numbers must agree within
-    the tolerance. Ends with 1 where they do not, or where the report has numbers that were not made again.
+    With the same code, packages and processor, runs must agree to the last bit; otherwise numbers must agree within
+    the tolerance. Ends with 1 if they do not, or if numbers of the report were not computed again.
     """
     given = read_numbers(report)
     if out is not None and out.exists() and any(out.iterdir()):
@@ -151,7 +151,7 @@ def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
 
 
 def _write_figure(key: str, out: Path, depth: str, facts: dict[str, Any]) -> None:
-    """Write a figure's panels, and all of them with their legend in one file; compute only what it needs."""
+    """Write each panel of a figure, and all panels with the legend in one file; compute only the needed inputs."""
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         raise ArgumentError("--figure", key, one_of(key, recipes))
@@ -169,7 +169,7 @@ def _write_figure(key: str, out: Path, depth: str, facts: dict[str, Any]) -> Non
 
 
 def _inputs(needs: tuple[str, ...], out: Path, depth: str) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
-    """What a figure asks for: a few runs and scenes, or else all evidence, and what of that failed."""
+    """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice, compute all evidence."""
     if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
         with stage_progress() as progress:
             evidence = gather(out, depth, progress)

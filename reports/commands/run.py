@@ -87,7 +87,7 @@ def run(
 
 
 def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
-    """Say what a rigid world will take, where that is long; and whether it refuses. Nothing of other laws."""
+    """Return a warning if a rigid world will take long, and whether it refuses the scene; "" for other laws."""
     if not isinstance(law, RigidConstraints):
         return "", False
     cost, steps = cost_of(System(scene)), scene.steps
@@ -118,7 +118,7 @@ def _tell(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> No
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
-    """What happened, as plain values."""
+    """Return the summary of a run as plain values."""
     return {
         "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling, "steps": run.steps,
         "dt": run.dt, "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
@@ -129,7 +129,7 @@ def run_as_json(run: Run) -> dict[str, Any]:
 
 
 def deepest(run: Run) -> float:
-    """Deepest penetration [m]; the gaps may be in the run's file."""
+    """Return the deepest penetration [m]; the gaps may be in memory or in the run's file."""
     return max(0.0, *(-float(block.min(initial=0.0)) for block in blocks(run.contacts.gap)))
 
 
@@ -137,7 +137,7 @@ SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
 
 
 def describe(run: Run, existed: bool) -> None:
-    """Say in sentences what happened; the arrays may still be in the run's file."""
+    """Print a summary of a run in sentences; the arrays may be in memory or in the run's file."""
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     ignored = ignored_fields(run.effects)
@@ -163,7 +163,7 @@ def describe(run: Run, existed: bool) -> None:
 
 
 def _end_of(run: Run) -> str:
-    """The last coordinates in words: the hand's tool where there are many, else the first of them."""
+    """Return the last coordinates in words: those of the hand's tool if there are many, else the first ones."""
     count = len(run.coordinate_names)
     start, stop = run.tool_coordinates
     shown = range(count) if count <= SHOWN_COORDINATES else range(start, stop) or range(SHOWN_COORDINATES)
@@ -173,7 +173,7 @@ def _end_of(run: Run) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Say a time in the unit that suits it."""
+    """Return a time as text in a suitable unit."""
     for unit, factor in (("s", 1.0), ("ms", 1e3)):
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.3g} {unit}"
@@ -181,5 +181,5 @@ def duration(seconds: float) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """Say a number of things: "1 collision", "2 collisions"."""
+    """Return a count with its noun: "1 collision", "2 collisions"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

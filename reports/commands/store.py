@@ -1,4 +1,4 @@
-"""`iapb store ACTION`: are the results whole, what can go, and do they come out the same again?"""
+"""`iapb store ACTION`: check stored results, remove files that are not needed, and simulate runs again."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from reports.streaming import logs_of_killed, recover
 
 
 class Action(StrEnum):
-    """What to do with a folder of results."""
+    """The action on a folder of results."""
     check = "check"
     repair = "repair"
     gc = "gc"
@@ -99,7 +99,7 @@ def _repair(where: Path, json_: bool) -> None:
 
 
 def _recovered(log: Path) -> Iterator[str]:
-    """Make what is whole in a log readable, and say so."""
+    """Store the complete steps of a log as a readable run, and yield a sentence about it."""
     try:
         if not is_live(log):
             yield f"{recover(log)}: what a killed run did; iapb run --resume goes on"
@@ -172,7 +172,7 @@ def _again(where: Path, json_: bool) -> None:
 
 
 def _tell_again(path: Path, found: Repetition | str) -> None:
-    """Say what differs in a run that was simulated again, and by how much."""
+    """Print what differs in a run that was simulated again, and by how much."""
     if isinstance(found, str):
         print(f"{path}: {found}")
         return

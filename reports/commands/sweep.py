@@ -1,4 +1,4 @@
-"""`iapb sweep STUDY`: one scene, many values; resumable, on this machine or on a cluster."""
+"""`iapb sweep STUDY`: simulate one scene for many values, on this machine or on a cluster; a sweep can be resumed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`iapb verify`: the passivity kit on an impact resolver; `--full`: every law at length; `--simulator`: an engine."""
+"""`iapb verify`: test an impact resolver (`--full`: with the full campaign) or an engine (`--simulator`)."""
 
 from __future__ import annotations
 
@@ -93,7 +93,10 @@ def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | No
 
 def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path,
                 facts: dict[str, Any]) -> bool:
-    """Do what is missing, print a line per law; return whether all are kept. Another's resolver: impacts only."""
+    """Compute the missing batches, print a line per law, and return whether all laws hold.
+
+    A resolver other than the engine's is tested on impacts only.
+    """
     ours = resolver == ENGINE
     bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
     request = CampaignRequest(resolver, bounds, condition, impacts, trajectories, seed, workers)
@@ -134,14 +137,14 @@ def _print_counts(campaign: Campaign, batches: tuple[object, ...]) -> bool:
 
 
 def count_in_words(count: LawCount) -> str:
-    """Return how many broke a law, of how many, and the worst as a share of its tolerance."""
+    """Return as text how many of the cases broke a law, and the worst residual as a share of its tolerance."""
     worst = count.worst
     nearest = "" if worst is None else f", worst {worst.value:.2e} of {worst.tolerance:.2e} ({worst.ratio:.3f} of it)"
     return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
 
 
 def print_recheck(path: Path, allow_code: bool, facts: dict[str, Any]) -> bool:
-    """Print every residual of a stored counterexample; return whether all laws are kept now."""
+    """Print every residual of a stored counterexample; return whether all laws hold now."""
     kept = True
     with compiling_told(to_stderr):
         judged = tuple(recheck(path, allow_code))
@@ -154,7 +157,7 @@ def print_recheck(path: Path, allow_code: bool, facts: dict[str, Any]) -> bool:
 
 
 def verify_simulators(simulators: Sequence[str], scenes: Sequence[str], json_: bool = False) -> None:
-    """Run the scenes and print what came of them; `all` names every engine.
+    """Run the scenes in the simulators and print the results; `all` stands for every engine.
 
     Raises
     ------
