@@ -1,8 +1,8 @@
 """Shapes of a scene and the arrays that the narrow phase reads and writes.
 
-Three planar shapes: half-plane, circle and convex polygon (a box is a polygon); three spatial ones: half-space,
-sphere and box. Every shape belongs to a body and is written in that
-body's frame; body -1 is the static world and its frame the world frame.
+The planar shapes are half-plane, circle and convex polygon (a planar box is a polygon); the spatial shapes are
+half-space, sphere and box. Every shape belongs to a body and is given in the frame of that body. Body -1 is the
+static world; its frame is the world frame.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ WORLD = -1  # the body index of the static world
 
 # Largest number of contacts of one pair: a face on a face keeps four, a box on a half-space has eight corners.
 BOX_PAIR_CONTACTS, BOX_CORNERS = 4, 8
-# While a face is clipped, all corners of the overlap stand in the buffer for a moment.
+# Extra rows of the buffer: clipping a face writes all corners of the overlap before it keeps four.
 CLIPPING_ROOM = 24
-# Scenes with many shapes cannot have all pairs touch at once: this many contacts per shape are six neighbours on
-# whole faces. Up to `SMALL_CAPACITY` contacts every pair keeps its place, whatever happens.
+# In a scene with many shapes not all pairs can touch at once: `CONTACTS_PER_SHAPE` is six neighbours with four
+# contacts each. Up to `SMALL_CAPACITY` contacts the buffer has room for the contacts of every pair.
 CONTACTS_PER_SHAPE, SMALL_CAPACITY = 24, 4096
 
 # A polygon counts as convex when no corner turns inwards by more than this [rad]: vertices typed with six
@@ -55,9 +55,9 @@ class Shapes(NamedTuple):
 
 
 class ContactBuffer(NamedTuple):
-    """Contacts of one step in arrays of a fixed capacity c; the caller keeps how many rows are in use.
+    """Contacts of one step in arrays of a fixed capacity c; the caller keeps the number of rows in use.
 
-    Filled by `detect`: the geometry. Filled by the contact-set kernels: what follows `gap`.
+    `detect` writes the geometry, up to `gap`. Later kernels of the step write the fields after `gap`.
     """
 
     shape_a: Integers  # (c,)
@@ -143,11 +143,11 @@ def make_shapes(descriptions: Sequence[Shape]) -> Shapes:
 
 
 def candidate_pairs(shapes: Shapes, may_touch: Callable[[int, int], bool] | None = None) -> Integers:
-    """Return the pairs (k, 2) of shape indices to test: bodies differ, shape a moves, a half-plane or half-space is b.
+    """Return the pairs (k, 2) of shape indices (a, b) to test.
 
-    `may_touch(body_a, body_b)` leaves out pairs of bodies (links joined to each other, for instance).
-    Between two moving bodies a is the one with the smaller body index, so that the contacts of one pair of
-    bodies agree about the direction of their normals.
+    The bodies of a pair differ, shape a moves, and a half-plane or half-space is always b. Pairs of bodies for which
+    `may_touch(body_a, body_b)` is False are left out (for instance links joined to each other). Otherwise, of two
+    moving bodies the one with the smaller index is a, so that all contacts of two bodies have normals of equal sense.
     """
     pairs = []
     for i in range(len(shapes.kind)):
@@ -178,7 +178,8 @@ def make_contact_buffer(capacity: int) -> ContactBuffer:
 def contact_capacity(shapes: Shapes, pairs: Integers) -> int:
     """Return a capacity that `detect` does not exceed for these pairs (at least 1).
 
-    Up to SMALL_CAPACITY that is certain; beyond, it holds while shapes do not lie in heaps inside each other.
+    Up to SMALL_CAPACITY contacts this is certain. Above, the capacity is CONTACTS_PER_SHAPE contacts per shape, which
+    is enough unless many shapes overlap one another.
     """
     total = sum(_most_contacts(shapes, int(a), int(b)) for a, b in pairs)
     if total > SMALL_CAPACITY:
@@ -227,7 +228,7 @@ def _vertex_block(name: str, shape: Shape) -> Floats:
 
 
 def _convex_vertices(name: str, vertices: ArrayLike) -> Floats:
-    """Return the vertices counterclockwise, or raise when they are no convex polygon."""
+    """Return the vertices counterclockwise, or raise if they do not form a convex polygon."""
     corners = np.asarray(vertices, np.float64)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.all(np.isfinite(corners)):
         raise ArgumentError(name, vertices, "an array (k, 2) of finite numbers, k >= 3")
@@ -254,7 +255,7 @@ def _plane_vector(name: str, value: ArrayLike) -> Floats:
 
 # Spatial shapes: half-space, sphere and box, each in the frame of its body. All lengths in metres.
 
-# Axes typed with nine digits still are a rotation.
+# Axes given with nine digits count as a rotation.
 ROTATION_TOLERANCE = 1e-8
 
 @dataclass(frozen=True)
@@ -295,7 +296,7 @@ def make_spatial_shapes(descriptions: Sequence[SpatialShape]) -> Shapes:
     Raises
     ------
     ArgumentError
-        A radius, side or normal of length 0, axes that are no rotation, values that are not finite.
+        A radius, side or normal of length 0, axes that do not form a rotation, values that are not finite.
     """
     n = len(descriptions)
     rows = [_row(f"shapes[{i}]", shape) for i, shape in enumerate(descriptions)]
@@ -333,7 +334,7 @@ def _row(name: str, shape: SpatialShape) -> tuple[float, Floats, Floats, Floats]
 
 
 def frame_along(name: str, normal: Floats) -> Floats:
-    """Return right-handed axes (columns) whose third is the direction of `normal`."""
+    """Return right-handed axes (columns); the third axis points along `normal`."""
     largest = float(np.abs(normal).max())
     if largest == 0.0:
         raise ArgumentError(name, normal.tolist(), "a vector longer than 0")

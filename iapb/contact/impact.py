@@ -1,7 +1,7 @@
 """Resolve a simultaneous impact: equations (19)-(21), in the form that stays passive in floating point.
 
 With M = L Lᵀ, u = Lᵀ v and A = J L⁻ᵀ the paper's (21) is u⁺ = u − (1 + e) P u, P the orthogonal projector onto
-the row space of A. `factored` applies P through an orthonormal basis; `gram_pinv` is the printed formula.
+the row space of A. `factored` applies P through an orthonormal basis; `gram_pinv` evaluates the formula as printed.
 """
 
 from __future__ import annotations
@@ -56,19 +56,19 @@ class Impact:
     ----------
     velocity : (d,) generalized velocity v⁺ after the impact [m/s, rad/s].
     generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp [N s, N m s].
-    impulses : (c,) p along the contact normals [N s], positive pushes. Where rows are redundant p is not unique:
-        this is the one of least norm (Poisson's law: the non-negative one found; ``damped``: of least norm in rows
-        scaled by powers of two to like size).
-    rank : rows found independent and used; Poisson's law: contacts that push.
-    energy_change : KE⁺ − KE⁻ [J], of the rounded velocities, evaluated in double-double.
-    energy_interval : (lower, upper) [J]: KE⁺ − KE⁻ in real arithmetic, of M, v⁻ and v⁺ as they are, lies between them.
-        The upper end is never above 0 where the clamp is on.
+    impulses : (c,) p along the contact normals [N s]; a positive value pushes. With redundant rows p is not unique.
+        Poisson's law returns the non-negative p that it found; ``damped`` returns the p of least norm for rows scaled
+        by powers of two to similar size; the other methods return the p of least norm.
+    rank : number of independent rows that were used; for Poisson's law, number of contacts that push.
+    energy_change : KE⁺ − KE⁻ [J] of the rounded velocities, evaluated in double-double arithmetic.
+    energy_interval : (lower, upper) [J], bounds of KE⁺ − KE⁻ in real arithmetic for the given M and v⁻ and the
+        returned v⁺. With the clamp on, the upper bound is never above 0.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
-    status : ``"complete"``; ``"budget"`` when the row budget ended the work early; ``"not solved"`` where Poisson's law
-        left a contact closing, as rows that nearly oppose each other can (the energy does not rise then either);
-        ``"cancelled"`` where no step that gains nothing was found, so that v⁺ = v⁻, or where entries of v are so far
-        apart (2^1000) that the smallest are lost.
-    method, law : the method that computed it, and the restitution law that it obeys.
+    status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not solved"``: a contact still
+        closes after Poisson's law, which nearly opposed rows can cause (the energy does not rise in this case either);
+        ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the entries of v differ
+        by more than 2^1000 in size, so that scaling rounded the smallest.
+    method, law : the method that computed the impact, and its restitution law.
     rows_used : the row budget used (None = unlimited); the same budget reproduces the result exactly.
     """
 
@@ -96,21 +96,21 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     Parameters
     ----------
     mass_matrix : (d, d) symmetric positive definite M (paper: D) [kg, kg m²].
-    contact_jacobian : (c, d) J with one row nᵀJᵢ per contact; n unit, pointing so that J v > 0 separates.
+    contact_jacobian : (c, d) J with one row nᵀJᵢ per contact; n is a unit normal; J v > 0 separates.
         c = 0 and zero, repeated or dependent rows are allowed.
     velocity : (d,) generalized velocity v⁻ before the impact [m/s, rad/s].
-    restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal values obey
+    restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal values use
         Poisson's law by two LCPs (compression, then restitution; contacts only push), which is passive for
-        all of them; equal values obey the scalar rule.
-    method : ``factored`` (default, passive in floating point), ``gram_pinv`` (the paper's (20)-(21) to the
-        letter), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated); ``poisson``:
-        contacts only push, where the others take every row as an equality (Newton's LCP where every row approaches
-        and e in [0, 1] is one).
-    budget : at most this many rows are used, the most violated first (``factored`` only). Passive at any value.
-    clamp : scale Δv so that energy cannot rise by rounding either, in real arithmetic. Default: on for ``factored``,
-        ``damped``, ``svd`` and Poisson's law, off for the two ``gram`` methods.
-    rank_tolerance : rows closer than this to the span of the others (unit rows, kinetic metric) are not used.
-        Default: 1e-10, or 8 d ε κ(L) where rounding of the rows is larger.
+        any such values. Equal values use the scalar rule.
+    method : ``factored`` (default, passive in floating point), ``gram_pinv`` (the paper's (20)-(21) as
+        printed), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated), ``poisson``
+        (contacts only push). All others take every row as an equality. ``poisson`` equals Newton's LCP if every row
+        approaches and e is one number in [0, 1].
+    budget : largest number of rows used, the most violated first (``factored`` only). Every budget is passive.
+    clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic. Default: on for
+        ``factored``, ``damped``, ``svd`` and Poisson's law, off for the two ``gram`` methods.
+    rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric) is not used.
+        Default: 1e-10, or 8 d ε κ(L), the rounding of the rows, where this is larger.
 
     Returns
     -------
@@ -126,10 +126,10 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
 
     Notes
     -----
-    KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2 with its missing ½). In floating point the relative gain of
-    ``factored`` stays below 10 d ε √κ(M): Cholesky's error d ε κ(M) is refined
-    away, then the energy is clamped. With the clamp no impact gains energy, not in the last bit: a v⁺ is accepted only
-    with a bound that shows it, for M as given (`iapb.contact.kernels.passive`).
+    KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2, with the factor ½ that the paper omits). In floating
+    point the relative energy gain of ``factored`` stays below 10 d ε √κ(M): a refinement removes Cholesky's error
+    d ε κ(M), then the energy is clamped. With the clamp no impact gains energy, not even in the last bit: a v⁺ is
+    accepted only if a computed bound proves this for the given M (`iapb.contact.kernels.passive`).
     Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
     given = as_given(mass_matrix, contact_jacobian, velocity, restitution)
@@ -152,13 +152,13 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     return _as_impact(problem, answer, clamped, method=method, law=law, rows_used=rows_used)
 
 
-# How the kernel says that an impact ends.
+# The texts of the kernel's status codes.
 _STATUS = ("complete", "budget", "cancelled")
 
 
 def _factored(given: Given, tolerance: float | None, limit: int, clamped: bool, method: str,
               rows_used: int | None) -> Impact:
-    """(21) through an orthonormal basis of A's row space: checks, scaling, impact and energy in one compiled call."""
+    """Check, scale and resolve by (21) through an orthonormal basis of A's row space, in one compiled call."""
     M, J, v, e, _ = given
     d, c = len(v), len(J)
     v_plus, momentum, impulses = np.empty(d), np.empty(d), np.empty(c)
@@ -173,13 +173,13 @@ def _factored(given: Given, tolerance: float | None, limit: int, clamped: bool, 
 
 @lru_cache(maxsize=8)
 def _scratch(coordinates: int, contacts: int) -> Any:
-    """Scratch that calls share: a kernel holds the interpreter's lock from start to end."""
+    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
     return block(make_border_work(coordinates, contacts))
 
 
 @lru_cache(maxsize=1)
 def _entries() -> tuple[Any, Any]:
-    """The machine code of one impact and of many, entered without numba's look-up of types."""
+    """Return the compiled functions for one impact and for many; calls skip numba's look-up of types."""
     work, e, count = block(make_border_work(1, 1)), np.zeros(1), np.zeros((1, 2), np.int64)
     flat, deep = np.zeros((1, 1)), np.zeros((1, 1, 1))
     one = Entry(whole_impact).taking(flat, flat, e, 0.0, 0.0, 1, True, work, e, e, e)
@@ -213,7 +213,7 @@ class Impacts:
 def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
                     restitution: ArrayLike, *, budget: int | None = None, clamp: bool | None = None,
                     rank_tolerance: float | None = None) -> Impacts:
-    """Resolve n impacts of one size in one call: to the bit what `resolve_impact` with ``factored`` returns for each.
+    """Resolve n impacts of equal size in one call, bit for bit as `resolve_impact` with ``factored`` resolves each.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     contact_jacobians : (n, c, d).
     velocities : (n, d).
     restitution : one number in [−1, 1], or (n,), one per impact.
-    budget, clamp, rank_tolerance : see `resolve_impact`; for all n.
+    budget, clamp, rank_tolerance : see `resolve_impact`; one value for all n impacts.
 
     Returns
     -------
@@ -232,8 +232,8 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     Raises
     ------
     ArgumentError, RangeError
-        As `resolve_impact`, for the first impact that is refused; the index in the argument's name begins with its
-        number: ``mass_matrices[17, 0, 0]``.
+        As `resolve_impact`, for the first invalid impact. The index in the argument's name begins with the number of
+        this impact: ``mass_matrices[17, 0, 0]``.
     """
     M, J, v, e = stacked(mass_matrices, contact_jacobians, velocities, restitution)
     _check_options("factored", budget, rank_tolerance, True)
@@ -257,7 +257,7 @@ def _method(method: Any) -> tuple[Any, bool]:
 
 
 def _limit(budget: int | None, coordinates: int) -> int:
-    """Rows that may be used, as a number that a kernel takes."""
+    """Return the largest number of rows to use, as an integer that fits the kernel."""
     return coordinates if budget is None else min(int(budget), np.iinfo(np.int64).max)
 
 
@@ -280,7 +280,7 @@ def _check_options(method: str, budget: Any, tolerance: Any, equal: bool) -> Non
 
 def _as_impact(problem: ImpactInput, answer: Whitened, clamped: bool, *, method: str, law: str,
                rows_used: int | None) -> Impact:
-    """Undo the power-of-two scaling and report the energy of what is really returned."""
+    """Undo the power-of-two scaling and report the energy change of the returned velocity."""
     found = outcome(problem, answer.v_plus, answer.momentum, answer.impulses, clamped)
     for quantity, array in (("velocity", found.velocity), ("generalized_impulse", found.momentum),
                             ("impulses", found.impulses)):

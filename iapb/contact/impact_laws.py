@@ -1,4 +1,4 @@
-"""Dry friction in the collision response: an extension of (15)-(21) that the paper leaves to the future.
+"""Dry friction in the collision response: an extension of (15)-(21) that the paper leaves to future work.
 
 With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P the projector onto A_n's rows, the change of velocity is split
 into two orthogonal parts,
@@ -6,11 +6,11 @@ into two orthogonal parts,
     Δu = −(1 + e) P u  +  α Bᵀ p_t,      B = A_t (I − P).
 
 The first is the paper's impulse. The second is a tangential impulse *together with the normal impulse that keeps every
-normal velocity at −e γ⁻*: so restitution is met exactly whatever friction does. p_t obeys Coulomb's law with the
-tangential velocity after the impact (stick, or slip against it at |p_t| = μ p_n); α ≤ 1 is the largest factor for
-which the impact gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|², whose root
-is α: Kane and Levinson's gain of Newton's law with friction cannot occur, and where it would not, α = 1 and the
-outcome is Coulomb's.
+normal velocity at −e γ⁻*. Restitution is therefore met exactly, whatever the friction. p_t obeys Coulomb's law with the
+tangential velocity after the impact: stick, or slip with |p_t| = μ p_n against the velocity. α ≤ 1 is the largest
+factor for which the impact gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|²;
+if ΔKE(1) > 0, α is the positive root of ΔKE. This excludes the energy gain that Kane and Levinson found for Newton's
+law with friction. If ΔKE(1) ≤ 0, then α = 1 and the impact obeys Coulomb's law.
 """
 
 from __future__ import annotations
@@ -37,15 +37,16 @@ class FrictionalImpact:
     Attributes
     ----------
     velocity : (d,) v⁺; generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp + Tᵀp_t.
-    impulses : (c,) p along the normals [N s]: non-negative where some non-negative choice gives the motion.
+    impulses : (c,) p along the normals [N s]; non-negative if non-negative impulses can produce the motion.
     tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the others.
     energy_change : KE⁺ − KE⁻ [J]; energy_interval : (lower, upper) that hold it in real arithmetic, upper ≤ 0.
-    friction_share : factor in [0, 1] by which friction was reduced so that no energy is gained and (status
-        ``"reduced"``) every contact stays in its cone; 1 = not at all.
-    clamp : factor of the final clamps against rounding.
-    status : ``"complete"``: p_t obeys Coulomb's law, up to that factor. ``"reduced"``: no p_t that obeys it was found
-        (there may be none). p_t then dissipates most within the friction limits of the frictionless impact; it stays
-        in its cones, and passivity and restitution hold as always. ``"cancelled"``: as in `resolve_impact`.
+    friction_share : factor in [0, 1] that scales friction so that the impact gains no energy and, with status
+        ``"reduced"``, every contact stays in its friction cone; 1 = friction is not reduced.
+    clamp : factor by which the final energy clamps against rounding scaled the change of velocity.
+    status : ``"complete"``: p_t obeys Coulomb's law, up to the factor `friction_share`. ``"reduced"``: no p_t that
+        obeys the law was found (there may be none). p_t then maximizes the dissipation within the friction limits of
+        the frictionless impact. It stays in the friction cones, and passivity and restitution still hold.
+        ``"cancelled"``: as in `resolve_impact`.
     """
 
     velocity: Floats
@@ -64,13 +65,13 @@ def resolve_frictional_impact(
     mass_matrix: ArrayLike, contact_jacobian: ArrayLike, tangents: ArrayLike, velocity: ArrayLike,
     restitution: float, friction: ArrayLike,
 ) -> FrictionalImpact:
-    """Resolve a simultaneous impact with restitution e and Coulomb friction μ; never gains energy.
+    """Resolve a simultaneous impact with restitution e and Coulomb friction μ, without energy gain.
 
     Parameters
     ----------
     mass_matrix : (d, d) symmetric positive definite M.
     contact_jacobian : (c, d) J, unit-normal rows; every row is an equality J v⁺ = −e J v⁻ (see `resolve_impact`).
-    tangents : (c, d) or (c, m, d), m = 1 (planar) or 2 (spatial): unit tangents' rows T of each contact.
+    tangents : (c, d) or (c, m, d), m = 1 (planar) or 2 (spatial): rows T of the unit tangents of each contact.
     velocity : (d,) v⁻.
     restitution : e in [0, 1], one for all contacts.
     friction : μ ≥ 0, one or (c,).
@@ -87,10 +88,10 @@ def resolve_frictional_impact(
 
     Notes
     -----
-    Sources: Coulomb's law at velocity level is Moreau's (1988); the energy gain that this method prevents is Kane and
-    Levinson's (Dynamics, 1985); the splitting into normal and tangential part is ours. At redundant contacts the normal
-    impulses that limit friction are not unique. Here they are non-negative ones near those of least norm, or those of
-    least norm where some contact must pull. Both depend continuously on p_t, so the limits converge
+    Sources: Coulomb's law at velocity level is from Moreau (1988). Kane and Levinson (Dynamics, 1985) found the energy
+    gain that this method prevents. The splitting into normal and tangential part is new here. At redundant contacts the
+    normal impulses that limit friction are not unique. The method takes non-negative impulses near those of least norm,
+    or those of least norm if some contact must pull. Both depend continuously on p_t, so the limits converge
     (`iapb.contact.kernels.impact_friction`).
     """
     given = check_friction(mass_matrix, contact_jacobian, tangents, velocity, restitution, friction)
@@ -111,7 +112,7 @@ def resolve_frictional_impact(
 
 def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses: Floats, p_t: Floats, share: float,
                clamp: float, met: bool) -> FrictionalImpact:
-    """Undo the scaling by powers of two, and refuse what overflows."""
+    """Undo the scaling by powers of two; raise RangeError if a result overflows."""
     problem = given.problem
     out = outcome(problem, v_plus, momentum, np.zeros(problem.contacts), clamped=True)
     scale = np.ldexp(1.0, problem.velocity_exponent) * out.factor
@@ -131,7 +132,7 @@ def _as_impact(given: FrictionInput, v_plus: Floats, momentum: Floats, impulses:
 
 
 class FrictionInput(NamedTuple):
-    """A checked impact with friction: coordinates scaled as in `problem`, rows of unit normals and tangents as given.
+    """A checked impact with friction: the coordinates are scaled as in `problem`, the rows are not scaled.
 
     normals : (c, d); tangents : (c, m, d); restitution in [0, 1]; friction : (c,)
     """
@@ -147,7 +148,7 @@ def check_friction(
     mass_matrix: ArrayLike, contact_jacobian: ArrayLike, tangents: ArrayLike, velocity: ArrayLike,
     restitution: float, friction: ArrayLike,
 ) -> FrictionInput:
-    """Check shapes, ranges and finiteness; raise ArgumentError by name."""
+    """Check shapes, ranges and finiteness; an ArgumentError names the wrong argument."""
     if np.ndim(restitution) != 0:
         raise ArgumentError("restitution", restitution, "one number for all contacts")
     problem = check_input(mass_matrix, contact_jacobian, velocity, restitution)

@@ -1,4 +1,4 @@
-"""The impact as given, checked and scaled by powers of two, and the methods that `resolve_impact` offers on it."""
+"""Checks and power-of-two scaling of an impact, and the methods that `resolve_impact` offers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PLURAL = {"mass_matrix": "mass_matrices", "contact_jacobian": "contact_jacobian
 
 
 class Given(NamedTuple):
-    """An impact as given: real numbers in arrays that fit each other."""
+    """An impact in the caller's units: arrays of real numbers whose shapes agree."""
 
     mass_matrix: Floats  # (d, d)
     contact_jacobian: Floats  # (c, d)
@@ -62,18 +62,18 @@ class ImpactInput:
 
     @property
     def coordinates(self) -> int:
-        """d."""
+        """Number of coordinates d."""
         return len(self.velocity)
 
     @property
     def contacts(self) -> int:
-        """c."""
+        """Number of contacts c."""
         return len(self.contact_jacobian)
 
 
 def check_input(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
                 restitution: ArrayLike) -> ImpactInput:
-    """Check shapes, finiteness, symmetry and definiteness, then scale; raise ArgumentError by name."""
+    """Check shapes, finiteness, symmetry and definiteness, then scale; an ArgumentError names the wrong argument."""
     return scaled(as_given(mass_matrix, contact_jacobian, velocity, restitution))
 
 
@@ -91,18 +91,18 @@ def scaled(given: Given) -> ImpactInput:
 
 
 class Outcome(NamedTuple):
-    """An impact in the caller's units, exactly passive where it is clamped."""
+    """An impact in the caller's units; it is exactly passive if it is clamped."""
 
     velocity: Floats
     momentum: Floats
     impulses: Floats
     energy_change: float
     energy_interval: tuple[float, float]
-    factor: float  # of the impulses: below 1 where rounding in the caller's units needed a further step
+    factor: float  # scales the impulses; below 1 if rounding in the caller's units required a shorter step
 
 
 def outcome(problem: ImpactInput, v_plus: Floats, momentum: Floats, impulses: Floats, clamped: bool) -> Outcome:
-    """Undo the scaling; the last step again where scaling back rounded v⁺ the wrong way."""
+    """Undo the scaling; if the rounding of this raised the energy, clamp the step again."""
     work, given = problem.work, problem.given
     work.v_plus[:], work.momentum[:], work.impulses[:] = v_plus, momentum, impulses
     results = np.empty(problem.coordinates), np.empty(problem.coordinates), np.empty(problem.contacts)
@@ -149,7 +149,7 @@ def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: 
 
 def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = (),
             method: str = "factored") -> ArgumentError | RangeError:
-    """What the kernel found wrong, and where, as an error; `which` : the number of the impact, where there are many."""
+    """Return the error for what the kernel found wrong; `which` : (number of the impact,), if there are several."""
     reason, i, j = wrong
 
     def name(argument: str, *place: int) -> str:
@@ -182,7 +182,7 @@ def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = 
 
 
 def _is_empty(rows: ArrayLike) -> bool:
-    """[] and zeros(0) have no second dimension to check."""
+    """Return whether there are no rows: [] and zeros(0) have no second dimension to check."""
     if type(rows) is np.ndarray and rows.ndim >= 2:
         return False
     given = _real_numbers(rows)
@@ -190,7 +190,7 @@ def _is_empty(rows: ArrayLike) -> bool:
 
 
 def _real_numbers(value: Any) -> NDArray[Any] | None:
-    """The value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
+    """Return the value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
     try:
         given = np.asarray(value)
     except (TypeError, ValueError):
@@ -203,7 +203,7 @@ def _real_numbers(value: Any) -> NDArray[Any] | None:
 
 
 def _array(name: str, value: Any, dimensions: int) -> Floats:
-    """A contiguous array of doubles; not yet checked to be finite."""
+    """Return a contiguous array of doubles, without a check that they are finite."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions and value.flags.carray:
         return value
     given = _real_numbers(value)
@@ -246,20 +246,20 @@ DAMPING = 1e-8  # λ as a share of the largest diagonal entry of W: half of the 
 
 
 class Whitened(NamedTuple):
-    """Answer of one method, in scaled coordinates."""
+    """Result of one method, in scaled coordinates."""
 
     v_plus: Floats
     momentum: Floats
     impulses: Floats
     rank: int
     clamp: float
-    status: str = "complete"  # "budget" where it ended the work with rows left, "not solved" where the law is not met
+    status: str = "complete"  # "budget": rows are left over; "not solved": the law is not met
 
 
 class Method(NamedTuple):
     """A method: its solver (problem, row budget, clamped, tolerance) and whether it clamps by default.
 
-    Without a solver it is (21) in factored form, compiled as a whole (`iapb.contact.kernels.border`).
+    If `solve` is None, the method is (21) in factored form, compiled as a whole (`iapb.contact.kernels.border`).
     """
 
     solve: Callable[[ImpactInput, int, bool, float | None], Whitened] | None
@@ -267,14 +267,14 @@ class Method(NamedTuple):
 
 
 def _prepared(problem: ImpactInput) -> Any:
-    """The scratch of the problem, with its rows as columns."""
+    """Return the scratch of the problem, with the rows of J written into its columns."""
     work = problem.work.impact
     work.columns[:, : problem.contacts] = problem.work.rows
     return work
 
 
 def _whitened_rows(problem: ImpactInput, work: Any) -> Floats:
-    """Unit rows of A = J L⁻ᵀ; fills work.u, work.rows and work.length as `factored_impact` would."""
+    """Return the unit rows of A = J L⁻ᵀ; write work.u, work.rows and work.length as `factored_impact` does."""
     to_whitened(problem.lower, problem.velocity, work.u)
     whiten_columns(problem.lower, work.columns, problem.contacts)
     unit_columns(work.columns, problem.contacts, work.length)
@@ -287,7 +287,7 @@ def _tolerance(problem: ImpactInput, given: float | None) -> float:
 
 
 def _from_impulses(problem: ImpactInput, impulses: NDArray[np.floating], rank: int, clamped: bool) -> Whitened:
-    """v⁺ = v⁻ + M⁻¹Jᵀp as (9) says, for a method that computes p first."""
+    """Return v⁺ = v⁻ + M⁻¹Jᵀp, equation (9), for a method that computes p first."""
     work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
     v_plus, momentum = np.empty(d), np.empty(d)
@@ -297,15 +297,15 @@ def _from_impulses(problem: ImpactInput, impulses: NDArray[np.floating], rank: i
 
 
 def _delassus(problem: ImpactInput, size: float | Floats = 1.0) -> tuple[Floats, Floats]:
-    """W = J M⁻¹ Jᵀ and γ⁻ = J v⁻, of the scaled rows times `size`; by LAPACK."""
+    """Return W = J M⁻¹ Jᵀ and γ⁻ = J v⁻ for the scaled rows times `size`, computed by LAPACK."""
     J = problem.contact_jacobian * np.reshape(size, (-1, 1))
     return J @ np.linalg.solve(problem.mass_matrix, J.T), J @ problem.velocity
 
 
 def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(20)-(21) to the letter: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size.
+    """(20)-(21) as printed: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size.
 
-    A comparison: LAPACK's last bits, which W's condition number amplifies, depend on the processor.
+    For comparison only: the last bits of LAPACK depend on the processor, and W's condition number amplifies them.
     """
     row_sizes(problem.work)
     size = problem.work.size
@@ -318,9 +318,9 @@ def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float
 
 
 def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(19): p = −(1 + e) W⁻¹ J v⁻ by Cholesky, for independent rows.
+    """Solve (19), p = −(1 + e) W⁻¹ J v⁻, by Cholesky; the rows must be independent.
 
-    A comparison: by LAPACK, whose last bits depend on the processor.
+    For comparison only: LAPACK computes it, so the last bits depend on the processor.
     """
     W, gamma = _delassus(problem)
     unit = W / np.sqrt(np.outer(np.diag(W), np.diag(W))) if np.all(np.diag(W) > 0.0) else np.zeros_like(W)
@@ -336,7 +336,7 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
 
 
 def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps some of its approach, none gains energy."""
+    """p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps part of its approach velocity, and none gains energy."""
     work = _prepared(problem)
     rows = _whitened_rows(problem, work) * work.length[: problem.contacts, None]
     W, gamma = product(rows, rows.T), product(problem.contact_jacobian, problem.velocity)
@@ -349,7 +349,7 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
 def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
     """(21) with the projector from the truncated singular value decomposition of unit-scaled A.
 
-    A comparison: by LAPACK, whose last bits depend on the processor.
+    For comparison only: LAPACK computes it, so the last bits depend on the processor.
     """
     work, d = _prepared(problem), problem.coordinates
     rows = _whitened_rows(problem, work)
@@ -370,7 +370,7 @@ _UNSOLVED = 1e-6
 
 
 def poisson(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """Poisson's law for unequal restitution, by two LCPs (compression, restitution), judged by what they leave."""
+    """Apply Poisson's law by two LCPs (compression, restitution); the status says whether they were solved."""
     work, d, c = _prepared(problem), problem.coordinates, problem.contacts
     v_plus, momentum, impulses = np.empty(d), np.empty(d), np.zeros(c)
     rank, clamp = poisson_impact(problem.mass_matrix, problem.lower, problem.velocity, problem.unequal, c, clamped,

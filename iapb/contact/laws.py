@@ -1,8 +1,8 @@
-"""Contact laws: the whole step from (q, v) to (q, v), as one protocol that engine, references and users share.
+"""Contact laws: each computes a whole step from (q, v). Engine, references and users share one protocol.
 
-The engine brings two: impulses while a contact is new and penalties while it lasts (ImpulseAugmented, the
-paper's), and penalties alone (Penalty: the same page with e = −1, claim C09). `reference.time_stepping` adds rigid
-constraints; any class with `name`, `settings` and `advance` is a law.
+The engine has two laws. `ImpulseAugmented`, the paper's law, applies impulses while a contact is new and penalty
+forces while it lasts. `Penalty` applies penalty forces alone: the same algorithm with e = −1 (claim C09).
+`reference.time_stepping` adds rigid constraints. Any class with `name`, `settings` and `advance` is a law.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PUSHING = "impulse-augmented penalty, contacts only push"
 WITH_IMPACT_FRICTION = "impulse-augmented penalty with impact friction"
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
-# Parts of a scene's contact section: what a law makes of it is its attribute `uses`.
+# Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
 PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
 IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
@@ -46,7 +46,7 @@ class StepResult(NamedTuple):
 
 
 def copied_step(system: Any, state: State) -> StepResult:
-    """The step that a state has just done, as copies."""
+    """Return copies of the results of the step that `state` has just made."""
     return StepResult(
         q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
         friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
@@ -55,28 +55,29 @@ def copied_step(system: Any, state: State) -> StepResult:
 
 
 def _contact_state(states: NDArray[np.int8], tool_tree: int) -> int:
-    """`iapb.contact.kernels.step.contact_state`, from Python faster without numba's look-up of types."""
+    """Python version of `iapb.contact.kernels.step.contact_state`; it avoids numba's look-up of types."""
     if tool_tree >= 0:
         return int(states[tool_tree])
     return next((state for state in (COLLIDING, RESTING) if state in states), FREE)
 
 
 class ContactLaw(Protocol):
-    """A contact law: the whole step.
+    """A contact law: it computes the whole step.
 
-    A law may also fill ``state.contacts`` (with ``state.contact_count[0]``), for the record. Stateless where possible:
-    what changes lives in `state`. An attribute `uses` names the parts of the contact section that count, for
-    `iapb.effects`; without it all are taken to.
+    A law may also write its contacts to ``state.contacts`` and their number to ``state.contact_count[0]``; the run
+    then records them. A law should keep no state of its own: everything that changes belongs in `state`. The optional
+    attribute `uses` names the parts of the contact section that affect the law; `iapb.effects` reads it. Without it,
+    every part is assumed to affect the law.
     """
 
     @property
     def name(self) -> str:
-        """Name that goes into every run."""
+        """Name of the law, recorded in every run."""
         ...
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings that go into every run: plain numbers and texts."""
+        """Settings of the law, recorded in every run: plain numbers and texts."""
         ...
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
@@ -86,7 +87,7 @@ class ContactLaw(Protocol):
 
 @dataclass(frozen=True)
 class _EngineLaw:
-    """What the two laws of the engine share: an integrator, and a compiled kernel."""
+    """Base class of the engine's two laws: an integrator and a compiled kernel."""
 
     integrator: str = "semi_implicit_euler"
 
@@ -95,7 +96,7 @@ class _EngineLaw:
             raise ArgumentError("integrator", self.integrator, one_of(self.integrator, INTEGRATORS))
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
-        """One step by the compiled kernel, from Python (see `ContactLaw`)."""
+        """Advance one step by the compiled kernel (see `ContactLaw`)."""
         world = system.world_under(self)
         if dt != world.dt:
             raise ArgumentError("dt", dt, f"the scene's step {world.dt!r} s: the engine's laws keep a fixed step")
@@ -106,7 +107,7 @@ class _EngineLaw:
 
     @classmethod
     def runs_compiled(cls) -> bool:
-        """Whether the compiled loop does what `advance` does: not where a subclass has a step of its own."""
+        """Return whether the compiled loop computes the step of `advance`: False if a subclass overrides `advance`."""
         return cls.advance is _EngineLaw.advance
 
 
@@ -117,13 +118,14 @@ class ImpulseAugmented(_EngineLaw):
     Parameters
     ----------
     integrator : name in `INTEGRATORS`.
-    rendering : how impulses meet the device's force limits (paper section VI): ``full`` ignores them,
-        ``saturate`` clips at the device, ``scale`` scales tool and device alike, ``spread`` scales and stays in
-        collision until the rest is rendered. Without limits in the scene all four are the same.
-    friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and never with a gain
-        of energy (`iapb.resolve_frictional_impact`). Default: no, as in the paper, which leaves it to the future.
-    pushing : whether contacts can only push: Poisson's law by two LCPs at every collision (`method="poisson"` of
-        `iapb.resolve_impact`), where (21) takes every row as an equality. Default: no, as in the paper.
+    rendering : how the device's force limits affect impulses (paper section VI). ``full`` ignores the limits;
+        ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool and device alike; ``spread``
+        scales it and stays in collision until the rest is rendered. Without limits in the scene all four are the same.
+    friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and without energy gain
+        (`iapb.resolve_frictional_impact`). Default: False, as in the paper, which leaves it to future work.
+    pushing : whether contacts can only push. Every collision then uses Poisson's law by two LCPs (`method="poisson"`
+        of `iapb.resolve_impact`) instead of (21), which takes every row as an equality. Default: False, as in the
+        paper.
     """
 
     rendering: str = "full"
@@ -143,7 +145,7 @@ class ImpulseAugmented(_EngineLaw):
 
     @property
     def name(self) -> str:
-        """The law, and whether friction acts in its impacts or contacts only push."""
+        """Name of the law; it says whether friction acts in impacts or contacts only push."""
         return WITH_IMPACT_FRICTION if self.friction_in_impacts else PUSHING if self.pushing else IMPULSE_AUGMENTED
 
     @property
@@ -153,7 +155,7 @@ class ImpulseAugmented(_EngineLaw):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Integrator, rendering, and whether friction acts in impacts; `pushing` where it is asked for."""
+        """Integrator, rendering, and whether friction acts in impacts; `pushing` only if it is True."""
         settings = {"integrator": self.integrator, "rendering": self.rendering,
                     "friction_in_impacts": self.friction_in_impacts}
         return settings | ({"pushing": True} if self.pushing else {})
@@ -161,7 +163,7 @@ class ImpulseAugmented(_EngineLaw):
 
 @dataclass(frozen=True)
 class Penalty(_EngineLaw):
-    """Penalties alone: (5)-(6) at every contact, new or old."""
+    """Penalty forces alone: (5)-(6) act at every contact, new or old."""
 
     name = "penalty"
     impulses = False
