@@ -1,11 +1,12 @@
 """Couplings between the device and the virtual tool: Fig. 5 and Table I of the paper.
 
-A coupling is data; the forces are in `iapb.haptics.kernels`. With x_t, x_d the coordinates of tool and device,
+A coupling is data; `iapb.haptics.kernels` computes the forces. With x_t, x_d the coordinates of tool and device,
 PD = K (x_d − x_t) + B (ẋ_d − ẋ_t):
 
 - four-channel controller: tool M ẍ_t = F_h + F_env + PD, device M ẍ_d = F_h + F_env,applied − PD;
-- unilateral coupler: in contact the tool gets PD and the device F_h − PD; in free motion the tool follows the
-  device. It stays on while the device's own pose would penetrate, so that the tool never follows it into a wall.
+- unilateral coupler: in contact PD acts on the tool and F_h − PD on the device; in free motion the tool follows the
+  device. The coupler stays on while the tool would penetrate a body at the device's pose, so that the tool never
+  follows the device into a wall.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from iapb.errors import ArgumentError
 
 @dataclass(frozen=True)
 class NoCoupling:
-    """The hand holds the tool itself; no device takes part."""
+    """The hand holds the tool directly; there is no device."""
 
     name = "none"
     kind = 0
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Nothing to set."""
+        """No settings."""
         return {}
 
 
@@ -45,7 +46,7 @@ class _PositionCoupling:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Gains as they go into a run's record."""
+        """Gains as a run records them."""
         return {"stiffness": list(self.stiffness), "damping": list(self.damping)}
 
 
@@ -57,7 +58,7 @@ class FourChannel(_PositionCoupling):
 
 
 class UnilateralCoupler(_PositionCoupling):
-    """PD between device and tool while the tool is in contact; the device feels nothing else but the hand."""
+    """PD between device and tool while the tool is in contact; otherwise only the hand acts on the device."""
 
     name = "unilateral"
     kind = 2

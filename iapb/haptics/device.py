@@ -1,8 +1,8 @@
-"""The haptic device: the protocol a real one keeps, and a simulated one (paper section VI: pure inertia).
+"""The haptic device: the protocol of any device, and a simulated device (paper section VI: pure inertia).
 
 Coordinates are those of the hand-held tool, to which the device is kinematically equal. The compiled loop
-simulates its device in `iapb.haptics.kernels`; the class here is the same device for loops written in Python
-and for laws of one's own, with a constant mass matrix.
+simulates its device in `iapb.haptics.kernels`; `SimulatedDevice` is the same device, with a constant mass matrix,
+for loops and laws written in Python.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ Floats = NDArray[np.float64]
 
 
 class DeviceReading(NamedTuple):
-    """What the simulation knows of the device, d coordinates."""
+    """Position and velocity of the device as the simulation reads them (d coordinates)."""
 
     q: Floats  # (d,) [m, rad]
     v: Floats  # (d,) [m/s, rad/s]
 
 
 class Device(Protocol):
-    """Anything that a hand can hold: it tells where it is and takes a force for one step."""
+    """A haptic device: it reports its position and velocity and applies a force for one step."""
 
     def read(self) -> DeviceReading:
         """Return the last measured position and velocity."""
         ...
 
     def apply(self, force: ArrayLike) -> None:
-        """Let the actuators give the generalized force (d,) [N, N m] for one step."""
+        """Apply the generalized force (d,) [N, N m] with the actuators for one step."""
         ...
 
 
 class SimulatedDevice:
-    """Pure inertia M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with what real devices add.
+    """Pure inertia M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with delay, limits and sensors.
 
     Parameters
     ----------
@@ -57,17 +57,17 @@ class SimulatedDevice:
     force_limit : (d,), optional
         The actuators clip each component to ±limit [N, N m]; default: no limit.
     delay : int
-        Steps that a reading takes to the simulation, and a force to the actuators.
+        Number of steps by which a reading reaches the simulation late, and a force the actuators.
     resolution : (d,), optional
-        Smallest step of the position sensors [m, rad], 0 = exact. With sensors the velocity read is the
-        difference of the positions read, over one step: it jumps by resolution / dt.
+        Resolution of the position sensors [m, rad], 0 = exact. Above 0, the velocity reading is the difference
+        of two successive position readings over dt: it changes in steps of resolution / dt.
 
     Attributes
     ----------
     q, v : (d,)
         True position and velocity.
     hand_force : (d,)
-        What the hand does to the device [N, N m]; set it at any time.
+        Force of the hand on the device [N, N m]; it may be set at any time.
     """
 
     def __init__(
@@ -100,11 +100,11 @@ class SimulatedDevice:
         self._forces = deque([np.zeros(size)] * delay)
 
     def read(self) -> DeviceReading:
-        """Return position and velocity as the simulation knows them: quantised and `delay` steps old."""
+        """Return position and velocity as the simulation reads them: quantised and `delay` steps old."""
         return self._readings[0]
 
     def apply(self, force: ArrayLike) -> None:
-        """Advance one step under the hand and the actuators, which get `force` clipped and `delay` steps late."""
+        """Advance one step under the hand and the actuators; `force` is clipped and acts `delay` steps later."""
         commanded = finite_array("force", force, self.q.shape)
         self._forces.append(np.clip(commanded, -self._limit, self._limit))
         total = self.hand_force + self._forces.popleft() - self._damping * self.v
@@ -123,7 +123,7 @@ class SimulatedDevice:
 
 
 def _cholesky(mass_matrix: Floats) -> Floats:
-    """Lower factor of a mass matrix, or an error that names it."""
+    """Return the lower Cholesky factor of a mass matrix; an ArgumentError names the matrix."""
     expected = "a finite symmetric positive definite matrix (d, d)"
     square = mass_matrix.ndim == 2 and mass_matrix.shape[0] == mass_matrix.shape[1]
     if not square or not np.all(np.isfinite(mass_matrix)) or not np.array_equal(mass_matrix, mass_matrix.T):
@@ -143,18 +143,18 @@ def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: flo
     return vector
 
 
-# A device that moves by itself in place of the compiled one: read, checked, told its force.
+# A device in place of the compiled one: its readings are checked, its force is sent to it.
 
 
 class DeviceLink:
-    """Carries force and reading between a device and the port of a simulation.
+    """Transfers forces and readings between a device and the port of a simulation.
 
-    The device is late and coarse by itself: the port has neither delay nor sensors (`make_port` with ``external``).
+    Delay and sensors belong to the device; the port simulates neither (`make_port` with ``external``).
 
     Parameters
     ----------
     device : Device
-        Of the coordinates of the hand-held tool.
+        Its coordinates are those of the hand-held tool.
     world, state, port : the simulation's blocks.
     """
 
@@ -168,13 +168,13 @@ class DeviceLink:
         self._read()
 
     def send(self) -> None:
-        """Let the actuators give ``port.device_force``; a simulated device feels the simulated hand, too."""
+        """Send ``port.device_force`` to the device; a `SimulatedDevice` also gets the force of the simulated hand."""
         if isinstance(self.device, SimulatedDevice):
             self.device.hand_force = self._port.device_hand_force.copy()
         self.device.apply(self._port.device_force.copy())
 
     def receive(self) -> None:
-        """Read where the device is at the end of the step, and do what `move_device` does with it."""
+        """Read the device at the end of the step, then update the port as `move_device` does."""
         world, state, port = self._world, self._state, self._port
         before = port.device_v.copy()
         self._read()
@@ -186,7 +186,7 @@ class DeviceLink:
             self._engage(world, state, port)
 
     def release(self) -> None:
-        """Take the force away, so that no real device goes on pulling when nobody computes any more."""
+        """Set the force to zero, so that a real device does not keep its last force after the simulation ends."""
         self.device.apply(np.zeros_like(self._port.device_force))
 
     def _read(self) -> None:

@@ -1,4 +1,4 @@
-"""The hand's side of one step, compiled: hand force, coupling, rendering, device (paper V-C and VI)."""
+"""Compiled kernels of the haptic side of a step: hand force, coupling, rendering, device (paper V-C and VI)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from iapb.mechanics.kernels.vectors import add, dot, load, transform
 from iapb.run import FREE
 
 NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
-PLANNED = 512  # steps ahead that the force of a hand which changes over time is known; no chunk is longer
+PLANNED = 512  # steps for which a time-varying hand force is planned ahead; no chunk is longer
 
 
 class Port(NamedTuple):
     """Hand, coupling and device of one world; d velocities of the world, d_t of the tool and the device."""
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
-    tool_tree: int  # -1: nobody holds anything
+    tool_tree: int  # -1: no tool is held
     q_start: int  # the tool's range in q
     q_stop: int
     v_start: int  # and in v
@@ -52,34 +52,34 @@ class Port(NamedTuple):
     quantised: bool
     pulsed: bool  # an impulse is rendered over more than one step
     pulse_weights: np.ndarray  # (w,) shares of an impulse in the w steps after it, sum 1
-    pulse_pending: np.ndarray  # (w, d_t) ring of what is still to be given [N, N m]
-    pulse_force: np.ndarray  # (d_t,) given in this step
-    pulse_balance: np.ndarray  # (1,) [J] lost in the tool's collisions less what the pulses gave the device
+    pulse_pending: np.ndarray  # (w, d_t) ring of forces still to be rendered [N, N m]
+    pulse_force: np.ndarray  # (d_t,) force of the pulses in this step
+    pulse_balance: np.ndarray  # (1,) [J] loss in the tool's collisions minus the work of the pulses on the device
     pulse_held: np.ndarray  # (1,) int64: steps in which the observer held a pulse back
     delayed_force: np.ndarray  # (n + 1, d_t) ring of actuator forces on their way; n = 0: no delay
     delayed_q: np.ndarray  # (n + 1, nq_t) ring of measured positions on their way
     delayed_v: np.ndarray  # (n + 1, d_t)
     sensed_q: np.ndarray  # (nq_t,) what the sensors read
-    measured_q: np.ndarray  # (nq_t,) what the simulation knows of the device
+    measured_q: np.ndarray  # (nq_t,) position of the device as the simulation reads it
     measured_v: np.ndarray  # (d_t,)
     hand_force: np.ndarray  # (d,) of the hand on the tool
     device_hand_force: np.ndarray  # (d_t,) of the hand on the device
     coupling_force: np.ndarray  # (d,) on the tool
     environment_force: np.ndarray  # (d,) F_env (26)
     device_force: np.ndarray  # (d_t,) of the actuators on the device
-    applied: np.ndarray  # (d,) hand and coupling together
+    applied: np.ndarray  # (d,) sum of hand and coupling force
     error: np.ndarray  # (d_t,) scratch
     acceleration: np.ndarray  # (d_t,) scratch
     engaged: np.ndarray  # (1,) bool: the unilateral coupler is on
     clock: np.ndarray  # (1,) int64: steps done
 
 
-# What the simulation knows of the device: through quantised sensors, and late.
+# Measurement of the device: quantised sensors and delay.
 
 
 @kernel
 def measure(world, port):
-    """What the simulation knows of the device: its state, through quantised sensors and the delay."""
+    """Write the state of the device as the simulation reads it: quantised by the sensors, and delayed."""
     slots = port.delayed_q.shape[0]
     now = port.clock[0] % slots
     arriving = (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0  # nothing older than the start
@@ -95,9 +95,9 @@ def measure(world, port):
 
 @kernel
 def sense(world, port, velocity):
-    """Positions rounded to the sensors' resolution, and their difference over one step as velocity.
+    """Write positions rounded to the sensors' resolution, and velocities from their difference over one step.
 
-    Exact where the resolution is 0; at the first reading, which has none to differ from, the velocity is exact too.
+    Both are exact where the resolution is 0. At the first reading, which has no predecessor, the velocity is exact too.
     """
     first = port.clock[0] == 0
     for k in range(port.sensed_q.shape[0]):
@@ -113,7 +113,7 @@ def sense(world, port, velocity):
 
 @kernel
 def couple(world, state, port):
-    """Forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
+    """Write the forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
     if port.tool_tree < 0:
         return  # `applied` holds the zeros that it was made with
     feel_hand(world, state, port)
@@ -129,7 +129,7 @@ def couple(world, state, port):
 
 @kernel
 def feel_hand(world, state, port):
-    """J_hᵀF_h on the tool where it is, and on the device where it is; nothing while the hand holds still."""
+    """Write the hand's J_hᵀF_h on the tool and on the device, each at its own pose; zeros if the wrench is zero."""
     port.hand_force[:] = 0.0
     port.device_hand_force[:] = 0.0
     if not pushes(port):
@@ -143,7 +143,7 @@ def feel_hand(world, state, port):
 
 @kernel
 def pushes(port):
-    """Does the hand do anything?"""
+    """Return whether the wrench of the hand is not zero."""
     pushing = False
     for k in range(port.wrench.shape[0]):
         pushing = pushing or port.wrench[k] != 0.0
@@ -166,7 +166,7 @@ def press(mechanism, body, held, port, out):
 
 @kernel
 def coordinate(state, port):
-    """Position channels: PD between tool and device, as a force on the tool (its opposite on the device)."""
+    """Write the PD force of the position channels on the tool; its opposite acts on the device."""
     port.coupling_force[:] = 0.0
     if port.coupling == UNILATERAL and not port.engaged[0]:
         return
@@ -178,15 +178,15 @@ def coordinate(state, port):
         )
 
 
-# An impulse handed out over many steps, and the observer that keeps it from making energy.
+# Rendering of an impulse over several steps, and the passivity observer that prevents an energy gain.
 
 
 @kernel
 def shape_impulse(world, state, port):
-    """Hand the step's impulse out by the waveform's weights, and give what is due now in its place.
+    """Spread the step's impulse by the waveform's weights; render the share due now in place of the whole impulse.
 
-    Passivity observer: the pulses may give the device no more energy than the tool's collisions took. Where they
-    would, this step's share waits for the next step: no momentum is lost.
+    Passivity observer: the pulses may give the device no more energy than the tool's collisions took. If the share of
+    this step would give more, it is added to the share of the next step, so that no momentum is lost.
     """
     slots = port.pulse_weights.shape[0]
     now = port.clock[0] % slots
@@ -208,7 +208,7 @@ def shape_impulse(world, state, port):
 
 @kernel
 def hand_out(world, state, port, now):
-    """Add the step's impulse to what is pending; return the power [W] of what is due now on the moving device."""
+    """Add the step's impulse to the pending forces; return the power [W] of the force due now on the moving device."""
     slots = port.pulse_weights.shape[0]
     power = 0.0
     for i in range(port.pulse_force.shape[0]):
@@ -222,25 +222,25 @@ def hand_out(world, state, port, now):
 
 @kernel
 def observe_work(world, port):
-    """Take the work of the step's pulses from the balance: force times the mean velocity of the step."""
+    """Subtract the work of this step's pulse from the energy balance: force times the mean velocity of the step."""
     for i in range(port.pulse_force.shape[0]):
         mean = port.device_v[i] - 0.5 * world.dt * port.acceleration[i]
         port.pulse_balance[0] -= world.dt * port.pulse_force[i] * mean
 
 
-# Rendering and device: F_env (26), what the actuators give of it, and how the device moves (paper V-C, VI).
+# Rendering and device: F_env (26), the actuator force that renders it, and the device's motion (paper V-C, VI).
 
 
 @kernel
 def drive_device(world, state, port):
-    """Render F_env (26) and move the device. False: it left all bounds."""
+    """Render F_env (26) and move the device; return False if its motion diverged."""
     render(world, state, port)
     return port.coupling == NO_COUPLING or move_device(world, state, port)
 
 
 @kernel
 def render(world, state, port):
-    """F_env (26) of this step, and what the actuators are to give of it."""
+    """Write F_env (26) of this step, and the actuator force that renders it."""
     for k in range(port.environment_force.shape[0]):
         contact = state.penalty_force[k] + state.friction_force[k]
         port.environment_force[k] = contact + state.impulse[k] / world.dt
@@ -253,7 +253,7 @@ def render(world, state, port):
 
 @kernel
 def command(port):
-    """Actuator force: F_env (four channels only) minus the PD, within the device's limits, after the delay."""
+    """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's limits and delayed."""
     slots = port.delayed_force.shape[0]
     now = port.clock[0] % slots
     for i in range(port.device_force.shape[0]):
@@ -268,7 +268,7 @@ def command(port):
 
 @kernel
 def move_device(world, state, port):
-    """M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler. False: it left all bounds."""
+    """M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged."""
     a = port.acceleration
     for i in range(a.shape[0]):
         a[i] = port.device_hand_force[i] + port.device_force[i]
@@ -297,7 +297,7 @@ def move_device(world, state, port):
 
 @kernel
 def engage(world, state, port):
-    """The coupler is on while the tool touches or the device is inside a body; else the tool follows the device."""
+    """Engage the coupler if the tool touches a body, or would at the device's pose; else the tool follows it."""
     port.engaged[0] = state.state_of_tree[port.tool_tree] != FREE or inside(world, state, port)
     if not port.engaged[0]:
         copy_into(state.q[port.q_start : port.q_stop], port.device_q)
@@ -306,7 +306,7 @@ def engage(world, state, port):
 
 @kernel
 def inside(world, state, port):
-    """Would the tool penetrate something at the device's pose? Uses the stage scratch of the state."""
+    """Return whether the tool would penetrate a body at the device's pose; uses the stage scratch of the state."""
     copy_into(state.start_q, state.q)
     copy_into(state.start_q[port.q_start : port.q_stop], port.device_q)
     forward_kinematics(world.mechanism, state.start_q, state.body)

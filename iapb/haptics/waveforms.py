@@ -1,7 +1,8 @@
-"""How an impulse reaches the hand: the force signals that carry its momentum over one step or many (paper I, VIII).
+"""Force signals that render an impulse to the hand over one step or several (paper I, VIII).
 
-A waveform is a list of weights w_j, j = 0 … n − 1, with Σ w_j = 1: the impulse p of a collision is given to the
-device as the forces w_j p/T in the n steps after it. So each carries exactly the computed momentum, whatever its shape.
+A waveform is a list of weights w_j, j = 0 … n − 1, with Σ w_j = 1: the device renders the impulse
+p of a collision as the forces w_j p/T in n successive steps of length T. So each waveform carries exactly the momentum
+p, whatever its shape.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ Floats = NDArray[np.float64]
 
 
 class Material(NamedTuple):
-    """A decaying sinusoid A e^(−Bt) sin(2πft) per speed of impact.
+    """A decaying sinusoid A e^(−Bt) sin(2πft), multiplied by the impact speed.
 
-    attack A [1/s], decay B [1/s], frequency f [Hz]: measured by tapping on real materials (Okamura, Dennerlein and
+    attack A [1/s], decay B [1/s], frequency f [Hz] were measured by tapping on real materials (Okamura, Dennerlein and
     Howe, Vibration feedback models for virtual environments, ICRA 1998).
     """
 
@@ -44,21 +45,21 @@ _FADED = 6.907755278982137  # -ln 0.001: a sinusoid ends where its envelope has 
 
 
 def step_weights(dt: float) -> Floats:
-    """All in one step: the paper's own rendering."""
+    """Return the weight of the paper's rendering: the whole impulse in one step."""
     return np.ones(1)
 
 
 def brake_weights(dt: float) -> Floats:
-    """A braking pulse: half a sine over PULSE_SECONDS, as a damper that is very hard and soon gone."""
+    """Return the weights of a braking pulse: half a sine over PULSE_SECONDS, like a stiff damper that acts briefly."""
     count = max(1, round(PULSE_SECONDS / dt))
     return _summing_to_one(_sines(np.pi * (np.arange(count) + 0.5) / count))
 
 
 def ring_weights(material: str) -> Callable[[float], Floats]:
-    """The momentum in one step, and the material's decaying sinusoid, freed of its mean, behind it.
+    """Return a function dt -> weights: the whole momentum in one step, then the material's sinusoid without its mean.
 
-    The sinusoid's acceleration A e^(−Bt) sin(2πft) v is given to the mass that the impulse (1 + e) m v stopped; as a
-    share of the impulse each step gets T A e^(−Bt) sin(2πft), for a plastic impact.
+    The sinusoid is the acceleration A e^(−Bt) sin(2πft) v of the mass m that the impulse (1 + e) m v acted on. For a
+    plastic impact (e = 0) each step of length T gets the share T A e^(−Bt) sin(2πft) of the impulse.
     """
     attack, decay, frequency = MATERIALS[material]
 
@@ -83,7 +84,7 @@ WAVEFORMS: dict[str, Callable[[float], Floats]] = {
 
 
 def waveform_weights(name: str, dt: float) -> Floats:
-    """The weights (n,) of a waveform for steps of dt [s]; their sum is 1 to rounding.
+    """Return the weights (n,) of a waveform for steps of dt [s]; their sum is 1 to rounding.
 
     Raises
     ------

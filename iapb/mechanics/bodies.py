@@ -1,4 +1,4 @@
-"""Body: a rigid body, its inertia and the joint that carries it; and the order of a mechanism's trees."""
+"""Rigid bodies with inertia and joint, and the order of the trees of a mechanism."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from iapb.mechanics.joints import Joint
 
 Floats = NDArray[np.float64]
 
-# A placement typed with nine digits is still a rotation; anything coarser would shear the body.
+# A placement given with nine digits counts as a rotation; a coarser one would shear the body.
 ROTATION_TOLERANCE = 1e-8
 # Rounding of R I R^T leaves this much asymmetry, relative to the largest entry of the inertia.
 SYMMETRY_TOLERANCE = 1e-12
 
 
 def no_placement() -> tuple[Floats, Floats]:
-    """Joint frame equal to the parent's frame."""
+    """Return the placement of a joint frame that equals the parent's frame."""
     return np.eye(3), np.zeros(3)
 
 
@@ -44,7 +44,7 @@ def finite_array(argument: str, value: ArrayLike, shape: tuple[int, ...], unit: 
 
 
 def float_vector(argument: str, value: ArrayLike, size: int) -> Floats:
-    """Return value as a contiguous float vector, itself if it is one; whether it is finite is not looked at.
+    """Return value as a contiguous float vector, without a copy if it is one already; entries may be NaN or infinite.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def float_vector(argument: str, value: ArrayLike, size: int) -> Floats:
 
 
 def float_rows(argument: str, value: ArrayLike, columns: int) -> Floats:
-    """Return value as a contiguous float array (rows, columns); like `float_vector`."""
+    """Return value as a contiguous float array (rows, columns), under the rules of `float_vector`."""
     try:
         rows = np.asarray(value, np.float64, "C")
     except (TypeError, ValueError):
@@ -91,16 +91,16 @@ class Body:
     parent : str or None
         Body that carries this one; None = the world.
     joint : Joint
-        How it moves relative to its parent.
+        How the body moves relative to its parent.
     placement : (rotation (3, 3), position (3,) [m])
-        Joint frame in the parent body's frame. At the joint's neutral position it is the body's frame.
+        Joint frame in the parent body's frame. At the joint's neutral position the body frame equals it.
     mass : float
         [kg], zero allowed (a frame).
     center_of_mass : (3,) [m]
         In the body frame.
     inertia : (3, 3) [kg m^2]
         About the centre of mass, body axes. Only symmetry is checked: whether the mechanism's mass
-        matrix is positive definite depends on the whole chain and is judged where it is factored.
+        matrix is positive definite depends on the whole chain and is checked when it is factored.
     """
 
     name: str
@@ -133,8 +133,8 @@ def parent_indices(bodies: Sequence[Body]) -> list[int]:
     Raises
     ------
     ArgumentError
-        A name twice, an unknown parent, a parent after its child, or a tree whose bodies do not follow
-        one another (M could not be block diagonal then).
+        A repeated name, an unknown parent, a parent after its child, or a tree whose bodies are not
+        consecutive (M would not be block diagonal).
     """
     index: dict[str, int] = {}
     parents: list[int] = []

@@ -1,8 +1,8 @@
-"""Energy ledger of a run: where every joule came from and went, and what the integrator made up.
+"""Energy balance of a run (the ledger): stored energy, work of each force, impact loss, residual of the integrator.
 
 Over step k the configuration moves by the displacement Dq_k = difference(q_k, q_k+1) (q_k+1 - q_k on vector
 coordinates), that is by the velocity actually integrated. The work of a force F_k held over the step is
-F_k . Dq_k: what somebody with a force sensor and a position sensor would measure. The impulse of step k acts
+F_k . Dq_k: what a force sensor and a position sensor would measure. The impulse of step k acts
 at q_k on v_k, before the forces. Then, summed over the steps so far,
 
     kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss + residual.
@@ -32,20 +32,20 @@ def port_energy(force: Floats, displacement: Floats, before: float | None = None
     """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F . Dq.
 
     This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d); `before` is
-    what had entered in earlier steps.
+    the energy [J] that entered in earlier steps.
     """
     return _summed(np.einsum("nd,nd->n", force, displacement), before)
 
 
 def _summed(values: Floats, before: float | None) -> Floats:
-    """Sums so far, one addition after another: a run summed part by part has the bits of one that is summed whole."""
+    """Return the running sums, added in order: a run summed in parts gives the same bits as a run summed at once."""
     return np.cumsum(values) if before is None else np.cumsum(np.concatenate([[before], values]))[1:]
 
 
 def passivity_deficit(entered: Floats, stored: float = 0.0) -> float:
-    """Return how much more energy [J] came out of a port than had entered or was stored there at first.
+    """Return the largest energy [J] that had left a port beyond what had entered and what was `stored` at the start.
 
-    Zero for a passive system, whatever happens at the port.
+    It is zero for a passive system, whatever happens at the port.
     """
     return max(0.0, -float(np.min(entered, initial=0.0)) - stored)
 
@@ -53,7 +53,7 @@ def passivity_deficit(entered: Floats, stored: float = 0.0) -> float:
 def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -> Floats:
     """Return the kinetic energy (n,) [J] taken by the generalized impulse (n, d) at q_k, v_k of each step.
 
-    -(v . P + P . M^-1 P / 2), which is exact whatever part of the impulse the clamp or a limit removed.
+    The loss is -(v . P + P . M^-1 P / 2). This is exact also if the clamp or a force limit removed part of the impulse.
     """
     losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
     mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
@@ -72,7 +72,7 @@ def energy_ledger(
     impulse: Floats,
     before: Mapping[str, float] | None = None,
 ) -> dict[str, Floats]:
-    """Return the ledger of n steps.
+    """Return the energy balance of n steps.
 
     Parameters
     ----------
@@ -85,18 +85,18 @@ def energy_ledger(
     impulse : (n, d) [N s, N m s]
         Generalized impulse at the beginning of each step.
     before : ledger name -> [J], optional
-        Where the sums stand that these steps continue (`last_of`).
+        Sums at the end of the preceding steps (see `last_of`); the sums of these n steps continue them.
 
     Returns
     -------
     dict
         `kinetic`, `potential` (n + 1,) [J]; `<name>_work` of each force, `impact_loss` and
-        `integration_residual` (n,) [J], sums since the start at the end of each step.
+        `integration_residual` (n,) [J], sums from the start to the end of each step.
 
     Raises
     ------
     ArgumentError
-        Arrays whose shapes do not belong together.
+        Shapes of arrays that do not agree.
     """
     steps = len(q) - 1
     kinetic, potential = mechanism.energies(q, v, gravity)
@@ -118,7 +118,7 @@ _AT_FIRST = "energy at the start"
 
 
 def last_of(ledger: Mapping[str, Floats], before: Mapping[str, float] | None) -> dict[str, float]:
-    """Return where the sums of a ledger stand: `before` of the steps that follow."""
+    """Return the sums at the end of a ledger, as the argument `before` for the steps that follow."""
     first = ledger["kinetic"][0] + ledger["potential"][0] if before is None else before[_AT_FIRST]
     ends = {name: float(values[-1]) for name, values in ledger.items() if len(values)}
     return dict(before or {}) | {_AT_FIRST: float(first)} | ends
@@ -132,7 +132,7 @@ def energy_of_run(
     run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
     before: Mapping[str, float] | None = None,
 ) -> dict[str, Floats]:
-    """Return the ledger of a run, or of the part that follows `before` (see `energy_ledger`), the device's side too.
+    """Return the energy balance of a run, or of its part after `before` (see `energy_ledger`), with the device.
 
     The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
     energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].

@@ -1,10 +1,10 @@
-"""Time integrators as data: each declares its order, tests measure it.
+"""Time integrators as data: each declares its order, and tests measure the order.
 
-All are explicit, start a step from (q, v) alone (an impulse may have changed v just before), and evaluate the
-acceleration at given stages: stage i stands `fraction[i]` of the step after its start, on the line that the
-stage before it points along, and carries the weight `weight[i]`. The compiled step reads these numbers;
-`Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python alone: it keeps
-its fourth order where rotations do not commute.
+All are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate the
+acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start of
+the step with velocity and acceleration of the stage before it, and has the weight `weight[i]`. The compiled step reads
+these numbers; `Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python only;
+it keeps its fourth order where rotations do not commute.
 
 On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
@@ -28,15 +28,15 @@ Acceleration = Callable[[Floats, Floats], Floats]  # q, v -> dv/dt
 class Integrator(NamedTuple):
     """An explicit integrator.
 
-    `order`: the error after a given time falls as dt^order. `group_order` is the same where rotations do not commute:
-    the step combines the stages' velocities into one displacement.
+    `order`: the error after a given time falls as dt^order. `group_order` is the order where rotations do not
+    commute; it can be lower, because the step combines the stages' velocities into one displacement.
     """
 
     name: str
     order: int
     group_order: int
-    fraction: tuple[float, ...]  # where in the step each evaluation stands
-    weight: tuple[float, ...]  # its share of the step, sum 1
+    fraction: tuple[float, ...]  # time of each evaluation, as a fraction of the step
+    weight: tuple[float, ...]  # weight of each evaluation, sum 1
     semi_implicit: bool = False  # the new velocity moves the configuration
 
     def step(
@@ -79,7 +79,7 @@ class _CommutatorFree4(Integrator):
 
 
 _STAGES_4 = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
-# Those that a contact law may name.
+# The integrators that a contact law may name.
 INTEGRATORS: dict[str, Integrator] = {
     method.name: method
     for method in (

@@ -104,7 +104,7 @@ class Joint:
         A name in `KINDS`.
     axis : 3-vector
         Direction of a revolute, continuous or prismatic joint in the joint frame; any length but zero.
-        Planar joints move in the joint frame's x-y plane and turn about its z; the others ignore it.
+        Other kinds ignore it; planar joints move in the x-y plane of the joint frame and turn about its z axis.
     """
 
     kind: str

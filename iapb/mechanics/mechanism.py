@@ -1,4 +1,4 @@
-"""Mechanism: bodies and joints as one point of configuration space (paper section IV, equations (1) to (3)).
+"""Mechanism: bodies and joints described by one configuration q (paper section IV, equations (1) to (3)).
 
 M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_1 ... M_m).
 """
@@ -40,12 +40,12 @@ entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
 
 
 class _Scratch(threading.local):
-    """Where kernels write; made anew in each thread that asks.
+    """Scratch memory of the kernels; each thread has its own.
 
     Attributes
     ----------
-    workspace : for the mechanism as it is
-    parts : the moving parts alone, with a workspace of their own
+    workspace : for the whole mechanism
+    parts : arrays of the moving parts alone, with a workspace of their own
     """
 
     def __init__(self, workspace: Workspace, parts: MechanismArrays) -> None:
@@ -74,13 +74,13 @@ class Mechanism:
     coordinate_names, coordinate_units : tuple of str (nq,)
     velocity_names, velocity_units : tuple of str (nv,)
     arrays : MechanismArrays
-        The same as contiguous arrays, for kernels.
+        The bodies as contiguous arrays for the kernels.
     tree_of_body : (n,) int array
     tree_dofs : list of (start, stop)
         Range in v of each tree; empty for a tree of fixed bodies.
     has_constant_mass_matrix, has_velocity_terms : bool
         See `iapb.mechanics.structure`.
-    block : the arrays laid out for kernels, once
+    block : `arrays` in the memory layout of the kernels, built once
 
     Raises
     ------
@@ -105,7 +105,7 @@ class Mechanism:
         self.has_velocity_terms: bool = structure.has_velocity_terms(self.arrays)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the bodies: a block holds addresses of this process."""
+        """Pickle the bodies alone: a block holds memory addresses of this process."""
         return Mechanism, (self.bodies,)
 
     @classmethod
@@ -125,7 +125,7 @@ class Mechanism:
 
     @property
     def velocity_names(self) -> tuple[str, ...]:
-        """Name of each entry of v (and of a generalized force): body.suffix, turns about x, y, z as rx, ry, rz."""
+        """Name of each entry of v (and of a generalized force): body.suffix; rotations about x, y, z are rx, ry, rz."""
         return tuple(f"{b.name}.{suffix}" for b in self.bodies for suffix in b.joint.layout.velocities)
 
     @property
@@ -146,24 +146,24 @@ class Mechanism:
         return make_workspace(len(self.bodies), self.nv)
 
     def alone(self, tree: int) -> Mechanism:
-        """Return one tree by itself: the same mechanism where it has no other."""
+        """Return a mechanism of one tree alone; this is the mechanism itself if it has no other tree."""
         if tree not in self._alone:
             bodies = [self.bodies[b] for b in np.flatnonzero(self.tree_of_body == tree)]
             self._alone[tree] = self if len(bodies) == len(self.bodies) else Mechanism(bodies)
         return self._alone[tree]
 
     def neutral(self) -> Floats:
-        """Return the configuration q (nq,) with every joint at rest."""
+        """Return the configuration q (nq,) with every joint at its neutral position."""
         return np.array([x for b in self.bodies for x in b.joint.layout.neutral], dtype=np.float64)
 
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
-        """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt where that makes sense."""
+        """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector coordinates."""
         out = np.empty(self.nq)
         entries.integrate(self.block, self._configuration(q), self._velocity(v), float(dt), out)
         return out
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
-        """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest turns."""
+        """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""
         out = np.empty(self.nv)
         entries.difference(self.block, self._configuration(q0, "q0"), self._configuration(q1, "q1"), out)
         return out
@@ -176,8 +176,8 @@ class Mechanism:
     def poses(self, qs: ArrayLike, planar: bool) -> Floats:
         """Return the pose of every body at each of the n configurations qs (n, nq).
 
-        (n, bodies, 3): x, y [m], angle in (−π, π] [rad], of bodies that move in the plane; else (n, bodies, 7):
-        x, y, z [m] and the quaternion x, y, z, w with w >= 0.
+        With `planar` the result is (n, bodies, 3): x, y [m] and the angle in (−π, π] [rad]. Otherwise it is
+        (n, bodies, 7): x, y, z [m] and the quaternion x, y, z, w with w >= 0.
         """
         places = float_rows("qs", qs, self.nq)
         out = np.empty((len(places), len(self.bodies), 3 if planar else 7))
@@ -230,14 +230,14 @@ class Mechanism:
         return self._filled((self.nv,), entries.inverse_dynamics, self._at(q), rates, change, _field(g))
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
-        """Return J (3, d): velocity, world axes, of the world point [m] taken as fixed to the body."""
+        """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the body."""
         place = finite_array("point", point, (3,), "m")
         return self._filled((3, self.nv), entries.point_jacobian, self._at(q), self.index(body), place)
 
     def rows_along(self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike) -> Floats:
-        """Return directionᵀ J (n, d) of n world points (n, 3), fixed to a body each, at qs (n, nq).
+        """Return directionᵀ J (n, d) of n world points (n, 3): point i is fixed to bodies[i] at configuration qs[i].
 
-        A body -1 does not move.
+        Body -1 is the world, which does not move.
         """
         places, fixed_to = float_rows("qs", qs, self.nq), np.ascontiguousarray(bodies, np.int64)
         spots, along = float_rows("points", points, 3), float_rows("directions", directions, 3)
@@ -252,7 +252,7 @@ class Mechanism:
         return out
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
-        """Return J (6, d): velocity of the body's origin (rows 0-2), angular velocity (3-5), world axes."""
+        """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows 3-5), in world axes."""
         return self._filled((6, self.nv), entries.frame_jacobian, self._at(q), self.index(body))
 
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
@@ -278,7 +278,7 @@ class Mechanism:
         return float(entries.potential_energy(self.block, self._at(q), _field(g)))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return (6,): momentum [N s] and angular momentum [N m s] about the centre of mass of what moves."""
+        """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
         return self._filled((6,), entries.centroidal_momentum, self._at(q), self._velocity(v))
 
     @cached_property
@@ -291,7 +291,7 @@ class Mechanism:
         return entries.bias_at.taking(self._scratch.parts, np.empty(self.nq), v, v)
 
     def _at(self, q: ArrayLike) -> Block:
-        """This thread's scratch, holding the kinematics of q until the next call."""
+        """Return this thread's scratch with the kinematics of q; the next call overwrites it."""
         workspace: Block = self._scratch.workspace
         entries.forward_kinematics(self.block, self._configuration(q), workspace)
         return workspace
@@ -312,7 +312,7 @@ class Mechanism:
         return values
 
     def _refuse(self, argument: str, q: Floats, rates: str = "v", v: ArrayLike | None = None) -> None:
-        """Raise what is wrong with a configuration, or with a velocity."""
+        """Raise ArgumentError for an invalid configuration or an invalid velocity."""
         finite_array(argument, q, (self.nq,))
         b = entries.misplaced_body(self.block, q)
         if b >= 0:

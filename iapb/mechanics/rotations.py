@@ -1,4 +1,4 @@
-"""Rotations and the angles they are written with: roll, pitch and yaw about the fixed x, y and z axes, as in URDF."""
+"""Rotations given by roll, pitch and yaw about the fixed x, y and z axes, as in URDF."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""What a mechanism is by its structure: bodies as arrays, the moving parts alone, and which terms it has at all.
+"""Structure of a mechanism: its bodies as arrays, its moving parts alone, and which terms of its equations vanish.
 
-Both answers on terms are exact zeros, never thresholds: a centre of mass 1e-17 m off its axis keeps the terms on.
-A "no" is a theorem; a "yes" may be cautious (a balanced second link after a first one is not looked for).
+`has_constant_mass_matrix` and `has_velocity_terms` compare with exact zeros, not with thresholds: a centre of mass
+1e-17 m off its axis keeps the terms. A term reported as absent is exactly zero. A term reported as present may still
+be zero in cases that are not checked, such as a balanced second link on a first one.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from iapb.mechanics.kernels.arrays import MechanismArrays
 
 
 def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
-    """Bodies fixed to `body`, itself included; None if anything moves relative to it."""
+    """Return the bodies fixed to `body`, with `body` itself; None if any body moves relative to it."""
     part = [body]
     for b in range(body + 1, len(m.kind)):
         if m.parent[b] in part:
@@ -29,7 +30,7 @@ def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
 
 
 def _mass_properties(m: MechanismArrays, part: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """First moment of mass and inertia of a rigid part about its first body's origin, in that body's axes."""
+    """Return first moment of mass and inertia of a rigid part about its first body's origin, in that body's axes."""
     rotation, position = {part[0]: np.eye(3)}, {part[0]: np.zeros(3)}
     moment, inertia = np.zeros(3), np.zeros((3, 3))
     for b in part:
@@ -44,7 +45,7 @@ def _mass_properties(m: MechanismArrays, part: list[int]) -> tuple[np.ndarray, n
 
 
 def _moves_before(m: MechanismArrays, body: int) -> bool:
-    """Does any dof of an ancestor carry the body?"""
+    """Return whether an ancestor of the body has a dof."""
     return int(m.parent[body]) >= 0 and int(m.last_dof[m.parent[body]]) >= 0
 
 
@@ -53,11 +54,11 @@ def _rotating_bodies(m: MechanismArrays) -> list[int]:
 
 
 def _rotation_keeps_mass_matrix(m: MechanismArrays, body: int) -> bool:
-    """Is M independent of the rotation of this body's joint?
+    """Return whether M is independent of the rotation of this body's joint.
 
-    Yes if what turns is one rigid part and either nothing moves before it, or it is balanced: its centre
+    True if the joint turns one rigid part and either no ancestor of the part moves or the part is balanced: its centre
     of mass lies on the axis (at the centre of a spherical joint). Free flyers and planar_se2 joints have
-    velocities in body axes, so at the root their M is the body's own inertia.
+    velocities in body axes, so at the root their M is the inertia of the body itself.
     """
     part = _rigid_part(m, body)
     if part is None:
@@ -75,12 +76,12 @@ def _rotation_keeps_mass_matrix(m: MechanismArrays, body: int) -> bool:
 
 
 def has_constant_mass_matrix(m: MechanismArrays) -> bool:
-    """True only if M does not depend on q."""
+    """Return True only if M does not depend on q."""
     return all(_rotation_keeps_mass_matrix(m, b) for b in _rotating_bodies(m))
 
 
 def _spins_without_bias(m: MechanismArrays, body: int) -> bool:
-    """With M constant: does the joint's rotation leave B zero, too?"""
+    """Return whether the joint's rotation leaves B zero, given that M is constant."""
     if m.kind[body] in (FREE_FLYER, PLANAR_SE2):
         return False  # m omega x u: the axes of the velocity turn with the body
     if m.kind[body] != SPHERICAL:
@@ -91,11 +92,11 @@ def _spins_without_bias(m: MechanismArrays, body: int) -> bool:
 
 
 def has_velocity_terms(m: MechanismArrays) -> bool:
-    """False only if B(q, v) is zero everywhere."""
+    """Return False only if B(q, v) is zero everywhere."""
     return not has_constant_mass_matrix(m) or not all(_spins_without_bias(m, b) for b in _rotating_bodies(m))
 
 
-# A mechanism with every fixed body merged into the one that carries it: what M and B need, and no more.
+# A mechanism with every fixed body merged into the body that carries it: this is enough for M and B.
 #
 # A robot's URDF has about two links for each that moves (flanges, covers, tool frames).
 
@@ -104,7 +105,7 @@ Floats = NDArray[np.float64]
 
 
 def moving_parts(m: MechanismArrays) -> MechanismArrays:
-    """Return arrays of the moving bodies alone, each with the mass of what is fixed to it; the dofs are the same."""
+    """Return arrays of the moving bodies alone, each with the mass of the bodies fixed to it; the dofs are the same."""
     carrier, rotation, position = _frames_in_carriers(m)
     moving = [b for b in range(len(m.kind)) if m.v_count[b] > 0]
     new_index = {b: i for i, b in enumerate(moving)} | {-1: -1}
@@ -129,7 +130,7 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
 
 
 def _frames_in_carriers(m: MechanismArrays) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Moving body that each body belongs to (-1: the world), and its axes and origin in that body's frame."""
+    """Return the moving body that carries each body (-1: the world), and each body's axes and origin in its frame."""
     count = len(m.kind)
     carrier = np.full(count, -1, dtype=np.int64)
     rotation, position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
@@ -144,7 +145,7 @@ def _frames_in_carriers(m: MechanismArrays) -> tuple[NDArray[np.int64], Floats, 
 
 
 def _placement(m: MechanismArrays, b: int, rotation: Floats, position: Floats) -> tuple[Floats, Floats]:
-    """Joint frame of b in the frame of the moving body (or the world) that carries its parent."""
+    """Return the joint frame of b in the frame of the moving body (or the world) that carries its parent."""
     parent = int(m.parent[b])
     if parent < 0 or m.v_count[parent] > 0:
         return m.placement_rotation[b], m.placement_position[b]
@@ -153,19 +154,19 @@ def _placement(m: MechanismArrays, b: int, rotation: Floats, position: Floats) -
 
 
 def turned_inertia(rotation: Floats, inertia: Floats) -> Floats:
-    """R I Rᵀ: the inertia in the axes that R turns to."""
+    """Return R I Rᵀ, the inertia in the axes that R turns to."""
     return product(product(rotation, inertia), rotation.T)
 
 
 def point_inertia(place: Floats) -> Floats:
-    """|r|² 1 − r rᵀ: the inertia about the origin of a unit mass at r."""
+    """Return |r|² 1 − r rᵀ, the inertia about the origin of a unit mass at r."""
     return product(place[None], place) * np.eye(3) - np.outer(place, place)
 
 
 def _part_masses(
     m: MechanismArrays, body: int, members: NDArray[np.int64], rotation: Floats, position: Floats
 ) -> tuple[float, Floats, Floats]:
-    """Mass, centre of mass and inertia about it of a part, in its first body's frame: sums of positive terms."""
+    """Return mass, centre of mass and inertia about this centre of a part, in the frame of its moving body `body`."""
     mass = sum(m.mass[members].tolist())
     if len(members) == 1 or mass == 0.0:
         turned = [turned_inertia(rotation[b], m.inertia[b]) for b in members]
@@ -182,7 +183,7 @@ def _part_masses(
     return mass, center, inertia
 
 
-# Laying bodies out as arrays: where each joint's coordinates stand, which dofs move which body.
+# Bodies as arrays: the position of each joint's coordinates in q and v, and the dofs that move each body.
 
 
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
@@ -216,7 +217,7 @@ def _stack(rows: list[Floats], shape: tuple[int, ...]) -> Floats:
 
 
 def _chains(v_start: Any, v_count: Any, parents: list[int]) -> tuple[list[int], list[int], list[int]]:
-    """For each body its last dof on the way from the world; for each dof its body and the dof before it."""
+    """Return for each body its last dof on the path from the world, and for each dof its body and the dof before it."""
     last_dof: list[int] = []
     dof_body: list[int] = []
     dof_parent: list[int] = []

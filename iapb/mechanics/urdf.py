@@ -1,10 +1,10 @@
-"""Read a URDF file into bodies, by the standard library's XML parser alone.
+"""Read a URDF file into bodies, with the standard library's XML parser alone.
 
-Independent of Pinocchio's reader, so that a comparison of the two checks the reading, too. Order and layout of
+The reader is independent of Pinocchio's, so a comparison of the two also checks the reading. Order and layout of
 q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the alphabetical order of
 their joints' names; continuous joints (cos, sin); planar and floating joints as SE(2) and SE(3) with
 velocities in body axes; mimic joints independent. Fixed joints stay as bodies without degrees of freedom.
-What can touch (<collision>) is no part of a mechanism: `read_collisions` reads it.
+Shapes for contact (<collision>) are not part of a mechanism: `read_collisions` reads them.
 Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML).
 """
 
@@ -37,7 +37,7 @@ KIND_OF_TYPE = {
     "floating": "free_flyer",
 }
 WITH_AXIS = ("revolute", "continuous", "prismatic")
-DEFAULT_AXIS = (1.0, 0.0, 0.0)  # of the specification
+DEFAULT_AXIS = (1.0, 0.0, 0.0)  # default of the specification
 
 
 class _Inertial(NamedTuple):
@@ -90,7 +90,7 @@ def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
 
 
 def _inertial(link: ElementTree.Element) -> _Inertial:
-    """Return mass, centre of mass and inertia about it, in link axes; nothing where there is no <inertial>."""
+    """Return mass, centre of mass and inertia about it, in link axes; zeros if there is no <inertial>."""
     inertial, where = link.find("inertial"), f"{where_of(link)} inertial"
     if inertial is None:
         return _Inertial()
@@ -131,7 +131,7 @@ def _connection(element: ElementTree.Element) -> _Connection:
 
 
 def _root(connections: list[_Connection], links: dict[str, _Inertial]) -> str:
-    """Return the one link that is nobody's child."""
+    """Return the only link that is not the child of a joint."""
     parent_of: dict[str, str] = {}
     for connection in connections:
         where = f"<joint name={connection.name!r}>"
@@ -148,7 +148,7 @@ def _root(connections: list[_Connection], links: dict[str, _Inertial]) -> str:
 
 
 def _depth_first(connections: list[_Connection], root: str) -> list[_Connection]:
-    """Return the joints depth first, siblings by name; a stack, so that depth has no limit."""
+    """Return the joints depth first, siblings ordered by name; a stack instead of recursion allows any depth."""
     children: dict[str, list[_Connection]] = {}
     for connection in sorted(connections, key=lambda c: c.name.encode(), reverse=True):
         children.setdefault(connection.parent, []).append(connection)
@@ -161,9 +161,9 @@ def _depth_first(connections: list[_Connection], root: str) -> list[_Connection]
     return order
 
 
-# The <collision> elements of a URDF file: which shapes each link touches with, in link axes.
+# The <collision> elements of a URDF file: the contact shapes of each link, in link axes.
 #
-# All five geometries of the format are read; which of them a scene can hold is the scene's to say.
+# All five geometries of the format are read; the scene decides which of them it accepts.
 # Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML/link); <capsule> as in ROS 2.
 
 # geometry -> its attributes that are lengths, and how many numbers each holds
@@ -225,7 +225,7 @@ def _shape(collision: ElementTree.Element, where: str) -> CollisionShape:
 # Elements of a URDF file, by the standard library's XML parser: the robot, its named parts, numbers and origins.
 
 
-MAX_BYTES = 10_000_000  # the largest of known robots has a tenth
+MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
 MAX_DEPTH = 32
 
 
@@ -234,7 +234,7 @@ def _refuse_doctype(*_: object) -> NoReturn:
 
 
 class _Depth:
-    """Counts the elements that are open; a URDF has five levels, a file without end as many as it likes."""
+    """Counts the open elements: a URDF has five levels, a malicious file could nest without limit."""
 
     def __init__(self) -> None:
         self.open = 0
@@ -249,16 +249,16 @@ class _Depth:
 
 
 def parse_robot(path: Path) -> ElementTree.Element:
-    """Return the robot element; document types, endless depth and slips of spelling are refused.
+    """Return the robot element; raise for a document type, too deep nesting or a misspelt name.
 
     Parameters
     ----------
-    path : of the URDF file
+    path : path of the URDF file
 
     Raises
     ------
     ArgumentError
-        The file cannot be read, is larger than MAX_BYTES, is no well-formed XML, or no URDF robot.
+        The file cannot be read, is larger than MAX_BYTES, is not well-formed XML, or is not a URDF robot.
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
@@ -298,7 +298,7 @@ def elements_by_name(robot: ElementTree.Element, tag: str) -> dict[str, ElementT
 
 
 def where_of(element: ElementTree.Element) -> str:
-    """Return how messages name an element."""
+    """Return the name of an element for error messages."""
     return f"<{element.tag} name={element.get('name')!r}>"
 
 
@@ -314,7 +314,7 @@ def numbers_in(where: str, text: str | None, count: int) -> Floats:
 
 
 def origin_of(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
-    """Return (rotation, position) of an optional <origin xyz rpy>; rpy turns about fixed x, then y, then z."""
+    """Return (rotation, position) of an optional <origin xyz rpy>; rpy rotates about fixed x, then y, then z."""
     element = owner.find("origin")
     if element is None:
         return np.eye(3), np.zeros(3)
@@ -325,10 +325,11 @@ def origin_of(owner: ElementTree.Element, where: str) -> tuple[Floats, Floats]:
     return rotation_of(angles) + 0.0, position  # + 0.0: no negative zeros
 
 
-# Slips in a URDF file that would otherwise pass for absent: a misspelt element, an unknown attribute, one given twice.
+# Spelling errors in a URDF file. Without this check a misspelt element, an unknown attribute or a repeated element
+# would be ignored silently.
 #
-# Elements of others (<gazebo>, <transmission>, <contact> …) are let through, as the format intends; one that is spelt
-# nearly like an element that is read is taken for a slip: the alternative is a link without mass and no word said.
+# Elements of other tools (<gazebo>, <transmission>, <contact> …) are allowed, as the format intends. A name that nearly
+# equals an element that is read counts as a spelling error: otherwise a link could lose its mass without a message.
 
 # element: (children that are read, children of the format that are not)
 _CHILDREN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -351,12 +352,12 @@ _ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "cylinder": ("radius", "length"),
     "capsule": ("radius", "length"),
 }
-_MANY = ("link", "joint", "collision")  # of these an element may hold several
-_NEAR = 0.75  # share of letters that agree: inertail and colision are slips, contact is a word of its own
+_MANY = ("link", "joint", "collision")  # an element may hold several of these
+_NEAR = 0.75  # share of letters that agree: inertail and colision are errors, contact is another word
 
 
 def check_spelling(robot: ElementTree.Element) -> None:
-    """Raise ArgumentError for the first slip in the parts of a robot that are read."""
+    """Raise ArgumentError for the first spelling error in the parts of a robot that are read."""
     _check(robot, "<robot>")
     for part in robot:
         if part.tag in ("link", "joint"):
