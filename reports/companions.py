@@ -1,4 +1,4 @@
-"""The files beside the report: its numbers, its manifest, what was not committed, and what they are, for machines."""
+"""Write the files beside the report: its numbers, its manifest, uncommitted changes, and machine-readable metadata."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def remembering(
 
 
 def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> tuple[Path, ...]:
-    """Write everything that goes beside the report in `out`, the description of it all last; return the files."""
+    """Write all files that accompany the report in `out`, the RO-Crate metadata last; return the files."""
     numbers = write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))
     listed = _write_manifest(out / MANIFEST_NAME, evidence)
     changed = _write_changes(out / DIRTY_NAME)
@@ -84,7 +84,7 @@ def _write_manifest(path: Path, evidence: Evidence) -> Path:
 
 
 def _write_changes(path: Path) -> Path | None:
-    """Write what was not committed; where all was, no file is left, not even an older one."""
+    """Write the uncommitted changes and return the file; without any, remove an older file and return None."""
     path.unlink(missing_ok=True)
     changes = uncommitted_changes()
     if not changes:

@@ -1,5 +1,7 @@
-"""What broke a law, kept so that it can be judged again: as a run where it is a trajectory or an impact, the impact as
-FCLIB too; a wall in the hand, limits of a device or two rooms as a table that says how to draw them again.
+"""Counterexamples to the laws, stored so that they can be checked again.
+
+A trajectory or an impact is stored as a run, an impact also in the FCLIB format. The other cases (a wall felt by the
+hand, limits of a device, two rooms) are stored as a table with the seeds that draw them again.
 """
 
 from __future__ import annotations
@@ -40,9 +42,9 @@ _TABLE = "counterexample"
 
 @dataclass(frozen=True)
 class CampaignRequest:
-    """What is verified: a resolver by its name, the tolerances by theirs, and how much.
+    """What a campaign verifies: the resolver and the tolerances, both given by name, and the number of cases.
 
-    workers : processes at work; 1 = this one.
+    workers : number of worker processes; 1 = this process alone.
     """
 
     resolver: str
@@ -54,19 +56,19 @@ class CampaignRequest:
     workers: int
 
     def subject(self) -> Subject:
-        """What the laws are put to; imports the resolver."""
+        """Import the resolver, and return it with its tolerances as the subject of the laws."""
         tested = function_named("--resolver", self.resolver)
         return Subject(tested, getattr(bounds, self.bounds), self.largest_condition, self.seed)
 
     def key(self) -> str:
-        """Hash of all that a batch depends on; not how many there are."""
+        """Return a hash of everything that a batch depends on; the number of batches does not enter it."""
         asked = {"resolver": self.resolver, "bounds": self.bounds, "condition": self.largest_condition,
                  "seed": self.seed, "code": code_version(), "laws": sources_hash("verification")}  # fmt: skip
         return hash_of(asked)[:16]
 
 
 def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) -> Path:
-    """Write one; return its file. The same one again is the same file."""
+    """Write a counterexample and return its file; the same counterexample always has the same file name."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{found.part.replace(' ', '_')}-{found.index:09d}-{found.law}.h5"
     if found.run is not None:
@@ -82,7 +84,7 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
 
 
 def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
-    """What draws the case again."""
+    """Return the part, index and request with which the case can be drawn again."""
     return {"part": found.part, "index": found.index, "request": asdict(request)}
 
 
@@ -95,7 +97,7 @@ def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> Br
 
 
 def _write_fclib(path: Path, case: ImpactCase) -> None:
-    """The impact as FCLIB too, where it is a problem of that kind: contacts, and a restitution in [0, 1]."""
+    """Write the impact in the FCLIB format if it can express it: with contacts and a restitution in [0, 1]."""
     e = case.given_restitution()
     if case.contacts == 0 or np.min(e) < 0.0:
         return
@@ -107,23 +109,23 @@ def _write_fclib(path: Path, case: ImpactCase) -> None:
 
 
 def recheck_command(path: Path, resolver: str) -> str:
-    """Return the command that judges a counterexample of this resolver again."""
+    """Return the command that checks a counterexample of this resolver again."""
     return f"iapb verify --recheck {path}" + ("" if resolver == ENGINE else " --allow-code")
 
 
 def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResidual]]:
-    """Judge a counterexample again: an impact by a resolver, a run as recorded and as it comes out now.
+    """Check a counterexample again: an impact with a resolver, a run as recorded and as simulated now.
 
     Parameters
     ----------
-    path : of its file
-    allow_code : whether the resolver that the file names is imported and called. A file may name any module, so
-        without leave the engine's own judges, and the law's name says so.
+    path : file of the counterexample
+    allow_code : whether the resolver that the file names is imported and called. A file may name any module, so by
+        default the engine's own resolver is used, and the name of the law says so.
 
     Raises
     ------
     RunFileError
-        The file is absent, damaged, or no counterexample.
+        The file is absent, damaged, or not a counterexample.
     """
     if not path.is_file():
         raise RunFileError(f"{path}: no such file")
@@ -142,7 +144,7 @@ def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResi
 
 
 def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code: bool) -> tuple[str, LawResidual]:
-    """Judge a stored impact or, for None, the case that part, seed and number draw."""
+    """Check a stored impact; if `case` is None, first draw the case again from its part, seed and index."""
     try:
         request = CampaignRequest(**origin["request"])
         part, index, own = origin["part"], origin["index"], request.resolver == ENGINE or allow_code
@@ -162,7 +164,7 @@ def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code:
 
 
 def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:
-    """Laws on the stored arrays, then on the same scene simulated again."""
+    """Check the laws on the stored arrays, then on the same scene simulated again."""
     run = read_run(path)
     yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))
     world, _, rendering = run.world.partition(" ")

@@ -30,8 +30,8 @@ def write_crate(out: Path, beside: Mapping[str, str], manifest: Iterable[StoredF
     Parameters
     ----------
     out : folder of the report.
-    beside : what each file beside the runs and tables is, by name.
-    manifest : the runs and tables; files that are not there are left out.
+    beside : descriptions, by name, of the files that are neither runs nor tables.
+    manifest : the runs and tables; missing files are left out.
     facts : the provenance of the report.
     """
     files = [_file(out / name, name, title, text) for name, (title, text) in _described(out, beside, manifest).items()]
@@ -45,7 +45,7 @@ def write_crate(out: Path, beside: Mapping[str, str], manifest: Iterable[StoredF
 
 
 def _described(out: Path, beside: Mapping[str, str], manifest: Iterable[StoredFile]) -> dict[str, tuple[str, str]]:
-    """Title and description of every file that is there, by its place from `out`."""
+    """Return the title and description of every existing file, by its path relative to `out`."""
     found = {name: (name, text) for name, text in beside.items()}
     for entry in manifest:
         if (out / entry.file).is_file():
@@ -86,7 +86,7 @@ def _root(parts: list[dict[str, str]], facts: Mapping[str, str]) -> dict[str, An
 
 
 def _action(parts: list[dict[str, str]], facts: Mapping[str, str]) -> dict[str, Any]:
-    """What made the files: the command, its seeds, the software and the machine."""
+    """Return the entry for the action that made the files: the command, its seeds, the software and the machine."""
     return {
         "@id": _ACTION, "@type": "CreateAction", "name": facts.get("command", "iapb reproduce"),
         "description": f"seeds: {facts.get('seeds', 'none')}", "instrument": [{"@id": _SOFTWARE}, {"@id": _MACHINE}],

@@ -1,7 +1,8 @@
-"""Two reports compared number by number: what agrees exactly, what within a tolerance, what differs.
+"""Compare two reports number by number: which agree exactly, which agree within a tolerance, and which differ.
 
-Measured times are never judged: they belong to a machine and an hour. Nor are sentences: their numbers stand in tables,
-and are compared there. Each table says itself which of its columns hold them (`Table.timed`, `Table.prose`).
+Measured times are not judged, because they depend on the machine and its load. Sentences are not judged either: their
+numbers are in tables and are compared there. Each table states which of its columns hold times (`Table.timed`) and
+which hold sentences (`Table.prose`).
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ LEFT_OUT = "left out"
 
 @dataclass(frozen=True)
 class Cell:
-    """One number, text or verdict of both reports; `gap` is the relative difference of the numbers in it."""
+    """One number, text or verdict in both reports; `gap` is the relative difference of its numbers."""
 
     table: str
     column: str
@@ -40,11 +41,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Difference:
-    """What came of the comparison.
+    """The result of a comparison.
 
     cells : every cell of either report
-    tables_old, tables_new : tables that only one has
-    runs_same, runs_other, runs_single : runs of both that are the same to the last bit, or not, and of one alone
+    tables_old, tables_new : tables that only the old or only the new report has
+    runs_same, runs_other : runs of both reports that are equal to the last bit, and those that are not
+    runs_single : runs that only one report has
     """
 
     cells: tuple[Cell, ...]
@@ -55,15 +57,18 @@ class Difference:
     runs_single: int
 
     def count(self, state: str) -> int:
-        """How many cells are in a state."""
+        """Return the number of cells in a state."""
         return sum(cell.state == state for cell in self.cells)
 
     def of(self, state: str) -> tuple[Cell, ...]:
-        """The cells in a state, the largest gap first."""
+        """Return the cells in a state, the largest gap first."""
         return tuple(sorted((cell for cell in self.cells if cell.state == state), key=lambda cell: -cell.gap))
 
     def by_part(self) -> dict[str, Counter[str]]:
-        """Number of cells in each state, by part of the report: what stands before the first / or comma of a table."""
+        """Return the number of cells in each state by part of the report.
+
+        The part is the text before the first "/" or comma in the name of a table.
+        """
         found: dict[str, Counter[str]] = {}
         for cell in self.cells:
             part = cell.table.partition("/")[0].partition(",")[0]
@@ -72,7 +77,7 @@ class Difference:
 
 
 def compare_reports(old: ReportNumbers, new: ReportNumbers, tolerance: float = TOLERANCE) -> Difference:
-    """Compare two reports; numbers are close within `tolerance` of the larger, or within ROUNDING."""
+    """Compare two reports; numbers are close if they differ by at most `tolerance` of the larger, or by ROUNDING."""
     both = [name for name in old.tables if name in new.tables]
     cells = [cell for name in both for cell in _cells(name, old.tables[name], new.tables[name], tolerance)]
     runs = {command: new.runs[command] == content for command, content in old.runs.items() if command in new.runs}
@@ -104,9 +109,10 @@ def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cel
 
 
 def _rows(old: Table, new: Table) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Rows of both by name: their number where there are equally many, else their first cell and which of those.
+    """Return the rows of both tables by name.
 
-    Where times decide which rows there are, a row is known by all that is not timed.
+    If the tables have equally many rows, a row is named by its number, else by its first cell; rows with the same
+    first cell are numbered. If measured times decide which rows exist, a row is named by all its untimed cells.
     """
     if old.timed_rows or new.timed_rows:
         return _named(_distinct(_untimed_cells(old)), old), _named(_distinct(_untimed_cells(new)), new)
@@ -126,7 +132,7 @@ def _untimed_cells(table: Table) -> list[str]:
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    """Names, with a number behind those that came before."""
+    """Return the names, each repeated one with a number after it."""
     seen: Counter[str] = Counter()
     found = []
     for name in names:
@@ -162,7 +168,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _gap(old: float, new: float) -> float:
-    """Relative difference; none where it is rounding."""
+    """Return the relative difference, 0 if the difference is within rounding."""
     if old == new:
         return 0.0
     largest = max(abs(old), abs(new))

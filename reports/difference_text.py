@@ -1,4 +1,4 @@
-"""What a comparison of two reports says: sentences, a table by part, and a line for each of the largest differences."""
+"""A comparison of two reports as text: sentences, a table by part, and a line for each of the largest differences."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _BITWISE = ("cpu", "lock", "sources", *PEERS)
 
 
 def sentences(found: Difference, tolerance: float) -> Iterator[str]:
-    """Say what agrees and what does not, each with its number."""
+    """Yield sentences that give the numbers of equal, close and different cells, tables and runs."""
     exact, close, differs = (found.count(state) for state in (EXACT, CLOSE, DIFFERS))
     judged = exact + close + differs
     yield (f"Of {judged} numbers and words in both reports, {exact} are exactly the same, {close} agree within "
@@ -53,7 +53,7 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
 
 
 def lines(found: Difference) -> Iterator[str]:
-    """A line for each of what differs most, SHOWN at most: where it stands, both values, the relative difference."""
+    """Yield a line for each of the SHOWN largest differences: table, row, column, both values, relative difference."""
     for cell in found.of(DIFFERS)[:SHOWN]:
         old, new = _values(cell)
         share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
@@ -61,13 +61,13 @@ def lines(found: Difference) -> Iterator[str]:
 
 
 def parts(found: Difference) -> Iterator[tuple[str, ...]]:
-    """Rows (part of the report, then how many cells are in each of the states of PARTS)."""
+    """Yield table rows: the part of the report, then the number of its cells in each of the states of PARTS."""
     for part, count in found.by_part().items():
         yield part, *(str(sum(count[state] for state in states) or "") for _, states in PARTS)
 
 
 def _values(cell: Cell) -> tuple[str, str]:
-    """Both values; long texts from where they part."""
+    """Return both values as text; long texts start shortly before their first difference."""
     old, new = str(cell.old), str(cell.new)
     parted = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0)
     start = max(0, parted - 8) if max(len(old), len(new)) > _WIDEST else 0
@@ -80,5 +80,5 @@ def _short(text: Any) -> str:
 
 
 def unlike(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
-    """Return why two reports need not agree to the last bit: the facts of their provenance that differ."""
+    """Return the provenance facts that differ and because of which two reports need not agree to the last bit."""
     return tuple(name for name in _BITWISE if old.get(name) != new.get(name))

@@ -1,4 +1,4 @@
-"""Drafts of what a CODECHECK (https://codecheck.org.uk/spec/config/1.0/) and the journal ReScience C ask for."""
+"""Drafts of the files for a CODECHECK (https://codecheck.org.uk/spec/config/1.0/) and for the journal ReScience C."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HEAD = """\
 
 
 def write_codecheck(out: Path, outputs: Mapping[str, str], command: str) -> Path:
-    """Write the draft: the files that a checker makes again, each with what it holds, and nobody's certificate."""
+    """Write the draft: the files that a checker reproduces, each with a description; the certificate is left empty."""
     authors = "".join(f"    - name: {_text(name)}\n" for name in PAPER_AUTHORS.split(", "))
     manifest = "".join(f"  - file: {_text(name)}\n    comment: {_text(text)}\n" for name, text in outputs.items())
     path = out / CODECHECK_NAME

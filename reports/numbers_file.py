@@ -1,4 +1,4 @@
-"""Every number of a report in one file beside it, numbers.json, so that two reports can be compared."""
+"""The file numbers.json beside a report holds every number of the report, so that two reports can be compared."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 @dataclass(frozen=True)
 class ReportNumbers:
-    """What a report says in numbers.
+    """The numbers of a report.
 
     tables : by place in the report, such as "claims/C07" or "mechanics/trees"
-    runs : content hash by the command that makes a run
-    provenance : where the report comes from
+    runs : content hash of each run, by the command that reproduces it
+    provenance : code, machine and packages that made the report
     depth : "quick" or "full"
     """
 
@@ -38,7 +38,7 @@ class ReportNumbers:
 
 
 def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> ReportNumbers:
-    """Return every table and judged sentence of a report, and what its runs came to; no table twice."""
+    """Return every table and judged sentence of a report, each once, and the content hashes of its runs."""
     tables = dict(_of_evidence(evidence))
     for key, figure in figures.items():
         if figure.numbers is not None and all(figure.numbers is not table for table in tables.values()):
@@ -65,7 +65,7 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
 
 
 def _claim_parts(claims: Iterable[Finding]) -> Iterator[tuple[str, Table]]:
-    """The parts of all claims, those that rest on measured times apart."""
+    """Yield a table of the parts of all claims, and another one of the parts that depend on measured times."""
     titles = ("part", "outcome", "holds in", "of", "cannot tell")
     rows = {timed: [(f"{claim.key}: {part.name}", part.outcome, part.held, part.decided, part.unknown)
                     for claim in claims for part in claim.parts if part.timed == timed]
@@ -76,7 +76,7 @@ def _claim_parts(claims: Iterable[Finding]) -> Iterator[tuple[str, Table]]:
 
 
 def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Table]]:
-    """Outcomes with their sentences, as one table; those that rest on measured times as another."""
+    """Yield the outcomes and their sentences as one table, and those that depend on measured times as another."""
     columns, kept = ("what", "outcome", "sentence"), tuple(found)
     yield name, titled(columns, tuple(tuple(row) for *row, timed in kept if not timed), prose=("sentence",))
     if any(timed for *_, timed in kept):
@@ -85,7 +85,7 @@ def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterato
 
 
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
-    """Write the numbers as JSON, to the last bit; what JSON has no number for is {"number": "nan"}, "inf" or "-inf"."""
+    """Write the numbers as JSON, to the last bit; NaN becomes {"number": "nan"}, an infinity {"number": "inf"}."""
     tables = {name: {"columns": list(table.titles), "timed": list(table.timed), "timed_rows": table.timed_rows,
                      "prose": list(table.prose),
                      "rows": [[_cell(value) for value in row] for row in table.cells]}
@@ -104,14 +104,14 @@ def _cell(value: Any) -> Any:
 
 
 def read_numbers(where: Path | str) -> ReportNumbers:
-    """Return the numbers of a report: of its folder, of a page with numbers.json beside it, or of that file.
+    """Return the numbers of a report, given its folder, one of its pages, or its numbers.json.
 
     Raises
     ------
     ArgumentError
         There is no such file.
     RunFileError
-        It is none of ours, or damaged.
+        The file was not written by `write_numbers`, or it is damaged.
     """
     path = Path(where)
     path = path / NUMBERS_NAME if path.is_dir() else path.with_name(NUMBERS_NAME) if path.suffix == ".html" else path

@@ -1,4 +1,4 @@
-"""Where a result comes from: code, packages, processor, command; no machine path and no host name."""
+"""The provenance of a result: code, packages, processor and command, but no machine path and no host name."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def collect_provenance(
     seeds: Sequence[int | str] = (), command: str | None = None, threads: int | None = None,
     packages: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return what it takes to make a result again, as texts by name.
+    """Return the facts needed to reproduce a result, as texts by name.
 
     Parameters
     ----------
     seeds
-        Seeds of the random numbers used, if any, each with its name or without.
+        Seeds of the random numbers used, if any, each with or without its name.
     command
-        The command that makes it again; by default the one that runs now, without machine paths.
+        The command that reproduces the result; by default the current one, without machine paths.
     threads
-        Threads that took part; by default not stated.
+        Number of threads used; by default not stated.
     packages
-        Packages beyond those that every result rests on, whose versions are stated too.
+        Further packages whose versions are stated, besides those that every result depends on.
     """
     facts = dict(_facts())
     facts["seeds"] = ", ".join(str(seed) for seed in seeds) or "none"
@@ -55,14 +55,14 @@ def collect_provenance(
 
 
 def current_command() -> str:
-    """Return the command line of this process; paths into this machine are cut to their last part."""
+    """Return the command line of this process; absolute paths are cut to their last part."""
     program = Path(sys.argv[0])
     name = "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name  # as python -m reports.cli
     return shlex.join([name or "python", *(_without_place(word) for word in sys.argv[1:])])
 
 
 def _without_place(word: str) -> str:
-    """An argument without the folders of a path that is absolute or leads upwards: they belong to a machine."""
+    """Return an argument; of a path that is absolute or contains "..", only its last part, as the rest is local."""
     option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
     path = Path(value)
     leads_out = path.is_absolute() or ".." in path.parts
@@ -71,7 +71,7 @@ def _without_place(word: str) -> str:
 
 @cache
 def _facts() -> tuple[tuple[str, str], ...]:
-    """What does not change while the process lives."""
+    """Return the facts that do not change while the process runs."""
     facts = {
         "version": package_version("iapb"),
         "commit": _git("rev-parse", "HEAD") or UNKNOWN,
@@ -98,7 +98,7 @@ def package_version(package: str) -> str:
 
 
 def _siconos_version() -> str:
-    """Siconos is a package of the system's Python, not of this one; the adapter that runs it knows."""
+    """Return the version of Siconos from its adapter: Siconos runs in the system's Python, not in this one."""
     try:
         return find_simulator("siconos").version()
     except MissingDependencyError:
@@ -124,7 +124,7 @@ def processor() -> str:
 def linear_algebra() -> str:
     """Return the BLAS of numpy: name, version, kernel family and threads.
 
-    Other packages bring a BLAS of their own; whether one of them is loaded yet must not change a key.
+    The BLAS libraries of other packages are ignored, so that a key does not depend on which packages are loaded.
     """
     import numpy as np
     from threadpoolctl import threadpool_info
@@ -138,7 +138,7 @@ def linear_algebra() -> str:
 
 
 def dispatched() -> str:
-    """Return the optional code of numpy that runs here; NPY_DISABLE_CPU_FEATURES can leave some out."""
+    """Return the CPU features whose optional code numpy uses here; NPY_DISABLE_CPU_FEATURES can disable some."""
     try:
         numpy = import_module("numpy._core._multiarray_umath")
         return " ".join(name for name in numpy.__cpu_dispatch__ if numpy.__cpu_features__[name]) or "baseline"
@@ -147,9 +147,9 @@ def dispatched() -> str:
 
 
 def machine_of(facts: Mapping[str, str]) -> str:
-    """Return what in a result's provenance can change last bits beside the code: processor, BLAS and numpy's code.
+    """Return the provenance facts besides the code that can change last bits: processor, BLAS, numpy's CPU features.
 
-    The number of threads is left out: it is that of the moment.
+    The number of threads is left out, because it can change within a process.
     """
     kernels = sorted(set(re.findall(r"(\S+) x\d+", facts.get("blas", ""))))
     simd = f"numpy {facts['simd']}" if "simd" in facts else ""
@@ -158,7 +158,7 @@ def machine_of(facts: Mapping[str, str]) -> str:
 
 @cache
 def this_machine() -> str:
-    """Return the same of this process: it is part of the keys of computed stages."""
+    """Return `machine_of` for this process; it is part of the keys of computed stages."""
     return machine_of({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
 
 
@@ -172,9 +172,9 @@ _TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requiremen
 
 
 def uncommitted_changes() -> str | None:
-    """Return what differs from the commit among the sources, the scenes and the lock, new files too, as a patch.
+    """Return the uncommitted changes of the sources, the scenes and the lock, including new files, as a patch.
 
-    Empty where nothing does, None where there is neither git nor checkout.
+    The patch is empty without changes, and None without git or without a checkout.
     """
     changed, new = _git("diff", "HEAD", "--", *_TRACED), _git("ls-files", "--others", "--exclude-standard", *_TRACED)
     if changed is None or new is None:
@@ -184,7 +184,7 @@ def uncommitted_changes() -> str | None:
 
 
 def _git(*arguments: str, fine: tuple[int, ...] = (0,)) -> str | None:
-    """Return what git says about the checkout; None where there is neither, or an exit status that is not `fine`."""
+    """Return git's output for the checkout; None without git or checkout, or if the exit status is not in `fine`."""
     if not (_ROOT / ".git").exists():
         return None
     try:

@@ -20,7 +20,7 @@ ARCHIVE_NAME = "report.zip"
 
 
 def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
-    """Write the pages and their archive, each in one step and the first page last; return the first page's path.
+    """Write each page and their archive atomically, the first page last; return the path of the first page.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
 
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:
-    """Return a zip of files, the same bytes for the same files."""
+    """Return a zip archive of files; equal files give equal bytes."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as file:
         for name in sorted(contents):

@@ -1,4 +1,4 @@
-"""Simulate a stored run again, from its own file alone, and compare the results bit for bit."""
+"""Simulate a stored run again from its file alone, and compare the results bit for bit."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ COUPLINGS: dict[str, Any] = {kind.name: kind for kind in (NoCoupling, FourChanne
 
 @dataclass(frozen=True)
 class Difference:
-    """One result that did not come out the same, and how.
+    """One result that differs between the stored and the repeated run, and how.
 
-    largest : absolute difference of the numbers; infinite where there is none (another shape, a NaN on one side).
+    largest : largest absolute difference of the numbers; infinite if they cannot be subtracted (different shapes, or a
+        NaN in one of the two).
     """
 
     name: str
@@ -47,7 +48,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Repetition:
-    """A run simulated again: the two content hashes, and what differs where they do."""
+    """The comparison of a stored run with its repetition: both content hashes, and the results that differ."""
 
     file: str
     stored: str
@@ -56,7 +57,7 @@ class Repetition:
 
     @property
     def same(self) -> bool:
-        """Whether every result is the same, bit for bit."""
+        """Whether all results are equal, bit for bit."""
         return self.stored == self.again
 
 
@@ -66,9 +67,9 @@ def repeat_run(path: Path | str) -> Repetition:
     Raises
     ------
     RunFileError
-        The file is no run, or damaged.
+        The file is not a run, or it is damaged.
     ArgumentError
-        Its law or coupling is not one of ours: it cannot be made again from the file alone.
+        The law or coupling is not one of the project's, so the file alone does not suffice to repeat the run.
     """
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
@@ -76,14 +77,14 @@ def repeat_run(path: Path | str) -> Repetition:
 
 
 def scene_of(run: Run) -> Scene:
-    """The scene of a run, from its resolved values."""
+    """Return the scene of a run, from its resolved values."""
     scene: Scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
     scene._source_text = run.scene_source
     return scene
 
 
 def law_of(run: Run) -> Any:
-    """The contact law of a run with its settings: one of LAWS, or that of the world that the run names."""
+    """Return the contact law of a run with its settings: one of LAWS, or the law of the run's world."""
     if run.law in LAWS:
         module, name = LAWS[run.law]
         kind = getattr(import_module(module), name)
@@ -95,12 +96,12 @@ def law_of(run: Run) -> Any:
 
 
 def _law_of_world(name: str) -> Any:
-    """The law of a world of reference/worlds.py, None where there is no such world."""
+    """Return the law of a world of reference/worlds.py; None if there is no such world."""
     return find_world(name).law if name in WORLDS else None
 
 
 def coupling_of(run: Run) -> Coupling:
-    """The coupling of a run with its gains."""
+    """Return the coupling of a run with its gains."""
     if run.coupling not in COUPLINGS:
         raise ArgumentError("coupling", run.coupling, one_of(run.coupling, COUPLINGS))
     kind = COUPLINGS[run.coupling]
@@ -110,13 +111,13 @@ def coupling_of(run: Run) -> Coupling:
 
 
 def _known(kind: Any, settings: Any) -> dict[str, Any]:
-    """The settings that are parameters; others only say what the law does."""
+    """Return the settings that are constructor parameters; the other ones only describe the law."""
     names = {field.name for field in fields(kind) if field.init}
     return {name: value for name, value in settings.items() if name in names}
 
 
 def differences(stored: Run, again: Run) -> tuple[Difference, ...]:
-    """Return every result that is not the same bit for bit; none where the content hashes are equal."""
+    """Return every result that is not equal bit for bit; there is none if the content hashes are equal."""
     heads, arrays = (result_head(stored), result_head(again)), (dict(results_of(stored)), dict(results_of(again)))
     found = [_difference(name, *(head[name] for head in heads)) for name in heads[0]]
     for name in dict.fromkeys([*arrays[0], *arrays[1]]):

@@ -1,4 +1,4 @@
-"""Runs of the paper's worlds through the store: what was computed once is read from its file."""
+"""Runs of the paper's worlds through the store: a run is computed once and then read from its file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Wanted = tuple[Scene, str, str]
 
 @dataclass(frozen=True)
 class Fetched:
-    """A run, what its file says of itself, where it belongs, and whether its file existed before."""
+    """A run, the index entry of its file, its place in the store, and whether its file existed before."""
 
     run: Run
     entry: RunEntry
@@ -37,12 +37,12 @@ class Fetched:
 
 
 class Runner:
-    """Simulates a scene in a world, or reads the run that exists.
+    """Simulates a scene in a world, or reads the existing run.
 
     Parameters
     ----------
-    folder : where run files are, and go.
-    progress : called as progress(steps done, steps in all) while a run is computed.
+    folder : folder of the run files.
+    progress : called as progress(steps done, total steps) while a run is computed.
     """
 
     def __init__(self, folder: Path | str, progress: Progress | None = None) -> None:
@@ -59,7 +59,8 @@ class Runner:
     ) -> Run:
         """Return the run of `scene` in `world`.
 
-        An incomplete run is stored as partial; then what stopped it is raised, or with `partial` the run returned.
+        An incomplete run is stored as partial. Then the error that stopped it is raised; with `partial` the run is
+        returned instead.
         """
         fetched = self.fetch(scene, world, rendering, keep=keep)
         if not partial:
@@ -68,7 +69,7 @@ class Runner:
         return fetched.run
 
     def fetch(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Fetched:
-        """Return the run of `scene` in `world` with its place, even where the simulation gave up."""
+        """Return the run of `scene` in `world` with its place, even if the simulation gave up."""
         place = self._place(scene, world, rendering)
         if place.path.name in self._held:
             return self._held[place.path.name]
@@ -79,9 +80,9 @@ class Runner:
         return fetched
 
     def stream(self, scene: Scene, world: str, rendering: str = "full", *, resume: bool = False) -> tuple[Place, Any]:
-        """Simulate and store a run in constant memory; return its place and what came of it, None where it exists.
+        """Simulate and store a run in constant memory; return its place and the outcome, None if the run exists.
 
-        resume : go on from what a stopped or killed process left, bit for bit.
+        resume : continue, bit for bit, from the log that a stopped or killed process left.
         """
         place = self._place(scene, world, rendering)
         if place.path.is_file():
@@ -98,7 +99,10 @@ class Runner:
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:
-        """Collect the runs used inside, as used by `user`, in a mapping of their own; they count outside as well."""
+        """Yield a mapping that collects the runs used inside this context as used by `user`.
+
+        The runs also count as used outside of it.
+        """
         outside, user_outside = self.used, self.user
         inside: dict[str, UsedRun] = {}
         self.used, self.user = inside, user
@@ -112,15 +116,15 @@ class Runner:
                 add_use(outside, run)
 
     def used_so_far(self) -> list[str]:
-        """Names of all run files used, also outside of the `recording` that is open, in order."""
+        """Return the sorted names of all run files used so far, inside and outside of an open `recording`."""
         return sorted({file for used in (*self._outside, self.used) for file in used})
 
     def use_again(self, file: str) -> None:
-        """Say that the present user also uses a run that was asked for before."""
+        """Record that the current user also uses a run that was requested before."""
         add_use(self.used, replace(self._known[file], used_by=(self.user,) if self.user else ()))
 
     def file_of(self, scene: Scene, world: str, rendering: str = "full") -> str:
-        """Name of the file of a run."""
+        """Return the name of the file of a run."""
         return self._place(scene, world, rendering).path.name
 
     def _place(self, scene: Scene, world: str, rendering: str) -> Place:
@@ -128,9 +132,9 @@ class Runner:
 
     @contextmanager
     def crew(self, workers: int) -> Iterator[Callable[[Sequence[Wanted]], Iterator[Run | None]]]:
-        """Give a function that makes many runs in as many processes; a run is used only once somebody asks for it.
+        """Yield a function that simulates many runs in `workers` processes, without counting them as used.
 
-        It yields the runs in the order in which they are wanted, None for one that raises.
+        The function yields the runs in the order of its argument, and None for a run that raises or is incomplete.
         """
         with worker_pool(workers) as pool:
 
@@ -144,7 +148,7 @@ class Runner:
             yield made
 
     def _note(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
-        """Say that the present user uses a run."""
+        """Record that the current user uses a run."""
         self._know(fetched, scene, world, rendering)
         self.use_again(fetched.entry.file)
 
@@ -158,12 +162,12 @@ class Runner:
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
-        """Start of the file's name."""
+        """Return the start of the file's name."""
         return "-".join([scene.name, world] + ([rendering] if rendering != "full" else []))
 
     @staticmethod
     def inputs(scene: Scene, world: str, rendering: str = "full") -> dict[str, Any]:
-        """Everything that determines the run, besides the code."""
+        """Return everything that determines the run, besides the code."""
         found = worlds.find_world(world, rendering)
         return run_inputs(scene, found.law, found.coupling_in(scene), world)
 
@@ -176,7 +180,10 @@ class Runner:
 
 
 def _fetched(folder: str, wanted: Wanted) -> Fetched | None:
-    """One run, in another process; what raises there is asked for again here, and raises where it belongs."""
+    """Return a run, in a worker process; None if it raises or is incomplete.
+
+    The parent then requests such a run again, so that the error is raised there.
+    """
     fetched = attempt("run", partial(Runner(folder).fetch, *wanted, keep=False), [])
     return fetched if fetched is not None and fetched.run.complete else None
 

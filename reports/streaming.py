@@ -1,7 +1,7 @@
-"""Runs of any length in constant memory: chunks go to a log while the loop is at work, and from there to the run file.
+"""Runs of any length in constant memory: chunks go to a log during the loop, and from the log to the run file.
 
-A run that is over before its first block is due never touches the disk until it is stored. A longer one leaves a log
-beside its file from which it goes on, bit for bit, after a kill; at most `PAUSE` seconds of work are lost.
+A run that ends before its first block is due needs no log. A longer run keeps a log beside its file. After a kill, the
+run can be continued from this log, bit for bit; at most about `PAUSE` seconds of work are lost.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _STATE_SHARE = 0.05  # of the time may go into states
 
 @dataclass(frozen=True)
 class Streamed:
-    """What came of a run: its entry where complete, why it stopped, where it went on from, whether it can again."""
+    """The outcome of a run: its entry if complete, why it stopped, the step it resumed at, and if it can resume."""
 
     entry: RunEntry | None
     stopped: str
@@ -51,7 +51,7 @@ class Streamed:
 
 
 def log_of(path: Path) -> Path:
-    """Return the log beside a run file that is in the making."""
+    """Return the path of the log of an unfinished run, beside its run file."""
     return path.with_name(path.name + LOG_SUFFIX)
 
 
@@ -61,13 +61,13 @@ def stream(place: Place, simulation: Simulation, world: str, total: int, *, resu
 
     Parameters
     ----------
-    simulation : at its start.
-    resume : go on from the log in that place, where there is one.
+    simulation : in its initial state.
+    resume : continue from the log in that place, if there is one.
 
     Raises
     ------
     RunFileError
-        Something cannot be written, or the log belongs to another run.
+        A file cannot be written, or the log belongs to another run.
     """
     return _Stream(place, simulation, world, total).run(resume, progress)
 
@@ -110,7 +110,7 @@ class _Stream:
         return entry
 
     def _between(self) -> None:
-        """Between two chunks: the log gets what is held where it is much, and a state now and then."""
+        """Between two chunks, append the held chunks to the log if they exceed HELD bytes, or if a state is due."""
         due = time.monotonic() >= self._next
         if not (due or self.recorder.held_bytes > HELD):
             return
@@ -123,7 +123,7 @@ class _Stream:
             self.log.sync()  # type: ignore[union-attr]
 
     def _spill(self) -> None:
-        """Append the chunks that are held and not yet in the log: Ctrl-C may come in the middle, and again."""
+        """Append the held chunks that are not yet in the log; it is safe to repeat this if Ctrl-C interrupts it."""
         if self.log is None:
             self.log = self._open()
         first = self.recorder.first
@@ -134,7 +134,7 @@ class _Stream:
         self.recorder.forget()
 
     def _open(self) -> RunLog:
-        """Return the log in its place, emptied."""
+        """Return the emptied log in the run's place."""
         head = log_head(self.simulation, self.world, self.total, key=self.place.key, code=code_label())
         try:
             return RunLog(log_of(self.place.path), head)
@@ -142,7 +142,7 @@ class _Stream:
             raise RunFileError(f"{self.place.path}: another process is computing this run; wait for it") from None
 
     def _go_on(self) -> int:
-        """Restore the last state in the log; return its step, 0 where there is none."""
+        """Restore the last state in the log; return its step, 0 if there is none."""
         path = log_of(self.place.path)
         if not path.is_file():
             return 0
@@ -163,7 +163,7 @@ class _Stream:
 
 
 def log_head(simulation: Simulation, world: str, total: int, **more: Any) -> dict[str, Any]:
-    """Return what a log says of its run: enough to simulate it again."""
+    """Return the head of a log: enough data to simulate the run again."""
     law, coupling = simulation.law, simulation.coupling
     return plain({
         "scene_resolved": simulation.scene.resolved(), "scene_source": simulation.scene.source_text, "world": world,
@@ -182,13 +182,13 @@ def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int
              rows: list[Any] | None = None) -> Iterator[Run]:
     """Yield the run in a log in parts.
 
-    joiner : a recorder of the same simulation that was made at its start; steps : that must be there;
-    rows : takes the `more` columns of the log.
+    joiner : a recorder of the same simulation, made in its initial state; steps : number of steps that the log must
+    have; rows : receives the `more` additional columns of the log.
 
     Raises
     ------
     RunFileError
-        Fewer steps are whole.
+        The log has fewer complete steps.
     """
     lengths, held = lengths_of(joiner), 0
     for block in read_log(path)[1]:
@@ -208,20 +208,20 @@ def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int
 
 
 def logs_of_killed(folder: Path | str) -> list[Path]:
-    """Return the logs in stores, at and below a folder, that no process is at work on."""
+    """Return the logs in stores, at and below a folder, that no process is writing."""
     return [log for store in stores_below(folder) for log in sorted(store.glob(f"*.h5{LOG_SUFFIX}"))
             if is_log(log) and not log.is_symlink() and not is_locked(log)]
 
 
 def recover(log: Path) -> Path:
-    """Store what a log holds as the partial run beside it, so that it can be read; the log stays, to go on from.
+    """Store the steps in a log as a partial run beside it, so that they can be read; the log stays for resuming.
 
     Raises
     ------
     RunFileError
         The log is damaged.
     ArgumentError
-        Its law or coupling is not one of ours.
+        The law or coupling is not one of the project's.
     """
     head, _ = read_log(log)
     simulation = simulation_of(head)
@@ -232,13 +232,13 @@ def recover(log: Path) -> Path:
 
 
 def simulation_of(head: Mapping[str, Any]) -> Simulation:
-    """Return the simulation of a log, at its start."""
+    """Return the simulation of a log in its initial state."""
     run: Any = SimpleNamespace(**head)  # it has the names of a Run's
     return Simulation(scene_of(run), law_of(run), coupling_of(run))
 
 
 def _forget(log: Path) -> None:
-    """Remove a log that an earlier attempt left, unless somebody writes it."""
+    """Remove a log that an earlier attempt left, unless another process is writing it."""
     if log.is_file():
         try:
             RunLog(log, {}, anew=False).close(remove=True)

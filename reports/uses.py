@@ -1,4 +1,4 @@
-"""Which runs something was made from, and the command that makes each of them again."""
+"""Keep track of which runs a result was made from, and of the command that reproduces each run."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ COMPLETE, PARTIAL = "complete", "partial"
 
 @dataclass(frozen=True)
 class UsedRun:
-    """A run file that was read or written for something.
+    """A run file that was read or written for a result.
 
     name : scene, world and rendering
     file : name within the folder of runs
-    key, content_hash : what was asked for, and what came of it
-    command : makes the run again
-    size : of the file [bytes]
-    status : COMPLETE or PARTIAL, the latter where the simulation gave up
-    used_by : what used it, such as a claim or a topic
+    key, content_hash : hash of the run's inputs, and hash of its results
+    command : reproduces the run
+    size : size of the file [bytes]
+    status : COMPLETE, or PARTIAL if the simulation gave up
+    used_by : the claims, topics and figure inputs that used the run
     """
 
     name: str
@@ -41,15 +41,15 @@ class UsedRun:
 
 
 def add_use(used: MutableMapping[str, UsedRun], run: UsedRun) -> None:
-    """Add a run to those used, by file; who used it before stays known."""
+    """Add a run to the used runs, by file; its earlier users are kept."""
     before = used[run.file].used_by if run.file in used else ()
     used[run.file] = replace(run, used_by=tuple(dict.fromkeys(before + run.used_by)))
 
 
 def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
-    """Return the `iapb run` that simulates this scene in this world; empty where no scene of the project leads to it.
+    """Return the `iapb run` command that simulates this scene in this world; "" if no scene of the project matches.
 
-    Its values are tried before it is returned: as the command reads them, they must give the scene to the last bit.
+    The values in the command are checked: parsed as the command parses them, they must give the scene to the last bit.
     """
     shipped = _shipped(scene.name)
     if shipped is None:
@@ -87,7 +87,7 @@ def _shipped(name: str) -> Scene | None:
 
 
 def changes(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (dotted path, new value) wherever the values of two resolved scenes differ, as deep as paths reach."""
+    """Yield (dotted path, new value) for each difference of two resolved scenes, at the deepest possible path."""
     if old == new:
         return
     steps = _steps(old, new)
@@ -99,7 +99,7 @@ def changes(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _steps(old: Any, new: Any) -> list[Any] | None:
-    """Keys or indices that both have; None where a path cannot go deeper."""
+    """Return the keys or indices that both values have; None if a path cannot go deeper."""
     if isinstance(old, Mapping) and isinstance(new, Mapping) and list(old) == list(new):
         return list(new)
     if isinstance(old, list) and isinstance(new, list) and _names(new) and _names(old) == _names(new):
@@ -108,7 +108,10 @@ def _steps(old: Any, new: Any) -> list[Any] | None:
 
 
 def _names(items: list[Any]) -> list[str]:
-    """Names of a list's items; none at all unless every one has its own: such a list is set as a whole."""
+    """Return the names of a list's items; an empty list unless all items have different names.
+
+    A list without such names can only be set as a whole.
+    """
     names = [item["name"] for item in items if isinstance(item, Mapping) and item.get("name")]
     return names if len(set(names)) == len(items) else []
 

@@ -1,1 +1,1 @@
-"""What the report is made of, topic by topic: computed once, kept in HDF5, read back the next time."""
+"""The evidence of the report, topic by topic: computed once, stored in HDF5, and read back later."""

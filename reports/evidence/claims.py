@@ -17,7 +17,7 @@ MOST_WORKERS = 4  # a worker holds some 400 MB
 
 
 def cores() -> int:
-    """Processes that are worth starting on this machine."""
+    """Return the number of worker processes that are worth starting on this machine."""
     return min(MOST_WORKERS, len(os.sched_getaffinity(0)))
 
 
@@ -26,7 +26,7 @@ def compute(
 ) -> tuple[Finding, ...]:
     """Check every claim with runs from the store; each run is listed under every claim that uses it.
 
-    workers : processes that make runs ahead; 1: none, all runs are made here
+    workers : processes that simulate runs in advance; 1: all runs are simulated in this process
     """
     files: dict[tuple[int, str, str], tuple[str, Scene]] = {}  # holds the scenes, so that their ids stay theirs
 

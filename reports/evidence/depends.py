@@ -1,4 +1,4 @@
-"""What stages read besides the project's own sources: one line per stage. It is part of the stage's key."""
+"""The external folders and packages that each stage reads; their hashes and versions are part of the stage's key."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PACKAGES: dict[str, tuple[str, ...]] = {
 
 
 def depends_of(stage: str) -> dict[str, str]:
-    """Return everything that a stage depends on by name: hashes of folders, or ABSENT, and versions of packages."""
+    """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and package versions."""
     folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
     if stage == "survival":
         kept = LAST_RESULT.read_bytes() if LAST_RESULT.is_file() else b""

@@ -1,4 +1,4 @@
-"""Does any impact gain energy, in real arithmetic? Recorded impacts of the report, and many adverse ones."""
+"""Topic: does any impact gain energy in exact arithmetic? It checks the report's impacts and many adverse ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("moved
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
     """Certify every engine run that the report uses, and adverse impacts of the compiled resolver.
 
-    Rigid worlds are left out: they solve impulses and forces of a step together and record no impact alone.
+    Rigid worlds are left out: they solve for the impulses and forces of a step together and record no separate impact.
     """
     failures: list[Failure] = []
     files, rows = runner.used_so_far(), []
@@ -69,12 +69,12 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 
 def verdict_of_families(holds: list[bool | None]) -> str:
-    """Verdict on all families: where one is left open (too few of its impacts moved), the law is not reproduced."""
+    """Return the verdict on all families; if one is undecided (too few of its impacts moved), it is NOT_TESTABLE."""
     return NOT_TESTABLE if None in holds and False not in holds else verdict_of_law(holds)
 
 
 def _certified(runner: Runner, name: str) -> dict[str, Any]:
-    """The row of a run; empty where its law is not the engine's or it has no impact."""
+    """Return the table row of a run; it is empty if the run's law is not the engine's or the run has no impact."""
     run = read_run(runner.store.folder / name)
     if run.law not in ENGINE_LAWS or not len(run.impacts.step):
         return {}

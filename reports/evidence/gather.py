@@ -1,4 +1,4 @@
-"""All evidence of a report, stage by stage."""
+"""Collect all evidence of a report, stage by stage."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link
 
 
 def gather(out: Path, depth: str, progress: Progress) -> Evidence:
-    """Compute or read everything that the report shows; `out` receives runs/ and tables/."""
+    """Compute or read everything that the report shows; runs/ and tables/ are written in `out`."""
     runner = Runner(out / "runs")
     kept = _Kept(out / "tables", depth, progress, runner)
     scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
@@ -76,20 +76,20 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
 
 
 def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
-    """One topic, or one that says why it could not be computed."""
+    """Return a topic, or a substitute that says why the topic could not be computed."""
     topic: Finding | None = kept.stage(name, Finding, lambda done, _: compute_topic(name, runner, depth, done), None)
     return failed_topic(name, kept.failures[name][-1]) if topic is None else topic
 
 
 def provenance() -> dict[str, str]:
-    """Where the report comes from: date, the facts of every result, all seeds, the sources, what is compared with."""
+    """Return the provenance of the report: date, machine and versions, all seeds, sources, and compared packages."""
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
     facts = collect_provenance(seeds=seeds, packages=PEERS)
     return {"date": datetime.now(UTC).date().isoformat()} | facts | {"sources": evidence_version()}
 
 
 class _Kept:
-    """Stages of one folder and depth, in the order in which they were asked for, and the cases that failed."""
+    """The stages of one folder and depth, in the order in which they were requested, and the cases that failed."""
 
     def __init__(self, folder: Path, depth: str, progress: Progress, runner: Runner) -> None:
         self.folder, self.depth, self.progress, self.runner = folder, depth, progress, runner
@@ -97,7 +97,7 @@ class _Kept:
         self.failures: dict[str, list[Failure]] = {}
 
     def stage(self, name: str, kind: Any, compute: Compute, nothing: Any = ()) -> Any:
-        """The records of a stage, computed if they are not there; `nothing` where it cannot be computed at all."""
+        """Return the records of a stage, stored or computed now; `nothing` if the stage cannot be computed at all."""
         stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth}, depends_of(name))
         self.failures[name] = stage.failures
 
@@ -109,12 +109,12 @@ class _Kept:
         return self.attempt(name, records, nothing)
 
     def finding(self, name: str, records: Sequence[Any], said: Callable[[Any, list[Failure]], Finding]) -> Finding:
-        """The finding on the records of a stage; without any, why there are none."""
+        """Return the finding on the records of a stage; without records, return one that says why there are none."""
         failures = self.failures[name]
         return said(records, failures) if records or not failures else failed_topic(name, failures[0])
 
     def attempt(self, name: str, compute: Compute, nothing: Any) -> Any:
-        """What is computed under a name, or `nothing` where that raises; an interrupt passes through."""
+        """Return the result of `compute`, or `nothing` if it raises; KeyboardInterrupt is not caught."""
         failures = self.failures.setdefault(name, [])
         started = len(failures)
         found = attempt("all of it", lambda: compute(lambda *done: self.progress(name, *done), failures), failures)
@@ -122,13 +122,16 @@ class _Kept:
         return nothing if found is None and len(failures) > started else found
 
     def failed(self) -> tuple[FailedCases, ...]:
-        """What failed in each stage; the tracebacks go to a file beside the tables, in place of older ones."""
+        """Return the failed cases of each stage, and write their tracebacks to a file beside the tables."""
         return tuple(case for name, failures in self.failures.items()
                      for case in failed_cases(self.folder, name, failures))  # fmt: skip
 
 
 def failed_cases(folder: Path, name: str, failures: Sequence[Failure]) -> tuple[FailedCases, ...]:
-    """Write the tracebacks of what failed under a name to a file in `folder`, in place of an older one; () for none."""
+    """Write the tracebacks of the failures of stage `name` to a file in `folder`, replacing an older file.
+
+    Return the failed cases with that file; without failures, return () and leave no file.
+    """
     path = folder / f"{name.replace(' ', '_')}-failed.txt"
     path.unlink(missing_ok=True)
     if not failures:

@@ -1,4 +1,4 @@
-"""The manifest: every file that the report was made from, its hashes, and the command that makes it again."""
+"""The manifest: every file that the report was made from, its hashes, and the command that reproduces it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TABLE_COMMAND = "iapb reproduce"
 
 
 def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
-    """One line per run file used and per table file, in the order of use; files are named from the folder `out`."""
+    """Return one line per used run file and per table file, in the order of use; paths are relative to `out`."""
     runs = [_run(run, out) for run in used.values()]
     return tuple(runs + [_table(stage, out) for stage in stages])
 

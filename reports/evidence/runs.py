@@ -1,4 +1,4 @@
-"""The runs behind the paper's figures, by the names under which the figures ask for them."""
+"""The runs behind the paper's figures, by the input names that the figures use."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
 
 
 def shipped_scene(name: str, values: dict[str, Any] | None = None) -> Scene:
-    """A scene that comes with the project, with some values changed."""
+    """Return a scene that comes with the project, with some values changed."""
     scene = load_scene(find_scene(name))
     return scene.with_values(values) if values else scene
 
@@ -51,7 +51,7 @@ def shipped_scene(name: str, values: dict[str, Any] | None = None) -> Scene:
 def figure_runs(
     runner: Runner, progress: Callable[[int, int], None], failures: list[Failure] | None = None
 ) -> dict[str, Run]:
-    """Every run in FIGURE_RUNS, computed or read, but for those that fail."""
+    """Return every run in FIGURE_RUNS, computed or read; runs that fail are left out."""
     runs = {}
     for name, (scene, values, world, rendering) in counted(FIGURE_RUNS.items(), progress):
         with runner.recording(name):

@@ -1,10 +1,10 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
-A record's tables are typed columns of that file, its words a JSON text without their rows. The file's name carries a
+The file holds the tables of a record as typed columns, and everything else as JSON text. The file's name contains a
 hash of what determines the records: the stage's inputs, the sources of the engine, the references and the verification,
-the scenes, the processor, BLAS kernel and optional code of numpy, and what else the stage says that it depends on. So a
-changed line of theirs makes the stage run again, a change of the report not, and no number wears another machine's
-name. Beside the records stand the runs they were made from.
+the scenes, the processor, the BLAS kernel and the optional code of numpy, and the declared external dependencies. If
+any of them changes, the stage is computed again; a change of the report's own code does not cause that. Because the
+machine is part of the hash, numbers of two machines are never mixed. The file also lists the runs behind the records.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ _LAYOUT = 2  # of the files: 1 had the rows of tables in the JSON as well
 
 
 class Stage:
-    """Where the records of one topic are kept.
+    """The file that stores the records of one topic.
 
     Parameters
     ----------
-    folder : of the table files.
-    name : of the topic; starts the file's name.
+    folder : folder of the table files.
+    name : name of the topic; the file's name starts with it.
     kind : the type of the records, such as ``tuple[Claim, ...]``.
-    inputs : what determines them besides the code.
-    depends : what they depend on outside of the project, such as files beside it, by name.
+    inputs : what determines the records besides the code.
+    depends : external dependencies of the records by name, such as files outside of the project.
 
     Attributes
     ----------
-    runs : the runs that the records were made from, by file; known once there are records.
-    failures : the cases that raised. Where there are some, the records go to a file that no later call takes for
-        complete: the stage is computed again.
+    runs : the runs that the records were made from, by file; empty until the records are computed or read.
+    failures : the cases that raised. If there are any, the records are written to a file named "incomplete", which
+        later calls do not read, so that they compute the stage again.
     """
 
     def __init__(
@@ -69,9 +69,9 @@ class Stage:
         self._kind = kind
 
     def get_or_compute(self, compute: Callable[[], Any], runner: Runner | None = None) -> Any:
-        """Return the records: from the file where there is one, else computed and written.
+        """Return the records: read them from the file if it exists, else compute and write them.
 
-        The runs that `compute` asks `runner` for are remembered in the file, and count as used whenever it is read.
+        The file also lists the runs that `compute` requested from `runner`; they count as used whenever it is read.
         """
         from pydantic import TypeAdapter
 
@@ -134,7 +134,7 @@ def _runs_of(table: Table) -> Iterator[UsedRun]:
 
 
 def plain_records(records: Any, tables: dict[str, Table], name: str = "table") -> Any:
-    """Return records as plain values, numpy's included; `tables` receives their tables, each named after its holder."""
+    """Return records as plain values, without numpy types; `tables` receives their tables, each named by its place."""
     if isinstance(records, finding.Table):
         label, count = safe_name(name), 2
         while label in (*tables, _RECORDS, _RUNS):
@@ -152,7 +152,7 @@ def plain_records(records: Any, tables: dict[str, Table], name: str = "table") -
 
 
 def _whole(value: Any, tables: Mapping[str, Table]) -> Any:
-    """The plain records with their tables back in them."""
+    """Return the plain records with their tables inserted again."""
     if isinstance(value, dict):
         if {"table", "columns", "judged"} <= set(value):
             return finding_table(tables.get(value["table"]), value)

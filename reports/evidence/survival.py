@@ -1,4 +1,4 @@
-"""Topic: runs that repeat to the last bit; the last results of fault injection and fuzzing."""
+"""Topic: do runs repeat to the last bit? It also shows the last results of fault injection and fuzzing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LEAD = (
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Simulate the runs of the figures again from their files; read the last results of the laboratory."""
+    """Simulate the runs of the figures again from their files; read the last results of `make fuzz`."""
     failures: list[Failure] = []
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
     tables, findings = {"simulated again": _repeated_table(repeated)}, [_repetitions(repeated)]
@@ -54,7 +54,7 @@ def _repeated(runner: Runner, name: str) -> Any:
 
 
 def _last(part: str) -> tuple[Table, str] | None:
-    """Table of the last fuzzing or fault injection, and when and how it was made; None where it is not kept."""
+    """Return the table of the last fuzzing or fault injection with its origin; None if there is no stored result."""
     kept = json.loads(LAST_RESULT.read_text(encoding="utf-8")) if LAST_RESULT.is_file() else {}
     if part not in kept:
         return None
@@ -64,7 +64,7 @@ def _last(part: str) -> tuple[Table, str] | None:
 
 
 def _of_table(table: Table, column: str) -> int:
-    """Sum of a column."""
+    """Return the sum of a column."""
     return sum(table.column(column))
 
 

@@ -32,7 +32,7 @@ def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int
 
 
 def failed_topic(name: str, failure: Failure) -> Finding:
-    """A topic in place of one that could not be computed: it says why."""
+    """Return a substitute for a topic that could not be computed; it says why."""
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
     key, title = name.replace(" ", "-"), name.replace("-", " ").capitalize()
     return finding_of(key, title, "", sentence, (Part(sentence, NOT_COMPUTED),))
