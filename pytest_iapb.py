@@ -1,4 +1,4 @@
-"""pytest plugin: one test per law for an impact resolver. It loads nothing until a test asks for it.
+"""pytest plugin: one test per law for an impact resolver. It imports this project only if a test uses it.
 
     import pytest
     from my_solver import resolve
@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-IMPACTS = 1000  # of each law, unless the marker or --iapb-impacts says otherwise
+IMPACTS = 1000  # for each law, unless the marker or --iapb-impacts gives another number
 _MARKER = ("iapb(contract='equality', laws=None, impacts=1000, **options): what `iapb_law` judges by; "
            "options as of verification.check_passivity")  # fmt: skip
 
@@ -32,19 +32,19 @@ def _at_least(least: int) -> Callable[[str], int]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the number of impacts and the seed."""
+    """Add the options for the number of impacts and the seed."""
     group = parser.getgroup("iapb", "laws of impact resolvers")
     group.addoption("--iapb-impacts", type=_at_least(1), metavar="N", help=f"random impacts for each law [{IMPACTS}]")
     group.addoption("--iapb-seed", type=_at_least(0), default=0, metavar="N", help="seed of the impacts [0]")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker."""
+    """Register the marker `iapb`."""
     config.addinivalue_line("markers", _MARKER)
 
 
 def _asked(node: Any) -> dict[str, Any]:
-    """The keywords of the nearest marker."""
+    """Return the keywords of the nearest marker `iapb`."""
     marker = node.get_closest_marker("iapb")
     return {} if marker is None else dict(marker.kwargs)
 
@@ -67,7 +67,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def iapb_law(request: pytest.FixtureRequest) -> Callable[[Callable[..., Any]], None]:
-    """Judge a resolver by one law: call it with the resolver; it raises with the shrunk counterexample."""
+    """Return a function that tests a resolver against one law and fails the test with a shrunk counterexample."""
     from verification import check_passivity
 
     asked = {"impacts": IMPACTS} | _asked(request.node) | {"laws": [request.param]}

@@ -1,4 +1,4 @@
-"""iapb: rigid contact by impulses where a contact is new and penalties while it lasts.
+"""iapb: rigid contact with impulses at new contacts and penalty forces at lasting ones.
 
 The names below are loaded when they are first used, so ``import iapb`` is fast.
 """

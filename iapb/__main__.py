@@ -1,6 +1,6 @@
-"""The command `iapb`, also as `python -m iapb`: start it, or say which package is missing or hidden.
+"""Start the command `iapb`, also as `python -m iapb`, or say which package is missing or hidden.
 
-It stands in `iapb`, the one package whose name is not a common word: a user's folder `reports` may hide ours.
+This module is in the package `iapb` because a folder `reports` of the user may hide the package `reports`.
 """
 
 import sys
@@ -10,7 +10,7 @@ from iapb.lazy import needed
 
 
 def main() -> int:
-    """Run the command; where a package is missing or hidden by another, one sentence says so and how to mend it."""
+    """Run the command; if a package is missing or hidden by another one, print one sentence that says how to fix it."""
     try:
         command = needed("reports.cli", "The command")
     except IapbError as error:

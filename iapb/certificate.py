@@ -1,9 +1,9 @@
-"""Certify recorded impacts: did any of them gain kinetic energy, in real arithmetic? Judged anew, from M, v⁻ and v⁺.
+"""Certify from M, v⁻ and v⁺ whether a recorded impact gained kinetic energy in exact arithmetic.
 
-Every double is an integer times a power of two, so that wᵀMw ≤ vᵀMv is a question about integers, and has an answer.
-A proved bound in double-double (`iapb.contact.kernels.passive`) answers it for almost every impact. Integers decide
-where the bound leaves the sign open, and confirm the bound for one impact in a hundred. The energies that the recorder
-wrote are not used, so another engine's impacts are judged alike.
+Every double is an integer times a power of two, so integer arithmetic decides exactly whether v⁺ᵀMv⁺ ≤ v⁻ᵀMv⁻.
+A proved error bound in double-double (`iapb.contact.kernels.passive`) decides almost every impact. Integer arithmetic
+decides the impacts whose sign the bound leaves open, and confirms the bound for one impact in a hundred. The recorded
+energies are not used, so impacts of other engines are judged in the same way.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from iapb.scene.model import Scene, scene_kind
 Floats = NDArray[np.float64]
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
-_CHECKED = 100  # of so many impacts that a bound decides, one is judged by integers as well
-_BATCH = 4096  # impacts whose mass matrices are at hand at once
-# M (v⁺ − v⁻) and the recorded impulse, or Jᵀp of the recorded contacts, agree to rounding of a well-built record.
+_CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
+_BATCH = 4096  # impacts whose mass matrices are in memory at once
+# In a correct record, M (v⁺ − v⁻) and Jᵀp of the recorded contacts equal the recorded impulse up to rounding.
 MOMENTUM_TOLERANCE = 1e-9
-# Rows within 1e-10 of the span of others are left out, felt √κ(M) times as much: 1e-6 at κ(M) = 1e8.
+# The resolver drops rows within 1e-10 of the span of others; their residual is √κ(M) times larger: 1e-6 at κ(M) = 1e8.
 RESTITUTION_TOLERANCE = 1e-6
 
 
@@ -45,15 +45,18 @@ class Certificate:
     checked : number of bounds confirmed by integer arithmetic.
     first_gain : index of the first impact that gained, −1 = none.
     largest_gain : largest relative gain (KE⁺ − KE⁻)/KE⁻, 0 if none gained.
-    momentum : largest |M(v⁺ − v⁻) − recorded impulse|, of the sum of |M||v⁺ − v⁻|; NaN where none is recorded.
-    span : largest |Jᵀp − recorded impulse| with the recorded contacts' normals and impulses, of the sum of sizes: the
-        distance of the impulse from range(Jᵀ). NaN where friction or per-body rows leave it open.
-    total : largest |sum of a step's impacts − the step's recorded impulse|, of the sum of sizes: 1 where a step has an
-        impulse and no impact; NaN where no steps are recorded.
-    restitution : largest |J v⁺ + e J v⁻| of pushed contacts, of |J||v⁻|; NaN where the law is not that equality.
-    restitution_judged : whether a restitution that is off fails: law (21) plain, one scalar e, every
-        row independent and used. Else it is reported.
-    counterexample : Python source that shows the first gain in rationals, to paste; empty without one.
+    momentum : largest |M(v⁺ − v⁻) − recorded impulse|, relative to the sum of |M||v⁺ − v⁻| and the recorded
+        impulse; NaN if no impulse is recorded.
+    span : largest |Jᵀp − recorded impulse|, relative to the sum of both sizes. J and p hold the normals and impulses of
+        the recorded contacts, so this is the distance of the impulse from range(Jᵀ). NaN with friction in impacts or
+        per-body rows.
+    total : largest |sum of the impulses of a step's impacts − the step's recorded impulse|, relative to the sum of
+        their sizes. It is 1 if a step has an impulse and no impact, and NaN if no steps are recorded.
+    restitution : largest |J v⁺ + e J v⁻| of the contacts with an impulse, relative to |J||v⁻|; NaN if the law does not
+        require J v⁺ = −e J v⁻.
+    restitution_judged : whether a large restitution residual makes the certificate fail. This holds for law (21)
+        without options, one scalar e, and only independent rows. Otherwise the residual is only reported.
+    counterexample : Python source, ready to paste, that shows the first gain in rationals; empty if there is no gain.
     """
 
     impacts: int
@@ -75,7 +78,7 @@ class Certificate:
         return self.gains == 0 and not self._named(lambda size: size > 1.0)
 
     def _named(self, chosen: Callable[[float], bool]) -> list[str]:
-        """Names of the conditions beside energy whose residual, as a multiple of its tolerance, is chosen."""
+        """Names of the conditions other than energy for which `chosen(residual / tolerance)` is true."""
         restitution = self.restitution if self.restitution_judged else np.nan
         sizes = {"momentum M(v⁺ − v⁻)": self.momentum / MOMENTUM_TOLERANCE,
                  "impulses in range(Jᵀ)": self.span / MOMENTUM_TOLERANCE,
@@ -84,7 +87,7 @@ class Certificate:
         return [name for name, size in sizes.items() if chosen(size)]
 
     def words(self) -> str:
-        """One line that says what is certified, what fails and what is not judged."""
+        """Return one line that says what is certified, what fails and what is not judged."""
         wrong, open_ = self._named(lambda size: size > 1.0), self._named(np.isnan)
         if not self.impacts:
             return f"no impact, and what is recorded does not fit: {', '.join(wrong)}" if wrong else \
@@ -115,7 +118,7 @@ def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) ->
 
 
 def _integers(values: Floats) -> tuple[list[int], int]:
-    """Integers and one exponent of two: values = integers · 2^exponent, exactly."""
+    """Return integers and one exponent such that values = integers · 2^exponent exactly."""
     if not np.isfinite(values).all():
         raise ArgumentError("velocity or mass_matrix", "a number that is not finite", "finite numbers")
     mantissas, exponents = np.frexp(values)
@@ -128,7 +131,7 @@ def _integers(values: Floats) -> tuple[list[int], int]:
 
 @dataclass(frozen=True)
 class Judged:
-    """`gained` (n,) of each impact, exactly, and how many integers decided or confirmed."""
+    """The exact answers `gained` (n,), and the numbers of impacts that integers decided and confirmed."""
 
     gained: NDArray[np.bool_]
     by_integers: int
@@ -136,12 +139,12 @@ class Judged:
 
 
 def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Judged:
-    """Say of each of n impacts whether it gained kinetic energy: M (d, d) or (n, d, d), v⁻ and v⁺ (n, d).
+    """Return for each of n impacts whether it gained kinetic energy, from M (d, d) or (n, d, d), v⁻ and v⁺ (n, d).
 
     Raises
     ------
     IapbError
-        The bound and the integers disagree: a fault of this program or of the processor.
+        The bound and the integers disagree, so this program or the processor has a fault.
     """
     before, after = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, np.float64))) for v in (v_minus, v_plus))
     masses = np.ascontiguousarray(np.asarray(mass_matrix, np.float64))
@@ -169,12 +172,12 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
 
 
 def certify(run: Run) -> Certificate:
-    """Judge every impact of a run exactly: its energy, and whether impulses, velocities and contacts are consistent.
+    """Judge the energy of every impact of a run exactly, and check impulses, velocities and contacts for consistency.
 
     The engine's kernels compute M again from the recorded q; they give the same bits on every x86-64 processor. The
-    digest in the record is that of the M computed in this way after the run, not of the M inside the step: if it
-    agrees, then q, scene and kernels are those of the recording. The recorded generalized impulse must be M(v⁺ − v⁻),
-    to `MOMENTUM_TOLERANCE`: this shows that M is the mass matrix of the impact.
+    digest in the record is that of M computed in this way after the run, not of the M inside the step. If the digests
+    agree, then q, scene and kernels are those of the recording. The recorded generalized impulse must equal M(v⁺ − v⁻) within
+    `MOMENTUM_TOLERANCE`; this shows that M is the mass matrix of the impact.
 
     Parameters
     ----------
@@ -189,7 +192,7 @@ def certify(run: Run) -> Certificate:
     ArgumentError
         The record holds a number that is not finite, or steps that the run does not have.
     IapbError
-        The digest of the recomputed M is not the recorded one.
+        The digest of the recomputed M differs from the recorded one.
     """
     table = run.impacts
     _check_finite(run)
@@ -200,13 +203,13 @@ def certify(run: Run) -> Certificate:
     mechanism = mechanism_of(scene)
     parts = [certify_impacts(*batch) for batch in _batches(run, mechanism)]
     span, restitution = _contacts(run, scene, mechanism)
-    every_row = bool((table.rank >= table.rows).all())  # a row budget leaves some out, and the record cannot tell why
+    every_row = bool((table.rank >= table.rows).all())  # a row budget drops rows, and the record does not say why
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(_joined(parts), span=span, restitution=restitution, total=total, restitution_judged=judged)
 
 
 def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
-    """M, v⁻, v⁺ and the generalized impulse of the recorded impacts, some thousand at a time."""
+    """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of `_BATCH`."""
     table = run.impacts
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
@@ -219,7 +222,7 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
 
 
 def exported_run(run: Run) -> Iterator[str]:
-    """The impacts of a run as `exported` writes them."""
+    """Yield the impacts of a run as the lines of `exported`."""
     if len(run.impacts.step):
         mechanism = mechanism_of(scene_kind(run.scene_resolved).model_validate(run.scene_resolved))
         for mass_matrix, v_minus, v_plus, _ in _batches(run, mechanism):
@@ -227,11 +230,11 @@ def exported_run(run: Run) -> Iterator[str]:
 
 
 def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:
-    """Write each impact as a line of integers, for a judge that shares no code with this one.
+    """Yield each impact as a line of integers, for a checker that shares no code with this module.
 
-    A line is d and then a mantissa and an exponent of two for each entry of M, row by row, of v⁻ and of v⁺. Nothing is
-    rounded. The file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. Arguments are those of
-    `judge_gains`, for n impacts.
+    A line holds d, then a mantissa and an exponent of two for each entry of M (row by row), of v⁻ and of v⁺. Nothing is
+    rounded. A complete file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. The arguments are
+    those of `judge_gains`, for n impacts.
     """
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
     masses = np.asarray(mass_matrix, np.float64)
@@ -244,7 +247,7 @@ def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> I
 
 
 def _check_finite(run: Run) -> None:
-    """Refuse by name what is not finite in the record, and steps that it does not have."""
+    """Raise an ArgumentError that names an array with numbers that are not finite, or with steps outside the run."""
     table, contacts = run.impacts, run.contacts
     if len(table.step) and not (table.step.min() >= 0 and table.step.max() < len(run.impulse)):
         raise ArgumentError("impacts.step", table.step.max(), f"steps from 0 to {len(run.impulse) - 1}")
@@ -260,7 +263,7 @@ def _check_finite(run: Run) -> None:
 
 
 def _totals(run: Run) -> float:
-    """The impulses of a step's impacts against the impulse of the step; 1 where the table lacks an impact."""
+    """Return `Certificate.total`: the largest relative difference of a step's impulse and the sum over its impacts."""
     table, total, size = run.impacts, np.zeros_like(run.impulse), np.abs(run.impulse)
     np.add.at(total, table.step, table.impulse)
     np.add.at(size, table.step, np.abs(table.impulse))
@@ -273,9 +276,9 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
 
     Parameters
     ----------
-    mass_matrix : M, (d, d) for all or (n, d, d), as it was used
+    mass_matrix : M as the impacts used it, (d, d) for all or (n, d, d)
     v_minus, v_plus : velocities before and after, (n, d), or (d,) of one impact
-    impulse : M(v⁺ − v⁻) as recorded, (n, d), where it is known
+    impulse : recorded M(v⁺ − v⁻), (n, d), if it is known
 
     Returns
     -------
@@ -300,7 +303,7 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
             raise ArgumentError("impulse", recorded.shape, f"shape {before.shape}, as v_minus")
         if not np.isfinite(recorded).all():
             raise ArgumentError("impulse", "a number that is not finite", "finite numbers")
-        with np.errstate(over="ignore", invalid="ignore"):  # it does not pass then
+        with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
             change = after - before
             size = np.matmul(np.abs(masses), np.abs(change)[:, :, None])[:, :, 0].sum(axis=1)
             error = np.abs(np.matmul(masses, change[:, :, None])[:, :, 0] - recorded).sum(axis=1)
@@ -311,7 +314,7 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
 
 
 def _largest_share(error: Floats, size: Floats) -> float:
-    """Largest error / size; 0 where both are, and infinity where it overflows: only what is not judged is NaN."""
+    """Return the largest error / size: 0 / 0 counts as 0, an overflow as infinity; NaN is kept for "not judged"."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(error == 0.0, 0.0, error / size)
     return float(np.where(np.isnan(share), np.inf, share).max(initial=0.0))
@@ -323,7 +326,7 @@ def _relative_gain(mass: Floats, before: Floats, after: Floats) -> float:
 
 
 def _shown(mass: Floats, before: Floats, after: Floats) -> str:
-    """Source of a check by rationals alone."""
+    """Return Python source that computes the energy gain with rationals alone."""
     return f"""from fractions import Fraction
 M = {[[float(x) for x in row] for row in mass]!r}
 v_minus = {[float(x) for x in before]!r}
@@ -336,7 +339,7 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 
 
 def _joined(parts: list[Certificate]) -> Certificate:
-    """One certificate of all batches, in order."""
+    """Join the certificates of all batches, given in order, into one."""
     first, counterexample, before = -1, "", 0
     for part in parts:
         if first < 0 <= part.first_gain:
@@ -348,12 +351,12 @@ def _joined(parts: list[Certificate]) -> Certificate:
 
 
 def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:
-    """The impulse against Jᵀp of the step's contacts, and restitution at those that were struck; NaN where open."""
+    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
     table, impacts = run.contacts, run.impacts
     frictionless = not (run.law_settings.get("friction_in_impacts") and largest_friction(scene) > 0.0)
     if not frictionless or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
-    if run.law not in ENGINE_LAWS and not table.impulse.any():  # another world need not record it
+    if run.law not in ENGINE_LAWS and not table.impulse.any():  # another world may not record contact impulses
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")

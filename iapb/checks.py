@@ -1,11 +1,11 @@
-"""Look in a scene, before its run, for what makes a result worthless: each warning has its number and what to set.
+"""Check a scene before its run for settings that make the result meaningless. Each warning says what value to set.
 
-A contact that lasts swings on (5). With k = K Δt²/m and b = B Δt/m, m its effective mass 1/(J M⁻¹ Jᵀ), a step of the
-law's integrator maps (gap, velocity) linearly; the swing grows where that map has an eigenvalue beyond 1. For
-semi-implicit Euler this is k + 2 b > 4. Contacts that share a body swing together: 1/m is then the largest eigenvalue
-of J M⁻¹ Jᵀ over all of them. A new contact is stopped at a depth of up to v Δt, and its spring gives back up to k times
-the energy that the body came with: so k must not exceed 1 either. `contact.auto` chooses well below both limits.
-`iapb.distrust` looks in the run.
+A lasting contact oscillates on its spring and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
+b = B Δt/m. A step of the law's integrator maps (gap, velocity) linearly. The oscillation grows if that map has an
+eigenvalue of modulus above 1; for semi-implicit Euler this means k + 2 b > 4. Contacts that share a body oscillate
+together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
+v Δt, and its spring then returns up to k times the kinetic energy of the approach, so k must not exceed 1 either.
+`contact.auto` chooses values well below both limits. `iapb.distrust` checks the run itself.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
 
-NEAR = 0.02  # of the smaller shape: contacts closer than this at the start are taken to touch together
-DEEP = 0.02  # of the smaller shape: an overlap at the start that is no resting depth
-SHIFTED = 0.05  # of the smaller shape: the way by which friction in an impact may change where a body goes
-SAG = 0.1  # of the smaller shape, or of the range of a joint: more static sag is no rigid contact
-THROWN = 1.0  # largest k = K Δt²/m at which a new contact gives back no more than it took
-ROUNDED = 1e-9  # share by which rounding may move a limit
-MANY_TURNS = 45  # of a joint that may turn often, only multiples of this many radians are taken for degrees
-MANY_PAIRS = 2000  # with more, only pairs closer than the largest body are looked at
+NEAR = 0.02  # of the smaller shape: contacts closer than this at the start count as touching
+DEEP = 0.02  # of the smaller shape: a larger overlap at the start is more than a resting depth
+SHIFTED = 0.05  # of the smaller shape: distance by which friction in an impact may displace a body
+SAG = 0.1  # of the smaller shape, or of a joint's range: largest static sag of a rigid contact
+THROWN = 1.0  # largest k = K Δt²/m at which a new contact returns no more energy than it absorbs
+ROUNDED = 1e-9  # relative rounding error of a limit
+MANY_TURNS = 45  # a joint may turn often, so only multiples of this many radians count as degrees
+MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
 class Caution(NamedTuple):
-    """A warning about a scene: its kind, the things it is about, and a sentence with the number and what to set."""
+    """A warning about a scene: its kind, the things that it concerns, and a sentence with the value to set."""
 
     kind: str
     where: str
@@ -71,11 +71,11 @@ class Caution(NamedTuple):
 
 @dataclass(frozen=True)
 class StepLimits:
-    """What the step can hold at the most critical contacts.
+    """Limits of stiffness, damping and rate at the most critical contacts.
 
-    mass : smallest effective mass [kg]; contacts : how many swing together there; where : of which bodies
+    mass : smallest effective mass [kg]; contacts : number of contacts that oscillate together; where : their bodies
     stiffness : largest stable K at the scene's damping [N/m]; damping : largest stable B at its stiffness [N s/m]
-    rate : smallest rate for both [Hz]
+    rate : smallest rate [Hz] at which the scene's stiffness and damping are stable
     """
 
     where: str
@@ -87,12 +87,12 @@ class StepLimits:
 
 
 class Start:
-    """A scene at its start: the contacts that touch or come next, their rows, masses and loads.
+    """A scene at its start: its closest contacts with their rows, effective masses and loads.
 
     Parameters
     ----------
     scene : Scene
-    mechanism, shapes, pairs : of the scene where the caller has them already.
+    mechanism, shapes, pairs : of the scene, if the caller has them already; else they are made here.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism | None = None, shapes: Shapes | None = None,
@@ -116,7 +116,7 @@ class Start:
         self.thickness = np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
 
     def _contacts(self) -> ContactBuffer:
-        """Contacts of each pair with its closest features, near or far."""
+        """Return the contacts between the closest features of each pair, near or far."""
         finite = self.size[np.isfinite(self.size)]
         few = len(self.pairs) <= MANY_PAIRS
         buffer, count = make_contact_buffer(_room(self.shapes, self.pairs, few)), 0
@@ -127,7 +127,7 @@ class Start:
         return ContactBuffer(*columns)
 
     def _add_stops(self) -> None:
-        """Append the ends of the joints' ranges: rows and gaps; a stop has one number for both of its shapes."""
+        """Append rows and gaps of the joint limits; a stop has one number in place of its two shapes."""
         stops, arrays, first = stops_of(self.scene, self.mechanism), self.mechanism.arrays, len(self.shapes.kind)
         names, ranges = [body.name for body in self.scene.bodies], [body.joint_limits for body in self.scene.bodies]
         extra, rows = make_contact_buffer(len(stops)), np.zeros((len(stops), self.mechanism.nv))
@@ -147,7 +147,7 @@ class Start:
         self.radius = np.append(self.radius, np.zeros(len(stops)))
 
     def _row(self, i: int, direction: Floats) -> Floats:
-        """Row of contact i along a direction."""
+        """Return the Jacobian row (d,) of contact i along a direction."""
         row = np.zeros(self.mechanism.nv)
         for body, sign in ((self.found.body_a[i], 1.0), (self.found.body_b[i], -1.0)):
             if body >= 0:
@@ -174,7 +174,7 @@ class Start:
         return self._applied_at(self.q)
 
     def _applied_at(self, q: Floats) -> Floats:
-        """Generalized force (d,) at q of gravity and of what the hand gives at the start."""
+        """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
         force, hand = -self.mechanism.gravity(q, self.gravity), self.scene.hand
         pushes = hand.forces([0.0])[0] if hand is not None else []
         if hand is not None and any(pushes):
@@ -189,7 +189,7 @@ class Start:
 
     @cached_property
     def by_pair(self) -> list[NDArray[np.int64]]:
-        """Contacts of each pair of shapes, closest first, no more than can lie flat on a face."""
+        """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as on a flat face."""
         most = 4 if self.spatial else 2
         kept: dict[tuple[int, int], list[int]] = {}
         for i, pair in enumerate(zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)):
@@ -198,7 +198,7 @@ class Start:
 
     @cached_property
     def touching(self) -> list[NDArray[np.int64]]:
-        """Groups of contacts that touch, or nearly, at the start: linked by moving trees."""
+        """Contacts that touch or nearly touch at the start, in groups that shared moving trees connect."""
         near = np.flatnonzero(self.found.gap <= NEAR * np.where(np.isfinite(self.thickness), self.thickness, 0.0))
         group: dict[int, int] = {}
 
@@ -222,20 +222,20 @@ class Start:
         return list(dict.fromkeys(int(self.mechanism.tree_of_body[b]) for b in bodies))
 
     def is_free(self, tree: int) -> bool:
-        """Whether a tree is one body that can go anywhere and that no hand holds."""
+        """Whether a tree is one free body (planar or free-flyer joint) that the hand does not hold."""
         bodies = [self.scene.bodies[b] for b in np.flatnonzero(self.mechanism.tree_of_body == tree)]
         held = self.scene.hand is not None and any(body.name == self.scene.hand.body for body in bodies)
         return len(bodies) == 1 and bodies[0].joint in ("planar", "free_flyer") and not held
 
     @cached_property
     def supports(self) -> list[NDArray[np.int64]]:
-        """Groups that carry loads: those that touch, and of a tree that touches nothing what it falls on first."""
+        """Groups of contacts that carry loads: those that touch, and the first pair that a falling tree hits."""
         touched = {tree for rows in self.touching for i in rows for tree in self.trees(i)}
         pull = self.rows @ self.moved(self.applied[None])[:, 0]
         falls: dict[int, tuple[float, NDArray[np.int64]]] = {}
         for rows in self.by_pair:
             tree, gap = self.trees(rows[0])[0], float(self.found.gap[rows[0]])
-            free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # of a linkage the pose would change
+            free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # a linkage would change its pose
             flat = len(rows) > 1 or self.radius[self.found.shape_a[rows[0]]] > 0.0  # not on one corner
             if tree in touched or not (free and flat and pull[rows[0]] < 0.0):
                 continue
@@ -245,14 +245,14 @@ class Start:
 
     @cached_property
     def resting(self) -> Floats:
-        """Forces (c,) [N] at the contacts that touch, where the scene would stay as it starts."""
+        """Normal forces (c,) [N] that would hold the start in equilibrium; 0 at contacts that do not touch."""
         force = np.zeros(len(self.found.gap))
         for rows in self.touching:
             force[rows] = self.loads(rows)
         return force
 
     def names(self, rows: Iterable[int]) -> str:
-        """The things that contacts join: "box and floor", or the first of many."""
+        """Return the names of the things in contact, such as "box and floor"; of more than two, the first three."""
         shapes = [s for i in rows for s in (int(self.found.shape_a[i]), int(self.found.shape_b[i]))]
         named = list(dict.fromkeys(self.labels[s] for s in shapes))
         return " and ".join(named) if len(named) < 3 else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
@@ -263,7 +263,7 @@ class Start:
 
     @cached_property
     def critical(self) -> tuple[tuple[float, NDArray[np.int64]], tuple[float, NDArray[np.int64]]]:
-        """Largest mobility [1/kg], with the contacts, of those that touch together and of one pair that meets."""
+        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs."""
         nobody = (0.0, np.zeros(0, np.int64))
         pairs = [rows for rows in self.by_pair if self.is_near(rows[0])]
         lasting, meeting = ([(self.mobility(self.rows[rows]), rows) for rows in each]
@@ -272,12 +272,12 @@ class Start:
                      for each in (lasting, meeting))
 
     def is_near(self, i: int) -> bool:
-        """Whether the row of contact i is that of a touch: two boxes in space must be near for that."""
+        """Whether the row of contact i is also valid at touch; two boxes in space must be near for that."""
         boxes = self.kind[self.found.shape_a[i]] == BOX and self.kind[self.found.shape_b[i]] == BOX
         return not boxes or bool(self.found.gap[i] <= self.thickness[i])
 
     def loads(self, rows: NDArray[np.int64]) -> Floats:
-        """Forces p >= 0 (c,) [N] at the contacts of a group that hold gravity and the hand: W p = −J M⁻¹ f."""
+        """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W p = −J M⁻¹ f."""
         J, force = self.rows[rows], np.zeros(len(rows))
         W, wanted = J @ self.moved(J), -J @ self.moved(self.applied[None])[:, 0]
         pushing = np.ones(len(rows), np.bool_)
@@ -286,14 +286,14 @@ class Start:
             force[pushing] = np.linalg.lstsq(W[np.ix_(pushing, pushing)], wanted[pushing], rcond=1e-12)[0]
             if (force >= 0.0).all():
                 break
-            pushing &= force > 0.0  # what would pull carries nothing
-        return np.clip(force, 0.0, self.total_load)  # more is what wedges and levers make of it, in other poses less
+            pushing &= force > 0.0  # a contact that would pull carries nothing
+        return np.clip(force, 0.0, self.total_load)  # wedges and levers can give more, but less in other poses
 
     @cached_property
     def at_stops(self) -> dict[int, float]:
-        """Forces [N] by which loads press on the limits, of those that do not touch: their joint there, the others not.
+        """Static forces [N] at the joint limits that do not touch, each with its own joint moved to the limit.
 
-        The force of a stop holds the load of its joint alone, as where the joints behind it are held too.
+        The force of a stop balances the load of its own joint alone, as if the joints behind it were fixed.
         """
         stops, touching = stops_of(self.scene, self.mechanism), {int(i) for rows in self.touching for i in rows}
         arrays, held = self.mechanism.arrays, {}
@@ -307,14 +307,14 @@ class Start:
 
     @cached_property
     def total_load(self) -> float:
-        """All weights and the hand's force [N]."""
+        """Sum of all weights and the hand's largest force [N]."""
         hand = self.scene.hand
         pushed = hand.largest_force() if hand is not None else 0.0
         return float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies) + pushed
 
 
 def _room(shapes: Shapes, pairs: NDArray[np.int32], few: bool) -> int:
-    """Contacts that the pairs give where none is left out for its distance: a corner each, and faces clipped."""
+    """Capacity for the contacts of all pairs; with few pairs, for contacts at any distance."""
     if not few:
         return contact_capacity(shapes, pairs)
     corners = np.where(shapes.kind == BOX, 8, np.maximum(shapes.count, 2))
@@ -336,7 +336,7 @@ def _smallest_extent(shapes: Shapes, i: int) -> float:
 
 
 def holds(integrator: Integrator, k: float, b: float) -> bool:
-    """Whether a contact with k = K Δt²/m and b = B Δt/m does not swing up."""
+    """Whether a contact with k = K Δt²/m and b = B Δt/m is stable under the integrator."""
     def step(x: float, v: float) -> tuple[float, float]:
         q, rate = integrator.step(
             lambda q, v, dt: q + dt * v, lambda q, v: -k * q - b * v, np.array([x]), np.array([v]), 1.0)
@@ -347,7 +347,7 @@ def holds(integrator: Integrator, k: float, b: float) -> bool:
 
 
 def _largest(good: Any, high: float) -> float:
-    """Largest x in (0, high] with good(x), 0 where there is none; good is true below some x."""
+    """Return the largest x in (0, high] with good(x), or 0 if there is none; good is true up to some x."""
     if good(high):
         return high
     low = 0.0
@@ -358,7 +358,7 @@ def _largest(good: Any, high: float) -> float:
 
 
 def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLimits | None:
-    """Return what the step can hold at the contacts that hold least; None where nothing can touch."""
+    """Return the limits at the most critical contacts; None if nothing can touch."""
     lasting, meeting = start.critical
     found = [_limits(start, INTEGRATORS[integrator], *one, thrown) for one, thrown in ((lasting, math.inf),
                                                                                       (meeting, THROWN)) if one[0]]
@@ -366,7 +366,7 @@ def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLi
 
 
 def _limits(start: Start, method: Integrator, mobility: float, rows: NDArray[np.int64], most: float) -> StepLimits:
-    """Largest stiffness, damping and step that hold at contacts of one mobility, with k at most `most`."""
+    """Return the limits for contacts of one mobility, with k at most `most`."""
     dt, contact = start.dt, start.scene.contact
     k, b = contact.stiffness * mobility * dt**2, contact.damping * mobility * dt
     stiffness = _largest(lambda x: x <= most and holds(method, x, b), 4.0) / (mobility * dt**2)
@@ -403,10 +403,11 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
 
 
 def _degrees(scene: Scene) -> Iterator[Caution]:
-    """Angles that look like degrees: whole numbers beyond a turn.
+    """Warn of angles that look like degrees: whole numbers beyond one turn.
 
-    In radians they are not plausible: a placement needs no more than a turn, and where another run ended is no whole
-    number. A joint may turn often, so of its start and its limits only multiples of 45 count (45 rad are seven turns).
+    Such numbers are not plausible in radians: a placement needs no more than one turn, and the end of another run is
+    not a whole number. A joint may turn often, so for its start and its limits only multiples of 45 count (45 rad are
+    seven turns).
     """
     for path, angle, unit in _angles(scene):
         if abs(angle) > math.tau and angle % unit == 0.0:
@@ -416,7 +417,7 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
 
 
 def _angles(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], float, int]]:
-    """Angles of a scene [rad] with their paths and the unit in which degrees are whole."""
+    """Yield the path and value [rad] of each angle, and the number whose multiples look like degrees."""
     plain = scene.resolved()
     for part in ("bodies", "walls"):
         for i, one in enumerate(plain[part]):
@@ -434,7 +435,7 @@ def _angles(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], float, int]]:
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:
-    """Shapes that start inside each other, behind a wall, or in a gap narrower than they are."""
+    """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the shape."""
     found = start.found
     sides: dict[int, list[int]] = {}
     for rows in start.by_pair:
@@ -467,7 +468,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
 
 
 def _too_deep(start: Start, rows: NDArray[np.int64]) -> bool:
-    """Whether a pair starts deeper than at rest: by depth, or by what its springs hold."""
+    """Whether a pair starts deeper than at rest, judged by its depth and by the energy of its springs."""
     gap = np.minimum(start.found.gap[rows], 0.0)
     depth, size, K = -float(gap.min()), float(start.thickness[rows[0]]), start.scene.contact.stiffness
     if depth * K <= 2.0 * float(start.resting[rows].max()):
@@ -479,12 +480,12 @@ def _too_deep(start: Start, rows: NDArray[np.int64]) -> bool:
     closing = float(np.abs(start.rows[rows] @ start.v).max())
     weight = float(np.abs(start.rows[rows] @ start.moved(start.applied[None])[:, 0]).max()) * mass
     usual = 0.5 * mass * closing**2 + weight * DEEP * size
-    usual = max(usual, 0.5 * mass * size**2)  # its size in a second
+    usual = max(usual, 0.5 * mass * size**2)  # moving by its size in a second
     return depth > 1e-6 * size and 0.5 * K * float(np.sum(gap**2)) > usual
 
 
 def _fast(start: Start) -> Iterator[Caution]:
-    """Bodies that move by more than half of a shape in the step that meets it."""
+    """Warn of bodies that move by more than half of a shape in the step of the impact."""
     pull = start.rows @ start.moved(start.applied[None])[:, 0]
     for rows in start.by_pair:
         i = int(rows[0])
@@ -503,14 +504,15 @@ def _fast(start: Start) -> Iterator[Caution]:
 
 
 def _slips_through_impacts(start: Start) -> Iterator[Caution]:
-    """The free body that lands while it slides, and that friction in the impact would carry to another place.
+    """Warn of a free body that slides as it lands, if friction in the impact would change its path visibly.
 
-    What each body meets first is looked at; not linkages, whose poses change on the way, nor what a hand leads.
-    Friction would take up to Δv = μ (1 + e) v_n of the slip. What it leaves, resting friction takes in the next
-    Δv/(μ a), a the acceleration onto the wall; a body that bounces keeps it for the flight of 2 e v_n/a.
+    Only the first contact of each free body counts. Linkages are left out, for their poses change on the way, and so is
+    a body that the hand holds. Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it,
+    resting friction removes the same slip within Δv/(μ a), where a is the acceleration onto the wall. A body that
+    bounces keeps the slip during its flight of 2 e v_n/a.
     """
     pull = start.moved(start.applied[None])[:, 0]
-    first: dict[int, tuple[float, int, float, float]] = {}  # of each tree: time, contact, approach, acceleration
+    first: dict[int, tuple[float, int, float, float]] = {}  # tree -> time, contact, approach, acceleration
     for rows in start.by_pair:
         i = int(rows[0])
         gap, approach = max(float(start.found.gap[i]), 0.0), -float(start.rows[i] @ start.v)
@@ -532,7 +534,7 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
 
 
 def _shift(start: Start, time: float, i: int, speed: float, force: float, pull: Floats) -> tuple[float, float, float]:
-    """What friction in the impact of contact i changes: the way as a share of the thinner, the slip, of which slip."""
+    """Return how friction in the impact at contact i changes path (over the thinner size) and slip, and the slip."""
     mu, pair = float(start.friction[i]), np.array([[start.found.shape_a[i], start.found.shape_b[i]]])
     e = float(restitution_by_pair(start.scene, pair)[0])
     slip = float(np.linalg.norm([start._row(i, t) @ (start.v + time * pull) for t in _tangents(start, i)]))
@@ -549,7 +551,7 @@ def _thin_first(start: Start, i: int) -> tuple[int, int]:
 
 
 def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
-    """Stiffness or damping beyond what the step can hold."""
+    """Warn of stiffness or damping beyond the stable limits of the step."""
     limits, contact = step_limits(start, integrator), start.scene.contact
     if limits is None or (contact.stiffness <= limits.stiffness and contact.damping <= limits.damping):
         return
@@ -567,7 +569,7 @@ def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
 
 
 def _sags(start: Start) -> Iterator[Caution]:
-    """Loads that press a contact in by more than a tenth of a shape, or a joint's limit by that of its range."""
+    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit."""
     K = start.scene.contact.stiffness
     if K == 0.0:
         return
@@ -588,7 +590,7 @@ def _sags(start: Start) -> Iterator[Caution]:
 
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:
-    """Regularised friction (6), an explicit damper μN/v_thr, that turns a motion round within a step."""
+    """Warn where regularised friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
     contact = start.scene.contact
     if contact.friction_law != "regularised" or not start.friction.any():
         return
@@ -614,12 +616,12 @@ def _tangents(start: Start, i: int) -> Floats:
 
 
 def _down(x: float, digits: int = 2) -> str:
-    """A number of two digits that is not above x."""
+    """Return x rounded down to two digits."""
     return f"{_two_digits(x, math.floor, digits):g}"
 
 
 def _up(x: float, digits: int = 2) -> str:
-    """A number of two digits that is not below x."""
+    """Return x rounded up to two digits."""
     return f"{_two_digits(x, math.ceil, digits):g}"
 
 
@@ -633,14 +635,14 @@ def _two_digits(x: float, way: Any, digits: int = 2) -> float:
 
 # What `contact.auto` chooses
 
-AUTO_K, AUTO_B = 0.2, 0.5  # k and b of the most critical contacts: k + 2 b = 1.2, far below 4; nearly critical damping
-SPARE = 2.0  # contacts that come together later are up to so much lighter than those at the start
+AUTO_K, AUTO_B = 0.2, 0.5  # k and b at the most critical contacts: k + 2 b = 1.2 is far below 4
+SPARE = 2.0  # factor by which later contacts may be lighter than those at the start
 
 
 def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with what `contact.auto` and `contact.resting_start` choose, and what is said of it.
+    """Return the scene with the values that `contact.auto` and `contact.resting_start` choose, and remarks on them.
 
-    The scene itself where it asks for neither.
+    A scene that uses neither is returned unchanged.
     """
     said: tuple[str, ...] = ()
     if scene.contact.auto:
@@ -649,7 +651,7 @@ def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str,
 
 
 def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
-    """The numbers that `contact.auto` chooses."""
+    """Return the scene with the values that `contact.auto` chooses, and a remark."""
     mobility, rows = start.critical[0]
     mobility *= SPARE if len(start.blocks) > 1 else 1.0
     if mobility == 0.0:
@@ -674,7 +676,7 @@ _UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
 
 
 def _top_speed(start: Start) -> float:
-    """Fastest that a contact point can get, by its start and by a fall or push through the scene's length [m/s]."""
+    """Return the largest speed [m/s] of a contact point, from the start and a fall or push over the scene's length."""
     length = float(np.ptp(start.found.point, axis=0).max()) if len(start.found.gap) else 0.0
     push = np.abs(start.rows @ start.moved(start.applied[None])[:, 0]).max(initial=0.0)
     speed = np.abs(start.rows @ start.v).max(initial=0.0)
@@ -684,12 +686,12 @@ def _top_speed(start: Start) -> float:
 # What `contact.resting_start` chooses
 
 SETTLING = 8  # Newton steps: the rows turn with the bodies, and the displacements are small
-BALANCED = 1e-6  # share of the load that equilibrium may leave
-DIGITS = 10  # of positions in m and rad, so that the last bits of linear algebra do not count
+BALANCED = 1e-6  # largest unbalanced share of the load
+DIGITS = 10  # of positions in m and rad, so that rounding in linear algebra has no effect
 
 
 def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene where springs and sticking friction hold what touches at the start, and what is said of it."""
+    """Return the scene with touching bodies moved to the equilibrium of springs and sticking friction, and remarks."""
     scene = settling = scene.with_values({"contact.resting_start": False})
     for _ in range(SETTLING):
         found = _sunk(Start(settling))
@@ -703,10 +705,11 @@ def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...
 
 
 def _sunk(start: Start) -> dict[str, Any] | str:
-    """One Newton step towards equilibrium: new positions by path, none where it is reached; or why there is none.
+    """Do one Newton step towards equilibrium; return new positions by path, or the reason why there is none.
 
-    The load f is held by springs and friction λ: K JᵀJ δ + Tᵀλ = f − K Jᵀg, of which the least √K δ and λ/√K are taken,
-    so that nothing moves along its contacts. No contact may pull, and friction not exceed μ N in all.
+    The result is empty at equilibrium. Springs and friction λ balance the load f: K JᵀJ δ + Tᵀλ = f − K Jᵀg. The
+    solution with the least √K δ and λ/√K is taken, so that nothing moves along its contacts. No contact may pull, and
+    the sum of the friction forces must not exceed the sum of μ N.
     """
     if not start.touching or start.scene.contact.stiffness == 0.0:
         return "nothing touches, or no spring holds it"

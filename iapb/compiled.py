@@ -1,11 +1,11 @@
-"""How kernels are compiled, and how whole rooms of arrays are handed to them.
+"""Compile kernels, and pass nested tuples of arrays to them as one pointer.
 
-`kernel` compiles by numba, cached on disk, without fastmath and *without an allocator*: `_nrt=False` leaves out the
-memory runtime, so that a kernel that would allocate does not compile. "No allocation" is checked, not promised.
+`kernel` compiles with numba, caches on disk, uses no fastmath and *no allocator*: `_nrt=False` leaves out the memory
+runtime, so a kernel that would allocate does not compile. The compiler thus checks that kernels do not allocate.
 
-`block` hands a NamedTuple of arrays (nested ones too) to kernels as one pointer. Numba passes a tuple member by
-member, some 1,300 numbers for a whole world: the step then took 150 s to compile and 60 µs to run; by pointer it
-takes a tenth of the one and a hundredth of the other. In Python a block has the attributes of its tuple.
+`block` passes a NamedTuple of arrays, also a nested one, to kernels as one pointer. Numba passes a tuple member by
+member, some 1,300 numbers for a whole world; a step then took 150 s to compile and 60 µs to run. With a pointer it
+takes a tenth of the compile time and a hundredth of the run time. In Python a block has the attributes of its tuple.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from iapb.inlining import compile_as_whole
 
 
 def _source_stamp() -> str:
-    """Hash of all files with kernels: numba alone would keep a cached kernel when one that it calls has changed."""
+    """Hash all files with kernels. Numba alone would keep a cached kernel after a change of a kernel that it calls."""
     digest = hashlib.sha256()
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
@@ -56,7 +56,7 @@ _STAMP = _source_stamp()
 
 
 def _stamp_of(function: Callable[..., Any]) -> str:
-    """What a kernel depends on: all kernels of the engine, and its own file where that lies elsewhere."""
+    """Hash the files that a kernel depends on: all kernels of the engine, and its own file if that lies elsewhere."""
     path = Path(inspect.getfile(function))
     if path.is_relative_to(Path(__file__).parent):
         return _STAMP
@@ -64,7 +64,7 @@ def _stamp_of(function: Callable[..., Any]) -> str:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function as a kernel (see the file's docstring); cached until any file with kernels changes."""
+    """Compile a function as a kernel (see the module's docstring), cached until a file with kernels changes."""
     if config.DISABLE_JIT:
         return function
     compiled = compile_as_whole(function, fastmath=False, _nrt=False)
@@ -81,8 +81,8 @@ def kernel(function: Callable[..., Any]) -> Any:
 class Entry:
     """A kernel that Python calls again and again with arguments of one set of types.
 
-    Numba looks up the type of each argument at each call, some 5 µs for a block; an Entry does so at its first
-    call only. The caller sees to it that arrays keep their dtype, dimensions and layout.
+    Numba looks up the type of each argument at each call, which takes about 5 µs for a block. An Entry does so only at
+    its first call. The caller must keep the dtype, dimensions and layout of all arrays.
     """
 
     def __init__(self, function: Any) -> None:
@@ -107,7 +107,7 @@ class Entry:
 
 @kernel
 def copy_into(target, source):
-    """target[:] = source for vectors of one length; a slice assignment might make a hidden copy."""
+    """Do target[:] = source for vectors of equal length; a slice assignment might make a hidden copy."""
     for k in range(target.shape[0]):
         target[k] = source[k]
 
@@ -135,13 +135,13 @@ class BlockType(types.Type):
 class Block:
     """A NamedTuple of arrays, numbers and further such tuples, laid out in memory for kernels.
 
-    The arrays stay where they are and are kept alive; numbers are copied and cannot change.
+    The block refers to the arrays and keeps them alive. Numbers are copied and cannot change.
     """
 
     block_type: BlockType
     address: int  # of the layout in memory
-    _folded: tuple[_Tree, np.ndarray, int, Sequence[np.ndarray]]  # of a twin: what it is made of
-    _piece: np.ndarray | None = None  # of a twin: the memory of its layouts, then of its arrays
+    _folded: tuple[_Tree, np.ndarray, int, Sequence[np.ndarray]]  # only in a twin: what it is made of
+    _piece: np.ndarray | None = None  # only in a twin: memory of its layouts, then of its arrays
 
     def __init__(self, content: Any) -> None:
         members = [block(value) if _is_named_tuple(value) else value for value in content]
@@ -153,10 +153,9 @@ class Block:
         self.address = self._memory.ctypes.data
 
     def twin(self) -> Block:
-        """Return a copy with the same layout in memory of its own: quicker than making one.
+        """Return a copy with the same layout and its own memory; this is faster than making a new block.
 
-        Its layouts and arrays lie in one piece of memory; the Python objects of a nested block are made when first
-        asked for.
+        Its layouts and arrays lie in one piece of memory. The Python objects of a nested block are made at first use.
         """
         plan = self._plan
         raw = np.empty(plan.size + _LINE, np.uint8)
@@ -176,9 +175,9 @@ class Block:
         return made
 
     def on(self, arrays: Sequence[np.ndarray], addresses: NDArray[np.int64]) -> Block:
-        """Return a block like this one on other arrays of the same shapes, in the order of `arrays()`.
+        """Return a block like this one with other arrays of the same shapes, in the order of `arrays()`.
 
-        The caller gives the addresses of their first entries.
+        `addresses` are those of their first entries.
         """
         plan = self._plan
         words = plan.words.copy()
@@ -189,7 +188,7 @@ class Block:
 
     @cached_property
     def _plan(self) -> _Plan:
-        """Where everything lies in a twin."""
+        """Positions of all layouts and arrays in a twin."""
         blocks = list(self._with_nested())
         starts = np.cumsum([0, *(_rounded(each._memory.nbytes) for each in blocks)]).tolist()
         words, nested, at = np.zeros(starts[-1] // 8, np.int64), [], starts[-1]
@@ -222,7 +221,7 @@ class Block:
                 yield from member._with_nested()
 
     def arrays(self) -> list[np.ndarray]:
-        """All arrays, those of nested blocks too."""
+        """Return all arrays, including those of nested blocks."""
         nested = [member.arrays() for member in self._content if isinstance(member, Block)]
         return [*(member for member in self._content if isinstance(member, np.ndarray)), *chain(*nested)]
 
@@ -242,7 +241,7 @@ class Block:
 
 
 class _Part(NamedTuple):
-    """An array of a twin: its number, byte of its piece at which it begins, and what it looks like."""
+    """An array of a twin: its number, its first byte in the twin's memory, shape, dtype and strides."""
 
     number: int
     at: int
@@ -252,7 +251,7 @@ class _Part(NamedTuple):
 
 
 class _Tree(NamedTuple):
-    """A block of a twin: bytes of its piece between which its layout lies, and what it is made of."""
+    """A block of a twin: first and last byte of its layout in the twin's memory, its type and its members."""
 
     at: int
     stop: int
@@ -262,7 +261,7 @@ class _Tree(NamedTuple):
 
 
 class _Plan(NamedTuple):
-    """A twin: bytes in all, layouts with addresses as if it lay at 0, which words are those of blocks and of arrays."""
+    """The plan of a twin: size in bytes, layouts with addresses relative to 0, and the words that hold addresses."""
 
     size: int
     words: np.ndarray
@@ -272,14 +271,14 @@ class _Plan(NamedTuple):
 
 
 def _unfolded(tree: _Tree, piece: np.ndarray, base: int, given: Sequence[np.ndarray]) -> Block:
-    """The block of a twin, of which nothing but the address is made yet."""
+    """Make a block of a twin with its address only; its members are made at first use."""
     made = object.__new__(Block)
     made.block_type, made.address, made._folded = tree.block_type, base + tree.at, (tree, piece, base, given)
     made._memory = piece[tree.at : tree.stop].view(np.int64)
     return made
 
 
-_LINE = 64  # bytes of a cache line: every array of a twin begins at one
+_LINE = 64  # bytes of a cache line; every array of a twin starts at a new line
 _CODES: dict[Any, Callable[..., Any]] = {}  # kernel and types -> its machine code
 
 
@@ -288,18 +287,18 @@ def _rounded(size: int) -> int:
 
 
 def columns(name: str, arrays: Mapping[str, Any]) -> Any:
-    """Return a NamedTuple of arrays by name, to be laid out by `block`."""
+    """Return a NamedTuple of named arrays, for `block`."""
     return _columns_of(name, tuple(arrays))(**arrays)
 
 
 @cache
 def _columns_of(name: str, fields: tuple[str, ...]) -> Any:
-    """Make the class once: a class is garbage that only Python's collector finds, and a live loop keeps that off."""
+    """Make the class once: only the garbage collector frees a class, and a live loop switches the collector off."""
     return namedtuple(name, fields)
 
 
 def block(content: Any) -> Any:
-    """Lay a NamedTuple out for kernels; see the file's docstring."""
+    """Lay a NamedTuple out for kernels; see the module's docstring."""
     return content if isinstance(content, Block) else Block(content)
 
 
@@ -307,7 +306,7 @@ def _is_named_tuple(value: Any) -> bool:
     return isinstance(value, tuple) and hasattr(value, "_fields")
 
 
-# Types that were found before: numba takes 20 µs to find that of an array, and a simulation has hundreds.
+# Cache of types: numba takes 20 µs to find the type of an array, and a simulation has hundreds.
 _KINDS: dict[Any, types.Type] = {}
 _NUMBERS = {bool: types.boolean, int: types.intp, float: types.float64}
 _BLOCK_TYPES: dict[Any, tuple[BlockType, tuple[types.Type, ...]]] = {}
@@ -328,18 +327,18 @@ def _kind(value: Any) -> types.Type:
 
 def _block_type_of(name: str, fields: tuple[str, ...], kinds: tuple[types.Type, ...]) -> BlockType:
     known = name, fields, tuple(map(id, kinds))
-    if known not in _BLOCK_TYPES:  # with the kinds, so that their ids stay theirs
+    if known not in _BLOCK_TYPES:  # the kinds are stored too, so that no other object gets their ids
         _BLOCK_TYPES[known] = BlockType(name, tuple(zip(fields, kinds, strict=True))), kinds
     return _BLOCK_TYPES[known][0]
 
 
 def _words(kind: types.Type) -> int:
-    """Words of a field: pointer, number, or numba's array structure (5 words, shape, strides)."""
+    """Return the number of words of a field: a pointer, a number, or numba's array structure (5, shape, strides)."""
     return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
 def address_of(array: Any) -> int:
-    """Address of an array's first entry; numpy itself takes four times as long to tell."""
+    """Return the address of an array's first entry, four times faster than numpy does."""
     try:
         return ctypes.addressof(_NOTHING.from_buffer(array))
     except (TypeError, ValueError, BufferError):  # read-only, or not in one piece
@@ -351,7 +350,7 @@ _NOTHING = ctypes.c_char * 0
 
 
 def _layout(value: Any) -> list[int]:
-    """The field as words; an array has no reference counter: the block keeps it alive."""
+    """Return a field as words. An array has no reference counter, for the block keeps it alive."""
     if isinstance(value, np.ndarray):
         place = address_of(value)
         return [0, 0, value.size, value.itemsize, place, *value.shape, *value.strides]

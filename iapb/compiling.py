@@ -1,4 +1,4 @@
-"""Say it when kernels are compiled: nothing else keeps silent for a minute. Nested listeners tell it once."""
+"""Report that kernels are being compiled, which can take a minute or two. Nested listeners report it once."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-_listening: list[bool] = []  # not empty: somebody tells already
+_listening: list[bool] = []  # not empty: a listener reports already
 BEGIN = "Compiling kernels (seconds to a minute or two); they are cached for the next time ..."
 
 
 @contextmanager
 def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
-    """Call say(line) when this process begins to compile a kernel, and at the end say how long all of it took.
+    """Call say(line) when this process starts to compile a kernel, and at the end with the total compile time.
 
-    A kernel that is read from numba's cache is not compiled, and nothing is said of it.
+    A kernel from numba's cache is not compiled and not reported.
     """
     from numba.core import event
 
@@ -40,7 +40,7 @@ def to_stderr(line: str) -> None:
 
 
 def tell_from_worker(told: Any) -> None:
-    """Initialise a worker process: the first of those that share the flag `told` says on stderr that it compiles."""
+    """Initialise a worker process. Of the processes that share the flag `told`, the first to compile reports it."""
     from numba.core import event
 
     def say_once() -> None:
@@ -54,7 +54,7 @@ def tell_from_worker(told: Any) -> None:
 
 
 def _listener(begin: Callable[[], None]) -> Any:
-    """A listener of numba's that calls begin() once, and adds up `seconds` of compiling."""
+    """Return a numba listener that calls begin() once and adds up the `seconds` of compiling."""
     from numba.core import event
 
     class Listener(event.Listener):

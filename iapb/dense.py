@@ -1,4 +1,4 @@
-"""Small dense matrices without BLAS or LAPACK, whose last bits depend on the processor."""
+"""Small dense matrices without BLAS or LAPACK, because the last bits of their results depend on the processor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Floats:
 
 
 def solve(matrix: ArrayLike, right: ArrayLike) -> Floats:
-    """Return x with matrix x = right, (n, n) and (n,), by elimination with row exchanges.
+    """Solve matrix · x = right for x (n,), with a matrix (n, n), by Gaussian elimination with row exchanges.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def _multiply(a, b, out):
 
 @kernel
 def _eliminate(a, x):
-    """Overwrite x with the solution; False where no pivot is left."""
+    """Overwrite x with the solution; return False if no pivot is left."""
     n = x.shape[0]
     for k in range(n):
         pivot = k

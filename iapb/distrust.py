@@ -1,4 +1,4 @@
-"""Look in a run, from its record alone, for what makes its result worthless: energy, overlap, tunnelling, positions."""
+"""Check the record of a run for signs of a meaningless result: energy, overlap, tunnelling and positions."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from iapb.run import Run
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-UNACCOUNTED = 0.02  # share of the energy at hand that a first-order step may make up
-DEEP = 0.5  # of the thinner shape: an overlap beyond is no contact of rigid bodies
-NARROW = 0.1  # of the body: a gap that much too narrow lets no rigid body through
-OVERRUN = 0.1  # of a joint's range: an end that far beyond it is no limit
-ROUNDED = 1e-9  # share of a step by which rounding may move a crossing
-WILD = 10.0  # times the farthest that start, speed and acceleration can carry a body
+UNACCOUNTED = 0.02  # share of the available energy that errors of a first-order step may add
+DEEP = 0.5  # of the thinner shape: largest overlap of rigid bodies
+NARROW = 0.1  # of the body: a rigid body cannot pass a gap that is narrower by so much
+OVERRUN = 0.1  # of a joint's range: largest distance beyond a limit at the end
+ROUNDED = 1e-9  # rounding error of a crossing, as a share of the step
+WILD = 10.0  # factor on the farthest distance that start, speed and acceleration explain
 
 
 def distrust_of(run: Run) -> tuple[str, ...]:
-    """Say why a result is not to be trusted, from the record alone; empty where nothing is wrong."""
+    """Return the reasons why a result is not to be trusted, from the record alone; empty if nothing is wrong."""
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
     return tuple(found for found in (_made_energy(run), _friction_drove(run), _sank(run), _passed(run), _squeezed(run),
@@ -43,7 +43,7 @@ def _in_springs(run: Run) -> float:
 
 
 def _at_hand(run: Run) -> float:
-    """All the energy that the run may show [J]: start, springs, fallen through, worked in."""
+    """Return the energy available to the run [J]: start, springs, loss of height, and work of hand and coupling."""
     energy = run.energy
     fallen = float(energy["potential"][0] - energy["potential"].min())
     worked = sum(float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work"))
@@ -51,7 +51,7 @@ def _at_hand(run: Run) -> float:
 
 
 def _made_energy(run: Run) -> str:
-    """Energy above start plus work."""
+    """Say where the energy exceeds the energy at the start plus the work done."""
     energy = run.energy
     if not {"kinetic", "potential", "hand_work", "coupling_work"} <= set(energy) or not run.steps:
         return ""
@@ -66,14 +66,14 @@ def _made_energy(run: Run) -> str:
 
 
 def _trifle(run: Run) -> float:
-    """Energy too small to count [J]: of lifting the bodies by a thousandth of their size."""
+    """Return a negligible energy [J]: that of lifting the bodies by a thousandth of their size."""
     gravity = float(np.linalg.norm(run.scene_resolved.get("gravity") or [0.0]))
     return 1e-3 * gravity * sum(body.get("mass", 0.0) * _size(body.get("shapes", ()), 0.0)
                                 for body in run.scene_resolved.get("bodies", ()))
 
 
 def _friction_drove(run: Run) -> str:
-    """Friction that did work on the bodies."""
+    """Say if friction did positive work on the bodies."""
     work = run.energy.get("friction_work")
     if work is None or not len(work) or not {"hand_work", "coupling_work"} <= set(run.energy):
         return ""
@@ -84,7 +84,7 @@ def _friction_drove(run: Run) -> str:
 
 
 def _size(shapes: Iterable[dict[str, Any]], without: float = math.inf) -> float:
-    """Smallest extent among plain shapes of the scene [m]."""
+    """Return the smallest extent [m] of shapes given as plain values; `without` if none has an extent."""
     sizes = []
     for shape in shapes:
         if "radius" in shape:
@@ -97,7 +97,7 @@ def _size(shapes: Iterable[dict[str, Any]], without: float = math.inf) -> float:
 
 
 def _sank(run: Run) -> str:
-    """Penetration above half a shape."""
+    """Say where two bodies overlap by more than half of the thinner shape."""
     bodies = run.scene_resolved.get("bodies", [])
     if not len(run.contacts.gap) or len(bodies) != len(run.body_names):
         return ""
@@ -116,7 +116,7 @@ def _sank(run: Run) -> str:
 
 
 def _passed(run: Run) -> str:
-    """Circles and balls whose centre goes through a wall of flat faces between two states, and is in it at neither."""
+    """Say which circle or ball passes through a flat-faced wall within a step: its centre enters and leaves it."""
     scene = run.scene_resolved
     walls = [(wall["name"], *_faces(wall)) for wall in scene.get("walls", ()) if "size" in wall or "vertices" in wall]
     if not walls or not run.steps or len(scene.get("bodies", ())) != len(run.body_names):
@@ -134,7 +134,7 @@ def _passed(run: Run) -> str:
 
 
 def _faces(wall: dict[str, Any]) -> tuple[Floats, Floats]:
-    """Unit outward normals (e, dim) and offsets (e,) of a box or polygon: n·x <= offset inside."""
+    """Return the unit outward normals (e, dim) and offsets (e,) of a box or polygon; n·x <= offset inside."""
     if "size" in wall:
         dim = len(wall["size"])
         normals = np.vstack([np.eye(dim), -np.eye(dim)])
@@ -150,7 +150,7 @@ def _faces(wall: dict[str, Any]) -> tuple[Floats, Floats]:
 
 
 def _carried(pose: Floats, point: Floats) -> Floats:
-    """A point of a body along its poses (n, 3 or 7): (n, 2 or 3)."""
+    """Return the world positions (n, 2 or 3) of a body's point for poses (n, 3 or 7)."""
     if pose.shape[1] == 3:
         c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
         return pose[:, :2] + np.column_stack([c * point[0] - s * point[1], s * point[0] + c * point[1]])
@@ -159,10 +159,13 @@ def _carried(pose: Floats, point: Floats) -> Floats:
 
 
 def _crossed(height: Floats) -> int:
-    """First step whose straight way goes in and out of a convex shape, by heights over its faces (n, e); -1: none."""
+    """Return the first step whose straight path enters and leaves a convex shape; -1 if none.
+
+    `height` (n, e) holds the heights of a point over the faces at n instants.
+    """
     before, after = height[:-1], height[1:]
     outside = (before.max(axis=1) > 0.0) & (after.max(axis=1) > 0.0) & ~((before > 0.0) & (after > 0.0)).any(axis=1)
-    k = np.flatnonzero(outside)  # all faces that these are beyond, they cross
+    k = np.flatnonzero(outside)  # they cross every face that they are beyond
     before, after = before[k], after[k]
     share = before / np.where(before == after, 1.0, before - after)
     enters = np.where((before > 0.0) & (after <= 0.0), share, 0.0).max(axis=1)
@@ -172,13 +175,13 @@ def _crossed(height: Floats) -> int:
 
 
 def _squeezed(run: Run) -> str:
-    """Bodies that go on by their size between walls that leave them a tenth too little room."""
+    """Say which body moves on by more than its size in a gap that is a tenth of its size too narrow."""
     bodies, table = run.scene_resolved.get("bodies", []), run.contacts
     if not len(table.gap) or len(bodies) != len(run.body_names):
         return ""
     for b, body in enumerate(bodies):
         size = _size(body.get("shapes", ()))
-        deep = table.gap < -0.5 * NARROW * size  # of two that overlap by more together, one does by half of it
+        deep = table.gap < -0.5 * NARROW * size  # if two overlap by more in sum, one of them does by half of it
         if not deep.any() or not (deep & (table.body_a == b) & (table.body_b < 0)).any():
             continue
         rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
@@ -195,9 +198,9 @@ def _squeezed(run: Run) -> str:
 
 
 def _pressed(step: Integers, normal: Floats, gap: Floats, least: float) -> tuple[Integers, float]:
-    """Steps (ascending) in which two contacts that face each other overlap by more than `least`, and by how much."""
+    """Return the steps, ascending, in which two opposed contacts overlap by more than `least` in sum, and the most."""
     found, widest = [], 0.0
-    for apart in range(1, int(np.bincount(step - step[0]).max())):  # contacts of a step stand together
+    for apart in range(1, int(np.bincount(step - step[0]).max())):  # the contacts of a step are consecutive
         facing = np.einsum("ij,ij->i", normal[:-apart], normal[apart:]) < -0.9
         narrow = -(gap[:-apart] + gap[apart:])
         caught = (step[:-apart] == step[apart:]) & facing & (narrow > least)
@@ -207,7 +210,7 @@ def _pressed(step: Integers, normal: Floats, gap: Floats, least: float) -> tuple
 
 
 def _flew(run: Run) -> str:
-    """Positions that no start, speed and acceleration explain."""
+    """Say which position is farther than start, speed and acceleration can explain."""
     lengths = [i for i, unit in enumerate(run.coordinate_units) if unit == "m"]
     if not lengths or not run.steps:
         return ""
@@ -228,7 +231,7 @@ def _flew(run: Run) -> str:
 
 
 def _overran(run: Run) -> str:
-    """Joints that go beyond their limits by more than half of their range, or end a tenth of it beyond."""
+    """Say which joint goes beyond a limit by more than half of its range, or by more than a tenth at the end."""
     bodies = run.scene_resolved.get("bodies", [])
     first = np.cumsum([0, *(KINDS[body["joint"]].nq for body in bodies)])
     for i, body in zip(first, bodies, strict=False):

@@ -1,7 +1,7 @@
-"""Double-double sums for energies: a number is an unevaluated pair hi + lo of about 32 digits.
+"""Double-double arithmetic for energies: a number is an unevaluated pair hi + lo of about 32 digits.
 
-Source: Dekker (1971), Knuth (TAOCP 2, 4.2.2), Hida, Li and Bailey (2001). Exact as long as no intermediate
-leaves the range of doubles; callers scale first (`iapb.contact.impact`).
+Sources: Dekker (1971), Knuth (TAOCP 2, 4.2.2), Hida, Li and Bailey (2001). The error bounds hold as long as no
+intermediate value leaves the range of doubles; callers scale first (`iapb.contact.impact`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _SPLITTER = 134217729.0  # 2^27 + 1: halves a 53-bit significand (Dekker)
 
 @kernel
 def two_sum(a, b):
-    """a + b = s + r exactly (Knuth)."""
+    """Return s and r with a + b = s + r exactly (Knuth)."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -23,7 +23,7 @@ def two_sum(a, b):
 
 @kernel
 def two_product(a, b):
-    """a b = p + r exactly (Dekker)."""
+    """Return p and r with a b = p + r exactly (Dekker)."""
     p = a * b
     t = _SPLITTER * a
     a_hi = t - (t - a)
@@ -36,7 +36,7 @@ def two_product(a, b):
 
 @kernel
 def add_product(hi, lo, a_hi, a_lo, b):
-    """(hi, lo) + (a_hi, a_lo) · b."""
+    """Return the pair (hi, lo) + (a_hi, a_lo) · b."""
     p, r = two_product(a_hi, b)
     r += a_lo * b
     s, t = two_sum(hi, p)
@@ -47,7 +47,7 @@ def add_product(hi, lo, a_hi, a_lo, b):
 
 @kernel
 def symmetric_entry(matrix, i, j):
-    """Entry of ½ (M + Mᵀ) as an exact pair: M[i, j] and 0 where M is symmetric."""
+    """Return entry (i, j) of ½ (M + Mᵀ) as an exact pair, which is M[i, j] and 0 if M is symmetric."""
     entry, mirrored = matrix[i, j], matrix[j, i]
     if entry == mirrored:
         return entry, 0.0
@@ -62,7 +62,7 @@ def quadratic_forms(mass_matrix, v, change):
 
 @kernel
 def _scaled_forms(mass_matrix, v, change, v_unit, change_unit):
-    """The forms of v and Δv times these powers of two."""
+    """Return the quadratic forms of v · v_unit and Δv · change_unit; the units are powers of two."""
     d = v.shape[0]
     cross_hi = cross_lo = square_hi = square_lo = 0.0
     for i in range(d):
@@ -77,7 +77,7 @@ def _scaled_forms(mass_matrix, v, change, v_unit, change_unit):
 
 @kernel
 def unit_of(vector):
-    """The power of two that brings the largest entry into [½, 1), or near it at the ends of range."""
+    """Return the power of two, at most 2^±1000, that scales the largest entry into [½, 1) or towards it."""
     largest = 0.0
     for k in range(vector.shape[0]):
         largest = max(largest, abs(vector[k]))
@@ -86,15 +86,16 @@ def unit_of(vector):
 
 @kernel
 def in_range(cross, square):
-    """Whether the forms are those of a step that loses energy at first, and nothing under- or overflowed in them."""
+    """Whether vᵀMΔv < 0 < ΔvᵀMΔv, and both are far from underflow and overflow."""
     return 2.0**-900 < square < 2.0**900 and -(2.0**900) < cross < -(2.0**-900)
 
 
 @kernel
 def passive_range(mass_matrix, v, change):
-    """Return the α where v + α Δv loses most energy, and the largest one without a gain: −x/y and −2x/y.
+    """Return the α at which v + α Δv has the least energy, and the largest α without a gain: −x/y and −2x/y.
 
-    x = vᵀMΔv, y = ΔvᵀMΔv. Both 0 where every step gains. Vectors whose squares under- or overflow are scaled first.
+    Here x = vᵀMΔv and y = ΔvᵀMΔv. Both results are 0 if every α > 0 gains energy. Vectors whose squares under- or
+    overflow are scaled first.
     """
     cross, square = quadratic_forms(mass_matrix, v, change)
     scale = 1.0
@@ -111,7 +112,7 @@ def passive_range(mass_matrix, v, change):
 def kinetic_energies(mass_matrix, v_minus, v_plus):
     """Return ½ v⁻ᵀ M v⁻ and ½ (v⁺ᵀ M v⁺ − v⁻ᵀ M v⁻), both in double-double, rounded once.
 
-    The difference is formed before rounding: it is right even where the two energies agree in all digits.
+    The difference is formed before rounding, so it is accurate even if the two energies agree in all digits.
     """
     d = v_minus.shape[0]
     before_hi = before_lo = change_hi = change_lo = 0.0

@@ -1,8 +1,8 @@
-"""Elementary functions with the same bits on every processor: no libm, no vectorised loops of numpy.
+"""Elementary functions that return the same bits on every processor, without libm and numpy's vectorised loops.
 
-The C library picks other code for sin, cos and atan2 where the processor has FMA, and numpy has its own for AVX-512:
-last bits differ. These use +, −, ×, ÷ and √ alone, which IEEE 754 rounds in one way. They evaluate to about 70 bits and
-round once, so that nearly every result is the correctly rounded one.
+The C library uses different code for sin, cos and atan2 on processors with FMA, and numpy uses its own for AVX-512, so
+their last bits differ. The functions here use only +, −, ×, ÷ and √, whose rounding IEEE 754 fixes. They compute about
+70 bits and round once, so nearly every result is correctly rounded.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ _FIFTH = (0.008333333333333333, 1.1564823173178714e-19)
 _SIXTH = (0.001388888888888889, -5.300543954373577e-20)
 _SEVENTH = (0.0001984126984126984, 1.7209558293420705e-22)
 
-_LARGEST_ANGLE = 2.0**30  # beyond, doubles are 1e-7 rad apart: the angle is first reduced by the rounded 2π
+_LARGEST_ANGLE = 2.0**30  # beyond this, doubles are 1e-7 rad apart, and the angle is first reduced by the rounded 2π
 _TAN_22_5_DEGREES_TERMS = 10  # of the arc tangent's series below tan(22.5°): 4e-10
 
 
 @kernel
 def _multiply_add(c_hi, c_lo, a_hi, a_lo, b_hi, b_lo):
-    """c + a b of three pairs."""
+    """Return c + a b for three pairs."""
     hi, lo = add_product(c_hi, c_lo, a_hi, a_lo, b_hi)
     return hi, lo + a_hi * b_lo
 
 
 @kernel
 def _near_zero(h, l):
-    """Sine and cosine, as pairs, of the angle h + l of at most about 45 degrees."""
+    """Return sine and cosine, as pairs, of an angle h + l of at most about 45 degrees."""
     z, w = two_product(h, h)
     w += 2.0 * h * l
     tail = 1.0 / 121645100408832000.0
@@ -62,9 +62,9 @@ def _near_zero(h, l):
 
 @kernel
 def _sine_cosine_pairs(angle):
-    """Sine and cosine of an angle [rad] as pairs hi + lo."""
+    """Return sine and cosine of an angle [rad] as pairs hi + lo."""
     if not abs(angle) <= _LARGEST_ANGLE:
-        # as if the angle were another one within its own rounding
+        # the rounded 2π changes the angle by less than its own rounding error
         angle = math.copysign(abs(angle) % (4.0 * _QUARTER[0]), angle)
     turns = math.floor(angle / _QUARTER[0] + 0.5) if abs(angle) > 0.5 * _QUARTER[0] else 0
     h, l = angle, 0.0
@@ -81,7 +81,7 @@ def _sine_cosine_pairs(angle):
 
 @kernel
 def sine_cosine(angle):
-    """Return (sin, cos) of an angle [rad]; NaN for what is not finite."""
+    """Return (sin, cos) of an angle [rad]; NaN for an angle that is not finite."""
     if not math.isfinite(angle):
         return math.nan, math.nan
     s, t, c, d = _sine_cosine_pairs(angle)
@@ -102,22 +102,22 @@ def cosine(angle):
 
 @kernel
 def _power_of_two(largest):
-    """A factor that brings a number to where its square neither over- nor underflows."""
+    """Return a power of two that scales a number so that its square neither over- nor underflows."""
     return 2.0**600 if largest < 2.0**-400 else (2.0**-600 if largest > 2.0**400 else 1.0)
 
 
 @kernel
 def arc_tangent(y, x):
-    """Return the angle [rad] in [−π, π] of the point (x, y), as math.atan2; (0, 0) has the angle 0.
+    """Return the angle [rad] in [−π, π] of the point (x, y), as math.atan2 does; the angle of (0, 0) is 0.
 
-    A series gives nine digits, and one step of Newton's method on y cos a − x sin a all of them.
+    A series gives nine digits. One step of Newton's method on y cos a − x sin a gives the others.
     """
     across, along = abs(y), abs(x)
     if across < 2.0**-30 * along and x > 0.0:
-        return y / x  # the cube of it is below its rounding
+        return y / x  # the cubic term is below the rounding error
     if not (across > 0.0 or along > 0.0):
         return 0.0 * y
-    # tan of half the angle from the nearer axis: below tan 22.5°
+    # tangent of half the angle from the nearer axis, at most tan 22.5°
     small, large = min(across, along) / max(across, along), 1.0
     small = small / (1.0 + math.sqrt(1.0 + small * small))
     square, series = small * small, 0.0
@@ -139,7 +139,7 @@ def arc_tangent(y, x):
 
 @kernel
 def hypotenuse(x, y):
-    """Return √(x² + y²), as math.hypot; nothing on the way leaves the range of doubles."""
+    """Return √(x² + y²), as math.hypot does, without intermediate overflow or underflow."""
     largest = max(abs(x), abs(y))
     if not (largest > 0.0 and math.isfinite(largest)):
         return largest + abs(x) + abs(y)

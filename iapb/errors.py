@@ -1,4 +1,4 @@
-"""What can go wrong at the public border: every error names the argument, its value and what was expected."""
+"""Errors of the public interface. Each names the argument, its value and the expected value."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pickle
 from dataclasses import dataclass
 from typing import Any
 
-_SHOWN_CHARACTERS = 120  # a value longer than this is cut in messages: a message is read, an array is not
-_LISTED_MISTAKES = 100  # a message lists no more; the error itself carries all
+_SHOWN_CHARACTERS = 120  # longer values are cut in messages
+_LISTED_MISTAKES = 100  # a message lists no more; the error itself has all
 
 
 def shown(value: Any) -> str:
@@ -19,12 +19,11 @@ def shown(value: Any) -> str:
 class IapbError(Exception):
     """Root of every error that iapb raises on purpose.
 
-    Errors can be pickled with message and attributes; an attribute that cannot be pickled is replaced by
-    its text.
+    Errors can be pickled with message and attributes. An attribute that cannot be pickled is replaced by its text.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from message and attributes: the arguments of a child's __init__ are not in `args`."""
+        """Rebuild from message and attributes, because `args` lacks the arguments of a subclass's __init__."""
         attributes = {name: _portable(value) for name, value in vars(self).items()}
         return _restored, (type(self), self.args, attributes)
 
@@ -32,7 +31,7 @@ class IapbError(Exception):
 def _portable(value: Any) -> Any:
     try:
         pickle.dumps(value)
-    except Exception:  # pickle raises whatever a value's own __reduce__ raises
+    except Exception:  # a value's own __reduce__ may raise any exception
         return shown(value)
     return value
 
@@ -61,9 +60,9 @@ class RangeError(IapbError, OverflowError):
 
 @dataclass(frozen=True)
 class Mistake:
-    """One mistake of a scene file: where it stands, what it says, what was expected.
+    """One mistake of a scene file: its place, the value found and the value expected.
 
-    Lines and columns count from 1; 0 where the value was not read from the file. `path` is the field's path,
+    Lines and columns count from 1; they are 0 if the value was not read from the file. `path` is the field's path,
     such as ``bodies[0].mass``.
     """
 
@@ -80,7 +79,7 @@ class Mistake:
 
 
 class SceneError(IapbError, ValueError):
-    """A scene file cannot be used; carries *all* of its mistakes. A study file, too: `what` is its kind in words."""
+    """A scene file (or study file) is invalid. The error lists *all* mistakes; `what` names the kind of file."""
 
     def __init__(self, mistakes: list[Mistake], what: str = "scene") -> None:
         self.mistakes = tuple(mistakes)
@@ -99,7 +98,7 @@ class MissingDependencyError(IapbError, ImportError):
         super().__init__(f"{purpose} needs {package}, which is not installed. Install it with: {install}")
 
 
-#: Which extra of ``pip install 'iapb[...]'`` brings a package that the engine itself does without.
+#: The extra of ``pip install 'iapb[...]'`` that installs a package which the engine itself does not need.
 EXTRAS = {
     **dict.fromkeys(("scipy", "h5py", "threadpoolctl", "pinocchio", "cvxpy", "clarabel", "qpsolvers", "daqp",
                      "quadprog", "proxsuite", "quantecon"), "reference"),
@@ -109,7 +108,7 @@ EXTRAS = {
 
 
 def name_the_extra(error: ModuleNotFoundError, purpose: str) -> ImportError:
-    """Return a `MissingDependencyError` that names the extra of the missing package; other errors unchanged."""
+    """Return a `MissingDependencyError` that names the extra of the missing package, or the error itself."""
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return error
@@ -117,8 +116,8 @@ def name_the_extra(error: ModuleNotFoundError, purpose: str) -> ImportError:
 
 
 class RunFileError(IapbError):
-    """A file is not a readable run of this project."""
+    """A file is not a readable run file of this project."""
 
 
 class SolverError(IapbError):
-    """A solver could not be used on a problem (refused or failed); never a silent bad answer."""
+    """A solver refused a problem or failed on it."""

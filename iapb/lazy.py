@@ -1,4 +1,4 @@
-"""Names of a package that are loaded when first used, so that importing the package costs next to nothing."""
+"""Load the names of a package at their first use, so that importing the package is fast."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def lazy_names(
     Parameters
     ----------
     package : the package's ``__name__``.
-    homes : name -> module that it is imported from; ".case" is one in the package.
+    homes : maps each name to its module; ".case" is a module of the package.
     """
 
     def load(name: str) -> Any:
@@ -42,9 +42,9 @@ def lazy_names(
 
 
 def needed(module: str, purpose: str) -> Any:
-    """Return an optional module, imported now; who lacks it gets one sentence that says how to install it.
+    """Import and return an optional module; if it is missing, raise an error that says how to install it.
 
-    Where a package of the user's hides one of this project's, the error names both and the way out.
+    If a package of the user hides one of this project, the error names both and says how to fix it.
     """
     if hidden := hidden_package():
         raise IapbError(hidden)
@@ -59,7 +59,7 @@ def needed(module: str, purpose: str) -> Any:
 
 
 def hidden_package() -> str:
-    """Say which package of this project is hidden by one of the same name elsewhere; empty where none is."""
+    """Say which package of this project another one of the same name hides; empty if none is hidden."""
     ours = Path(__file__).resolve().parents[1]
     for name in ("reference", "verification", "reports"):
         spec = find_spec(name)
@@ -72,7 +72,7 @@ def hidden_package() -> str:
 
 
 def extension(group: str, name: str) -> Any:
-    """Return what an installed package offers under an entry point: so packages above add to the ones below."""
+    """Load the object that an installed package offers as an entry point; upper packages extend lower ones this way."""
     for offered in entry_points(group=group, name=name):
         return _loaded(offered, f"{group}: {name}")
     raise MissingDependencyError("iapb[report]", f"{group}: {name}", "pip install 'iapb[report]'")

@@ -1,4 +1,4 @@
-"""Names that are looked up: what to say of one that nothing has."""
+"""Messages for unknown names, with the most similar known name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def nearest(wrong: Any, known: Iterable[Any]) -> str:
-    """Return the known name that is spelt most like `wrong`, capitals aside; empty where none is much like it."""
+    """Return the known name most similar to `wrong`, ignoring case; empty if none is similar."""
     spelt = {str(name).casefold(): str(name) for name in known}
     near = difflib.get_close_matches(str(wrong).casefold(), spelt, n=1)
     return spelt[near[0]] if near else ""
@@ -22,5 +22,5 @@ def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
 
 
 def in_metres(length: float) -> str:
-    """Return a length [m] for readers: in millimetres below a metre."""
+    """Return a length [m] as text, in millimetres below 1 m."""
     return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"

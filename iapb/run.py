@@ -1,10 +1,10 @@
-"""Run: the plain record of one simulation, and the one list of what is recorded.
+"""Run: the record of one simulation, and the definition of every recorded array.
 
-Everything after the engine works from a Run alone. Each recorded array says once, where it stands, along which
-dimensions it goes, its unit and its meaning; the loop's record (`iapb.recording`), the run file
-(`reports.store.schema`) and the test of docs/notation.md are made from that. States are sampled at n + 1 instants
-(dimension time), step quantities belong to the n steps between them; velocity is the dimension of the d generalized
-velocities, device_velocity that of the hand-held tool (and of the device, kinematically its equal).
+All evaluation after the simulation uses a Run alone. Each recorded array has its dimensions, unit and meaning in its
+field definition below. The loop's record (`iapb.recording`), the run file (`reports.store.schema`) and the test of
+docs/notation.md use these definitions. States are sampled at n + 1 instants (dimension time); step quantities belong
+to the n steps between them. The dimension velocity has the d generalized velocities, and device_velocity has those of
+the tool in the hand (and of the device, which has the same kinematics).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from iapb.lazy import extension, needed
 
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
 STATE_NAMES = ("free", "colliding", "resting")
-_SHOWN = 12  # coordinates that a plot or a table shows
+_SHOWN = 12  # most coordinates that a plot or a table shows
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +32,7 @@ _TYPES = {"Floats": np.float64, "Integers": np.int64, "Booleans": np.bool_, "Sta
 
 # Units of generalized quantities follow the unit of their coordinate or of their velocity.
 POSITION = {"m": "m", "rad": "rad", "1": "1"}
-# "1": an impact of bare numbers, which no scene gives a unit.
+# "1": an impact of plain numbers without units, not from a scene.
 VELOCITY = {"m/s": "m/s", "rad/s": "rad/s", "1": "1"}
 FORCE = {"m/s": "N", "rad/s": "N m", "1": "1"}
 IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
@@ -42,8 +42,8 @@ IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
 class Quantity:
     """A recorded array: its name (also the attribute of the record), type, dimensions, unit and meaning.
 
-    A `unit` that is a mapping belongs to a generalized quantity: the unit for each unit of coordinate
-    or, along velocities, of velocity.
+    For a generalized quantity, `unit` maps the unit of each coordinate (or of each velocity) to the unit of the
+    quantity.
     """
 
     name: str
@@ -54,25 +54,25 @@ class Quantity:
 
 
 def _along(dimensions: str, unit: str | dict[str, str], meaning: str) -> dict[str, Any]:
-    """What a field of a record says of itself."""
+    """Return the metadata of a recorded field."""
     return {"dimensions": tuple(dimensions.split()), "unit": unit, "meaning": meaning}
 
 
 def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
-    """Return the recorded arrays of a record class in order; those along dimension `first` alone, if it is given."""
+    """Return the recorded arrays of a record class in order; if `first` is given, only those along this dimension."""
     found = (Quantity(f.name, _TYPES[str(f.type)], **f.metadata) for f in fields(record) if f.metadata)
     return tuple(quantity for quantity in found if first in ("", quantity.dimensions[0]))
 
 
 def blank(listed: Iterable[Quantity], lengths: Mapping[str, int],
           make: Callable[..., NDArray[Any]] = np.zeros) -> dict[str, NDArray[Any]]:
-    """Return an array for each quantity, by name, of zeros or as `make` has it; `lengths` of the dimensions."""
+    """Return one array per quantity, by name, made by `make`; `lengths` gives the length of each dimension."""
     return {each.name: make([lengths[name] for name in each.dimensions], each.dtype) for each in listed}
 
 
 @dataclass(frozen=True)
 class ContactTable:
-    """Contacts of all steps, ragged: those of step k are the rows ``offsets[k]:offsets[k + 1]``."""
+    """Contacts of all steps. The rows ``offsets[k]:offsets[k + 1]`` are the contacts of step k."""
 
     offsets: Integers = field(metadata=_along(
         "step_edge", "1", "first row of each step's contacts; the last entry closes"))
@@ -85,16 +85,16 @@ class ContactTable:
         "contact", "m/s", "before the step's impulse, positive separates"))
     normal_force: Floats = field(metadata=_along("contact", "N", "force on a along the normal"))
     friction_force: Floats = field(metadata=_along("contact axis", "N", "friction force on a"))
-    impulse: Floats = field(metadata=_along(  # of least norm where it is not unique
+    impulse: Floats = field(metadata=_along(  # the one of least norm if it is not unique
         "contact", "N s", "collision impulse on a along the normal"))
     is_new: Booleans = field(metadata=_along("contact", "1", "1 where the contact was not there in the step before"))
 
 
 @dataclass(frozen=True)
 class ImpactTable:
-    """Collisions resolved, one row per step and island of a colliding group (paper section V).
+    """Resolved collisions: one row per step and island of a colliding group (paper section V).
 
-    An island are the trees that contacts of the collision link: what only touches them is not in it.
+    An island is a set of trees connected by contacts of the collision. A tree that merely touches them is not in it.
     """
 
     step: Integers = field(metadata=_along("impact", "1", "step in which it happened"))
@@ -126,7 +126,7 @@ def digests(matrices: Floats) -> Integers:
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One line of the effects table: what was on, and why; `ignores`: the field of the scene that the law ignored."""
+    """One line of the effects table: whether the effect was on, and why. `ignores`: scene field that the law ignored."""
 
     name: str
     active: bool
@@ -135,7 +135,7 @@ class EffectRow:
 
 
 class Later(NamedTuple):
-    """What a Run computes when it is first asked for: a function of the run."""
+    """A function of the run that computes an attribute at its first use."""
 
     value: Callable[[Run], Any]
 
@@ -147,26 +147,26 @@ _LATER = ("scene_source", "scene_resolved", "pose", "energy", "effects", "distru
 class Run:
     """One simulation: scene, law, coupling and all recorded quantities (SI units).
 
-    Derived quantities (`pose`, `energy`, `distrust`, the text of scene and effects) are computed when first asked for.
+    Derived quantities (`pose`, `energy`, `distrust`, the text of scene and effects) are computed at first use.
     """
 
     scene_name: str
     scene_source: str  # YAML text
     scene_resolved: dict[str, Any]  # every field with its value, defaults included
-    world: str  # "IAPB", "PB", "ideal", "CBuc" or a name of the caller's
+    world: str  # "IAPB", "PB", "ideal", "CBuc" or a name that the caller chose
     law: str
     law_settings: dict[str, Any]
-    coupling: str  # "none" where no device takes part
+    coupling: str  # "none" without a device
     coupling_settings: dict[str, Any]
     dt: float  # [s]
-    complete: bool  # False: interrupted, the arrays end at the last step done
+    complete: bool  # False if stopped early; the arrays then end at the last step done
     coordinate_names: tuple[str, ...]  # (nq,)
     coordinate_units: tuple[str, ...]  # (nq,)
-    velocity_names: tuple[str, ...]  # (d,) of each entry of v, and of generalized forces and impulses
-    velocity_units: tuple[str, ...]  # (d,) m/s or rad/s: a force has N, N m, an impulse N s, N m s
+    velocity_names: tuple[str, ...]  # (d,), also for generalized forces and impulses
+    velocity_units: tuple[str, ...]  # (d,) m/s or rad/s; forces have N or N m, impulses N s or N m s
     body_names: tuple[str, ...]
     tool_dofs: tuple[int, int]  # start, stop of the tool in v; (0, 0) without a hand
-    tool_coordinates: tuple[int, int]  # the same in q: quaternions are longer than their velocities
+    tool_coordinates: tuple[int, int]  # start, stop of the tool in q: a quaternion has more entries than its velocity
 
     time: Floats  # (n + 1,) [s]
     q: Floats = field(metadata=_along("time coordinate", POSITION, "generalized configuration"))
@@ -195,18 +195,18 @@ class Run:
     chunk_seconds: Floats = field(
         default_factory=lambda: np.zeros(0), metadata=_along("chunk", "s", "wall time of each chunk"))
     kernel: str = "compiled"  # or "python"
-    stopped: str = ""  # why an incomplete run ends where it does; empty for a complete one
-    remarks: tuple[str, ...] = ()  # what was chosen for the scene, such as by contact.auto
-    # why the result is not to be trusted (`iapb.distrust`); empty: it is
+    stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
+    remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene, such as by contact.auto
+    # why the result is not to be trusted (`iapb.distrust`); empty if nothing is wrong
     distrust: tuple[str, ...] = field(default_factory=tuple)
 
     def __post_init__(self) -> None:
-        """Lay aside what is computed later."""
+        """Set the attributes aside that are computed at first use."""
         self.__dict__["_later"] = {name: self.__dict__.pop(name).value for name in _LATER
                                    if isinstance(self.__dict__[name], Later)}
 
     def __getattr__(self, name: str) -> Any:
-        """Compute what was laid aside."""
+        """Compute an attribute at its first use."""
         later = self.__dict__.get("_later", {}).get(name)
         if later is None and name not in self.__dict__:  # another thread may have been quicker
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
@@ -216,7 +216,7 @@ class Run:
         return self.__dict__[name]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything computed: for pickle and copies."""
+        """Return all attributes, computed, for pickle and copies."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
@@ -225,7 +225,7 @@ class Run:
         return len(self.time) - 1
 
     def __repr__(self) -> str:
-        """Say what was run and what came of it, in one line or two."""
+        """Return the summary, and the first reason for distrust if there is one."""
         return f"<Run of {self.summary}>" if not self.distrust else (
             f"<Run of {self.summary}\n not to be trusted, because {self.distrust[0]}>")
 
@@ -250,7 +250,7 @@ class Run:
     def to_xarray(self) -> Any:
         """Return everything recorded as one `xarray.Dataset`, with units and labelled dimensions.
 
-        What belongs to contacts and impacts has the prefix ``contact_`` and ``impact_``, the ledger ``energy_``.
+        Arrays of contacts and impacts have the prefixes ``contact_`` and ``impact_``; energies have ``energy_``.
         """
         xarray = needed("xarray", "Run.to_xarray")
         listed = [(record, prefix, each) for record, prefix in (
@@ -293,8 +293,8 @@ class Run:
 
         Parameters
         ----------
-        path : of the file
-        replace : whether a file that is there is replaced; otherwise it stays as it is
+        path : path of the file
+        replace : whether to replace an existing file; otherwise the file is left unchanged
 
         Returns
         -------
@@ -303,17 +303,17 @@ class Run:
         return extension("iapb.files", "write")(path, self, replace=replace)
 
 
-# How the arrays of a run are labelled: by its file and by `Run.to_xarray`
+# Labels of the arrays of a run, for its file and for `Run.to_xarray`
 
 
 def energy_dimension(run: Run, name: str) -> str:
-    """Return the dimension of a ledger entry: ``time`` when it has n + 1 values, ``step`` when it has n."""
+    """Return the dimension of an energy array: ``time`` if it has n + 1 values, ``step`` if it has n."""
     length = len(run.energy[name])
     return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
 
 
 def unit_of(quantity: Quantity, run: Run) -> str:
-    """Return the unit of `quantity` in `run`: one, or one per column where the columns differ."""
+    """Return the unit of `quantity` in `run`: one unit, or one per column if the columns differ."""
     if isinstance(quantity.unit, str):
         return quantity.unit
     units = [quantity.unit[unit] for unit in _labels_along(run, quantity.dimensions[-1])[1]]
@@ -331,7 +331,7 @@ def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] 
 
 
 def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units along a dimension of generalized quantities; none along others."""
+    """Return names and units along a dimension; both are empty for dimensions without labels."""
     q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
     planar = run.pose.shape[-1] == 3
     return {

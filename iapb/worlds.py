@@ -1,4 +1,4 @@
-"""Worlds by name: a contact law and a coupling. The engine's are here; `reference.worlds` adds the rigid ones."""
+"""Worlds by name. A world is a contact law with a coupling; `reference.worlds` adds the worlds of rigid contact."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from iapb.system import coupling_of
 
 
 class World(NamedTuple):
-    """A named combination; the coupling's gains come from the scene."""
+    """A named pair of contact law and coupling; the gains of the coupling come from the scene."""
 
     name: str
     law: ContactLaw
     coupling: str
 
     def coupling_in(self, scene: Scene) -> Coupling:
-        """The coupling with the scene's gains; none where the scene has no hand or gives no gains at all."""
+        """Return the coupling with the scene's gains, or no coupling if the scene has no hand or no gains."""
         gains = scene.couplings
         without = scene.hand is None or (gains.four_channel is None and gains.unilateral is None)
         return coupling_of(scene, "none" if without else self.coupling)
 
 
-# name -> (how IAPB meets the device's limits) -> world
+# name -> function of the rendering (how IAPB respects the device's limits) that returns the world
 WORLDS: dict[str, Callable[[str], World]] = {
     "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
     "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
@@ -47,12 +47,12 @@ def find_world(name: str, rendering: str = "full") -> World:
     Parameters
     ----------
     name : a key of `WORLDS`
-    rendering : how IAPB meets the device's limits: full (ignores them), saturate, scale or spread
+    rendering : how IAPB respects the device's limits: full (ignores them), saturate, scale or spread
 
     Raises
     ------
     ArgumentError
-        There is no such world, or its law has no impulses that a rendering could fit.
+        There is no such world, or its law has no impulses to which a rendering applies.
     """
     if name not in WORLDS:
         load_extensions("iapb.worlds")

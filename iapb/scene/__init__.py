@@ -1,4 +1,4 @@
-"""Scenes: what a scene file may say, read and checked."""
+"""Scenes: the format of scene files, and their reading and checking."""
 
 from iapb.scene.model import Scene, SpatialScene, scene_schema
 from iapb.scene.reading import find_scene, load_scene, scene_folder, scene_from_text, scene_names

@@ -1,6 +1,6 @@
-"""Rules between the parts of a scene: names, parents, the hand's body, lengths that follow from the tool.
+"""Rules between the parts of a scene: names, parents, the hand's body, and list lengths that depend on the tool.
 
-They work on the plain values as read, so that they report their mistakes also where other fields are wrong.
+They use the plain values of the file, so they report their mistakes even if other fields are wrong.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from iapb.mechanics.joints import KINDS
 from iapb.scene.bodies import WORLD
 from iapb.scene.parts import located
 
-MAX_SHAPES = 4000  # bodies and walls together: candidate pairs grow with its square
+MAX_SHAPES = 4000  # bodies and walls together; the number of candidate pairs grows with its square
 
 
 def across_parts(given: Any) -> list[InitErrorDetails]:
@@ -35,7 +35,7 @@ def across_parts(given: Any) -> list[InitErrorDetails]:
 
 
 def _mappings(items: Any) -> list[dict[str, Any]]:
-    """Return the items of a list; those that are no mappings as empty ones, to keep the numbering."""
+    """Return the items of a list; an item that is no mapping becomes an empty one, to keep the numbering."""
     if not isinstance(items, (list, tuple)):
         return []
     return [item if isinstance(item, dict) else {} for item in items]
@@ -68,7 +68,7 @@ def _parents(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
 
 
 def _scattered_trees(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    """The bodies of one tree stand together, so that the mass matrix is block diagonal."""
+    """Check that the bodies of one tree are consecutive, so that the mass matrix is block diagonal."""
     roots = _roots(bodies)
     for i in range(1, len(roots)):
         if roots[i] is not None and roots[i] != roots[i - 1] and roots[i] in roots[:i]:
@@ -78,7 +78,7 @@ def _scattered_trees(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]
 
 
 def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
-    """Return the name of each body's root; None where names or parents are wrong."""
+    """Return the name of each body's root; None if names or parents are wrong."""
     root: dict[str | None, str | None] = {}
     for body in bodies:
         name, parent = _name(body), _name(body, "parent", WORLD)
@@ -100,7 +100,7 @@ def _too_many_shapes(bodies: list[dict[str, Any]], walls: list[dict[str, Any]]) 
 def _friction_pairs(
     contact: Any, bodies: list[dict[str, Any]], walls: list[dict[str, Any]]
 ) -> Iterator[InitErrorDetails]:
-    """Pairs name things of the scene, and no two things twice."""
+    """Check that friction pairs name things of the scene, and that no pair occurs twice."""
     names, seen, where = {_name(item) for item in (*bodies, *walls)}, set(), ("contact", "friction_pairs")
     for i, pair in enumerate(_mappings(contact.get("friction_pairs") if isinstance(contact, dict) else None)):
         between = pair.get("between")
@@ -117,7 +117,7 @@ def _friction_pairs(
 
 
 def _tool(given: dict[str, Any], bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    """Check what hangs on the hand's body: it exists, moves, and has as many coordinates as the lists say."""
+    """Check that the hand's body exists and moves, and that its lists have one entry per coordinate of the tool."""
     couplings, device = given.get("couplings"), given.get("device")
     hand = given.get("hand")
     if hand is None:
@@ -130,7 +130,7 @@ def _tool(given: dict[str, Any], bodies: list[dict[str, Any]]) -> Iterator[InitE
         return
     names = [_name(body) for body in bodies]
     if None in names or not names:
-        return  # an unreadable body may be the one
+        return  # the unreadable body may be the hand's body
     if held not in names:
         yield located(("hand", "body"), held, "the name of a body of this scene")
         return
@@ -156,7 +156,7 @@ def _lengths(where: str, section: Any, fields: tuple[str, ...], count: int) -> I
 
 
 def _tree_coordinates(bodies: list[dict[str, Any]], held: str) -> int | None:
-    """Return the number of coordinates of the tree that carries a body; None where it cannot be told."""
+    """Return the number of coordinates of the tree that a body belongs to; None if it cannot be determined."""
     roots = _roots(bodies)
     held_root = roots[[_name(body) for body in bodies].index(held)]
     joints = [_name(body, "joint") for body in bodies]

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of a body whose shapes are filled with one density; an overlap counts twice."""
+"""Mass, centre of mass and inertia of a body whose shapes have one density; overlaps of shapes count twice."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Matrix = list[list[float]]
 
 
 def filled(shapes: Iterable[Any], density: float, spatial: bool) -> dict[str, Any]:
-    """Return `mass`, `center_of_mass` and `inertia` about it, as a scene says them.
+    """Return `mass`, `center_of_mass` and `inertia` about it, as in a scene file.
 
     Parameters
     ----------
     shapes : checked shapes of one body
     density : [kg/m2] in the plane, [kg/m3] in space
-    spatial : whether the shapes are those of space
+    spatial : whether the shapes are three-dimensional
     """
     parts: list[tuple[float, list[float], Any]] = [
         _spatial(shape, density) if spatial else _planar(shape, density) for shape in shapes]
@@ -32,7 +32,7 @@ def filled(shapes: Iterable[Any], density: float, spatial: bool) -> dict[str, An
 
 
 def _planar(shape: Any, density: float) -> tuple[float, list[float], float]:
-    """Mass, centre of mass in body axes, moment of inertia about it."""
+    """Return mass, centre of mass in body axes, and moment of inertia about it."""
     if shape.kind == "circle":
         mass = density * math.pi * shape.radius**2
         return mass, list(shape.center), 0.5 * mass * shape.radius**2
@@ -43,7 +43,7 @@ def _planar(shape: Any, density: float) -> tuple[float, list[float], float]:
 
 
 def _polygon(shape: Any, density: float) -> tuple[float, list[float], float]:
-    """Sum over the triangles between the first corner and each edge."""
+    """Return the same for a polygon, as a sum over the triangles between the first corner and each edge."""
     first, mass, moments, about = shape.vertices[0], 0.0, [0.0, 0.0], 0.0
     for a, b in zip(shape.vertices[1:], shape.vertices[2:], strict=False):
         ax, ay, bx, by = a[0] - first[0], a[1] - first[1], b[0] - first[0], b[1] - first[1]
@@ -60,7 +60,7 @@ def _polygon(shape: Any, density: float) -> tuple[float, list[float], float]:
 
 
 def _spatial(shape: Any, density: float) -> tuple[float, list[float], Matrix]:
-    """Mass, centre of mass in body axes, inertia about it in body axes."""
+    """Return mass, centre of mass in body axes, and inertia about it in body axes."""
     if shape.kind == "sphere":
         mass = density * 4.0 / 3.0 * math.pi * shape.radius**3
         about = 0.4 * mass * shape.radius**2
@@ -74,7 +74,7 @@ def _spatial(shape: Any, density: float) -> tuple[float, list[float], Matrix]:
 
 
 def _rotation(rpy: Sequence[float]) -> Matrix:
-    """Roll, pitch, yaw about the fixed x, y and z axes, in this order."""
+    """Return the matrix of roll, pitch and yaw about the fixed x, y and z axes, in this order."""
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(x) for x in rpy)
     return [[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
@@ -82,7 +82,7 @@ def _rotation(rpy: Sequence[float]) -> Matrix:
 
 
 def _cos_sin(angle: float) -> tuple[float, float]:
-    """By Taylor's series: the C library's last bit depends on the processor."""
+    """Return cosine and sine by Taylor's series, because the C library's last bit depends on the processor."""
     x, terms = math.remainder(angle, math.tau), [1.0]
     for k in range(1, 32):
         terms.append(terms[-1] * x / k)

@@ -1,6 +1,7 @@
-"""Functions of time in a scene file: arithmetic of t, pi and a few functions, read without running any Python.
+"""Functions of time in a scene file: arithmetic with t, pi and a few functions, read without running Python code.
 
-They have the same bits on every processor: decimal arithmetic in place of libm, powers by multiplication.
+Their values have the same bits on every processor: they use decimal arithmetic in place of libm, and multiplication for
+powers.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from iapb.scene.parts import Text, expectation
 Function = Callable[[float], float]
 
 MAX_POWER = 16
-_DIGITS = 70  # of an angle, behind its point: a double comes as near as 1e-19 to a multiple of pi, and has 17 digits
+_DIGITS = 70  # decimals of an angle: a double has 17 digits and comes as near as 1e-19 to a multiple of pi
 _NEGLIGIBLE = Decimal("1e-50")
-_LARGEST_EXPONENT = 709.0  # e to it is still a double
+_LARGEST_EXPONENT = 709.0  # its exponential is still a double
 
 
 def _exp(x: float) -> float:
@@ -32,7 +33,7 @@ def _exp(x: float) -> float:
 
 @cache
 def _pi(digits: int) -> Decimal:
-    """Pi to so many digits, by Machin: 16 atan 1/5 - 4 atan 1/239, in whole numbers with ten digits to spare."""
+    """Return pi to so many digits by Machin's formula 16 atan 1/5 - 4 atan 1/239, in integers with ten more digits."""
     total = 0
     for factor, n in ((16, 5), (-4, 239)):
         power, k = factor * 10 ** (digits + 10) // n, 1
@@ -43,7 +44,7 @@ def _pi(digits: int) -> Decimal:
 
 
 def _sine(x: float, odd: int = 1) -> float:
-    """sin x, or cos x with odd = 0: the series of the angle less whole turns, with digits to spare for any double."""
+    """Return sin x, or cos x with odd = 0, by the series of x modulo 2 pi with enough digits for any double."""
     turns = max(Decimal(x).adjusted(), 0)  # digits of the whole turns in x
     with localcontext(prec=_DIGITS + turns):
         angle = Decimal(x) % (2 * _pi(_DIGITS + turns))
@@ -78,7 +79,7 @@ _KNOWN = f"numbers, t, pi, + - * / **, and {', '.join(FUNCTIONS)} (step(x) is 1 
 
 @cache
 def function_of(text: str) -> Function:
-    """Return the function of t that a checked text gives; it raises IapbError where it has no finite value."""
+    """Return the function of t that a checked text describes; it raises IapbError if its value is not finite."""
     inner = _made(ast.parse(text, mode="eval").body)
 
     def function(t: float) -> float:
@@ -94,7 +95,7 @@ def function_of(text: str) -> Function:
 
 
 def _made(node: ast.expr) -> Function:
-    """Turn one node into a function of t; SyntaxError for what an expression does not hold."""
+    """Turn one node into a function of t; raise SyntaxError for a node that an expression may not contain."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             number = float(value)
@@ -119,7 +120,7 @@ def _made(node: ast.expr) -> Function:
 
 
 def _checked(text: str) -> str:
-    """A text that is an expression with a finite value at t = 0."""
+    """Return the text if it is an expression with a finite value at t = 0."""
     try:
         function_of(text)(0.0)
     except IapbError as error:
