@@ -176,8 +176,8 @@ def certify(run: Run) -> Certificate:
 
     The engine's kernels compute M again from the recorded q; they give the same bits on every x86-64 processor. The
     digest in the record is that of M computed in this way after the run, not of the M inside the step. If the digests
-    agree, then q, scene and kernels are those of the recording. The recorded generalized impulse must equal M(v⁺ − v⁻) within
-    `MOMENTUM_TOLERANCE`; this shows that M is the mass matrix of the impact.
+    agree, then q, scene and kernels are those of the recording. The recorded generalized impulse must equal
+    M(v⁺ − v⁻) within `MOMENTUM_TOLERANCE`; this shows that M is the mass matrix of the impact.
 
     Parameters
     ----------

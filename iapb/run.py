@@ -126,7 +126,7 @@ def digests(matrices: Floats) -> Integers:
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One line of the effects table: whether the effect was on, and why. `ignores`: scene field that the law ignored."""
+    """One line of the effects table: whether the effect was on, and why. `ignores`: field that the law ignored."""
 
     name: str
     active: bool
