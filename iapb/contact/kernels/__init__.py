@@ -1,1 +1,1 @@
-"""Compiled contact kernels: arrays in, `out` written, status returned, nothing allocated in a step."""
+"""Compiled contact kernels: they read arrays, write `out`, return a status and allocate nothing in a step."""

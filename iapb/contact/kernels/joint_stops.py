@@ -1,8 +1,8 @@
-"""Ends of the joints' ranges as contacts: a joint at its limit is held, and stopped, like any other contact.
+"""Ends of the joints' ranges as contacts: impulses and penalty forces act at a joint's limit as at any contact.
 
 A point on an arm of length r that a revolute joint turns about its axis a moves with a × r, so that its contact with
-the joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the joint's own velocity, and no other. A prismatic
-joint slides along its axis, and the row is ± e_k. Impulses, springs and records then need no more than contacts do.
+the joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the velocity of this joint alone. A prismatic
+joint slides along its axis, and the row is ± e_k. Impulses, penalty forces and records then treat a limit as a contact.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from iapb.mechanics.kernels.vectors import add, cross, load, scale, store
 
 @kernel
 def is_stop(contacts, i):
-    """Whether contact i is the end of a joint's range: it has one number for both of its shapes."""
+    """Return whether contact i is the end of a joint's range: both of its shapes have the same number."""
     return contacts.shape_a[i] == contacts.shape_b[i]
 
 
 @kernel
 def add_stops(mechanism, stops, w, q, margin, contacts, count):
-    """Append the stops with gap <= margin [m] behind `count` contacts; return how many there are, −1: too many."""
+    """Append the stops with gap <= margin [m] after `count` contacts; return the new count, −1 if there is no room."""
     for i in range(stops.bound.shape[0]):
         gap = stops.arm[i] * stops.sign[i] * (q[stops.coordinate[i]] - stops.bound[i])
         if gap > margin:

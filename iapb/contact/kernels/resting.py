@@ -12,7 +12,7 @@ from iapb.mechanics.kernels.vectors import dot, load, scale, store
 
 @kernel
 def normal_force(gap, normal_velocity, stiffness, damping, clamped):
-    """(5) F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; `clamped`: never below zero."""
+    """(5) F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; with `clamped`, F_n is never below zero."""
     force = -stiffness * gap
     if damping != 0.0:
         force -= damping * normal_velocity

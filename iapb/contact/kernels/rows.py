@@ -11,10 +11,10 @@ from iapb.compiled import kernel
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, store, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at and below this
-# share of what it was computed from. Kinematics round by about 2e-16 a joint, so that n and j are known to
-# 1e-13 for chains of some hundred joints; a direction that truly differs by 1e-13 rad from orthogonal cannot
-# be told from that, and no geometry is that accurate. Left alone, a row of such entries would be promoted to a
-# contact by the unit scaling of the resolver.
+# share of the numbers it was computed from. Kinematics round by about 2e-16 per joint, so n and j are known to
+# 1e-13 for chains of some hundred joints. A true deviation of 1e-13 rad from orthogonal cannot be distinguished
+# from this rounding, and no geometry is that accurate. Without the rule, the resolver's scaling of rows to unit
+# length would make a contact of a row of such entries.
 ROW_NOISE = 1e-13
 
 
@@ -22,10 +22,10 @@ ROW_NOISE = 1e-13
 def add_body_row(m, w, body, x, n, factor, out):
     """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
 
-    Entry n·j, j the motion of x, is left out where it is only rounding: |n·j| <= ROW_NOISE ‖j‖ for a translation.
-    For a rotation j = a × (x − o), and the lever x − o is known no better than the coordinates it is the difference
-    of, so their size counts too: a contact struck at the joint itself has no lever at all.
-    Dofs that carry both bodies of a self-collision get the same number added and subtracted: exact zero.
+    With j the motion of x per unit rate of a dof, the entry n·j is set to zero where it is only rounding: for a
+    translation if |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o). The lever x − o has the rounding of x and o,
+    so the bound includes their size; the lever of a contact at the joint itself is zero.
+    Dofs that carry both bodies of a self-collision add and subtract the same number, which gives an exact zero.
     """
     if body < 0:
         return
@@ -44,7 +44,7 @@ def add_body_row(m, w, body, x, n, factor, out):
 
 @kernel
 def body_row(m, w, body, point, normal, out):
-    """(13), (14): nᵀJ_b of one body alone; out (d,)."""
+    """out (d,) <- nᵀJ_b of one body alone, (13) and (14)."""
     out[:] = 0.0
     x, n = (point[0], point[1], point[2]), (normal[0], normal[1], normal[2])
     add_body_row(m, w, body, x, n, 1.0, out)
@@ -52,13 +52,13 @@ def body_row(m, w, body, point, normal, out):
 
 @kernel
 def contact_row(m, w, contacts, i, out):
-    """(11), (12): nᵀ(J_a − J_b) of contact i; out (d,)."""
+    """out (d,) <- nᵀ(J_a − J_b) of contact i, (11) and (12)."""
     direction_row(m, w, contacts, i, load(contacts.normal, i), out)
 
 
 @kernel
 def direction_row(m, w, contacts, i, direction, out):
-    """Row of the relative velocity at contact i along a unit direction; out (d,)."""
+    """out (d,) <- row of the relative velocity at contact i along a unit direction."""
     out[:] = 0.0
     x = load(contacts.point, i)
     add_body_row(m, w, contacts.body_a[i], x, direction, 1.0, out)
@@ -67,13 +67,13 @@ def direction_row(m, w, contacts, i, direction, out):
 
 @kernel
 def friction_of(world, contacts, i):
-    """μ of contact i: that of its two shapes."""
+    """Return μ of contact i, given by the friction classes of its two shapes."""
     return world.friction[world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]]
 
 
 @kernel
 def tangent_of(n, which, tangents):
-    """Unit tangent number `which` of a unit normal: the one in the plane z = 0 where there is one only, else of two."""
+    """Return unit tangent number `which` of a unit normal: of one tangent, in the plane z = 0, or of two."""
     if tangents == 1:
         return (-n[1], n[0], 0.0)
     ax, ay, az = abs(n[0]), abs(n[1]), abs(n[2])
@@ -89,7 +89,7 @@ def tangent_of(n, which, tangents):
 
 @kernel
 def twist(m, w, body, v):
-    """Origin p of a body, velocity of p and angular velocity; zeros for the static world.
+    """Return the origin p of a body, the velocity u of p and the angular velocity ω; zeros for the static world.
 
     A point x fixed to the body moves with u + ω × (x − p).
     """
@@ -112,7 +112,7 @@ def twist(m, w, body, v):
 def contact_velocities(m, w, v, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each contact."""
     points, normals, tangentials = contacts.point, contacts.normal, contacts.tangential_velocity
-    a = b = -1  # bodies whose twists are at hand: contacts of one pair follow each other
+    a = b = -1  # bodies whose twists are computed already: contacts of one pair follow each other
     p_a, u_a, omega_a = p_b, u_b, omega_b = twist(m, w, -1, v)
     for i in range(count):
         if contacts.body_a[i] != a:

@@ -1,4 +1,4 @@
-"""Small steps shared by the pair kernels: placements of shapes, feature numbers, storing a contact."""
+"""Helpers of the pair kernels: placements of shapes, feature numbers, storing a contact."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _VERTEX_SHIFT, _KIND_SHIFT = 20, 40
 
 @kernel
 def vertex_feature(kind, vertex, edge):
-    """Feature number. kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners."""
+    """Return the feature number. kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners."""
     return (kind << _KIND_SHIFT) | (vertex << _VERTEX_SHIFT) | edge
 
 
 @kernel
 def placement(body, R, p):
-    """Planar part of a body's placement: R row by row, then p; body < 0 is the world."""
+    """Return the planar part of a body's placement: R row by row, then p; body < 0 is the world."""
     if body < 0:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     return R[body, 0, 0], R[body, 0, 1], R[body, 1, 0], R[body, 1, 1], p[body, 0], p[body, 1]
@@ -26,7 +26,7 @@ def placement(body, R, p):
 
 @kernel
 def to_world(x, y, body, R, p):
-    """World coordinates of a point given in a body's frame; body < 0 is the world."""
+    """Return the world coordinates of a point given in a body's frame; body < 0 is the world."""
     if body < 0:
         return x, y
     return (
@@ -37,7 +37,7 @@ def to_world(x, y, body, R, p):
 
 @kernel
 def turn_to_world(x, y, body, R):
-    """World components of a direction given in a body's frame."""
+    """Return the world components of a direction given in a body's frame."""
     if body < 0:
         return x, y
     return R[body, 0, 0] * x + R[body, 0, 1] * y, R[body, 1, 0] * x + R[body, 1, 1] * y
@@ -45,13 +45,13 @@ def turn_to_world(x, y, body, R):
 
 @kernel
 def world_point(shapes, row, shape, R, p):
-    """World coordinates of row `row` of `shapes.vertices`, which belongs to `shape`."""
+    """Return the world coordinates of row `row` of `shapes.vertices`, which belongs to `shape`."""
     return to_world(shapes.vertices[row, 0], shapes.vertices[row, 1], shapes.body[shape], R, p)
 
 
 @kernel
 def relative_frame(shapes, onto, other, R, p):
-    """Rotation Q (4 numbers) and translation t of `other` seen from `onto`: x_onto = Q x_other + t."""
+    """Return rotation Q (4 numbers) and translation t of `other` relative to `onto`: x_onto = Q x_other + t."""
     ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
     jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
     dx, dy = jx - ix, jy - iy
@@ -71,12 +71,12 @@ def store_in_plane(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
     return store_in_space(buffer, count, shapes, a, b, feature, (x, y, 0.0), (nx, ny, 0.0), gap)
 
 
-# The same in space, where vectors are tuples (see `iapb.mechanics.kernels.vectors`).
+# The same helpers in space, where vectors are tuples (see `iapb.mechanics.kernels.vectors`).
 
 
 @kernel
 def world_center(shapes, shape, R, p):
-    """Centre of a sphere or box, point of a half-space, in the world."""
+    """Return, in the world, the centre of a sphere or box, or the point of a half-space."""
     body, local = shapes.body[shape], load(shapes.center, shape)
     if body < 0:
         return local
@@ -85,7 +85,7 @@ def world_center(shapes, shape, R, p):
 
 @kernel
 def world_axis(shapes, shape, k, R):
-    """Axis k of a shape in the world; axis 2 of a half-space is its outward normal."""
+    """Return axis k of a shape in the world; axis 2 of a half-space is its outward normal."""
     body, local = shapes.body[shape], column(shapes.axes, shape, k)
     return local if body < 0 else transform(R, body, local)
 
@@ -108,7 +108,7 @@ def store_in_space(buffer, count, shapes, a, b, feature, point, normal, gap):
 
 @kernel
 def copy_contact(buffer, target, source):
-    """Row `target` <- row `source`, geometry only."""
+    """Copy the geometry of row `source` to row `target`."""
     buffer.shape_a[target], buffer.shape_b[target] = buffer.shape_a[source], buffer.shape_b[source]
     buffer.body_a[target], buffer.body_b[target] = buffer.body_a[source], buffer.body_b[source]
     buffer.feature[target], buffer.gap[target] = buffer.feature[source], buffer.gap[source]

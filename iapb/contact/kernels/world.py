@@ -1,4 +1,4 @@
-"""What one step reads (World, constant) and what it writes (State): plain arrays and numbers for the kernels."""
+"""Input of a step (World, constant) and its output (State): plain arrays and numbers for the kernels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 
 
 class Switches(NamedTuple):
-    """Effects that are on. One that is off costs one branch: its code is not entered."""
+    """Effects that are on. An effect that is off costs one branch; its code does not run."""
 
     gravity: bool
     varying_inertia: bool
@@ -39,7 +39,7 @@ class Stops(NamedTuple):
 
     body: np.ndarray  # (k,) int64
     parent: np.ndarray  # (k,) int64, −1 = the world
-    shape: np.ndarray  # (k,) int64: stands for both shapes of the contact
+    shape: np.ndarray  # (k,) int64: number used for both shapes of the contact
     coordinate: np.ndarray  # (k,) int64 in q
     dof: np.ndarray  # (k,) int64
     sign: np.ndarray  # (k,) 1 least, −1 largest position
@@ -48,12 +48,12 @@ class Stops(NamedTuple):
 
 
 class World(NamedTuple):
-    """A scene under one contact law, as the step reads it (n bodies, d velocities, t trees)."""
+    """A scene under one contact law, as input of the step (n bodies, d velocities, t trees)."""
 
     mechanism: MechanismArrays
     shapes: Shapes
     pairs: np.ndarray  # (k, 2) candidate pairs of shapes
-    broad_phase: BroadPhase  # finds the near ones among them; a stub where that does not pay
+    broad_phase: BroadPhase  # finds the near pairs among them; a stub if testing all pairs is as fast
     tree_of_body: np.ndarray  # (n,) int64
     tree_start: np.ndarray  # (t,) first dof of each tree
     tree_stop: np.ndarray  # (t,)
@@ -67,7 +67,7 @@ class World(NamedTuple):
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
     coulomb: bool  # resting friction by Coulomb's law, implicit in the step; False: the paper's explicit (6)
     friction_velocity: float  # v_threshold [m/s] (6)
-    restitution: float  # e of all contacts, or of those whose shapes give none
+    restitution: float  # e of all contacts whose shapes give no e of their own
     own_restitution: np.ndarray  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
@@ -76,8 +76,8 @@ class World(NamedTuple):
     joint_damping: np.ndarray  # (d,) viscous [N s/m, N m s/rad]
     stops: Stops
     impulse_limit: np.ndarray  # (d,) largest |Jᵀp/Δt| the device can render [N, N m], inf = none
-    stage_fraction: np.ndarray  # (s,) where in the step each force evaluation of the integrator stands, first 0
-    stage_weight: np.ndarray  # (s,) its share of the step, sum 1
+    stage_fraction: np.ndarray  # (s,) time of each force evaluation as a fraction of the step, first 0
+    stage_weight: np.ndarray  # (s,) weight of each force evaluation, sum 1
     semi_implicit: bool  # the new velocity moves the configuration (one stage only)
 
 
@@ -95,9 +95,9 @@ class State(NamedTuple):
     contact_count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
     group_of_tree: np.ndarray  # (t,) int64: first tree of its contact group
     state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
-    island_of_tree: np.ndarray  # (t,) int64: first tree of those resolved with it in one impact
+    island_of_tree: np.ndarray  # (t,) int64: first tree of its island, resolved in one impact
     collides_of_tree: np.ndarray  # (t,) bool: the first tree of an island that collides
-    row_budget: np.ndarray  # (1,) int64: at most so many rows of an impact are used, the most violated first
+    row_budget: np.ndarray  # (1,) int64: largest number of rows used in an impact, most violated first
     spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
     penalty_force: np.ndarray  # (d,) [N, N m]
     friction_force: np.ndarray  # (d,)
@@ -111,8 +111,8 @@ class State(NamedTuple):
     mean_v: np.ndarray  # (d,)
     mean_acceleration: np.ndarray  # (d,)
     contact_impulse: np.ndarray  # (c,) [N s] per contact, minimum norm
-    rows: np.ndarray  # (c,) int64: contact of each row of the impact in hand
-    dofs: np.ndarray  # (d,) int64: coordinates of the group in hand
+    rows: np.ndarray  # (c,) int64: contact of each row of the present impact
+    dofs: np.ndarray  # (d,) int64: coordinates of the present group
     group_mass: np.ndarray  # (d, d)
     group_lower: np.ndarray  # (d, d)
     group_v: np.ndarray  # (d,)

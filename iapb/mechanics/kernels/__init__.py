@@ -1,6 +1,6 @@
-"""Compiled kernels of the mechanics room: arrays in, `out` written, nothing allocated.
+"""Compiled kernels of the mechanics: they read arrays, write `out` and allocate nothing.
 
-Everything is expressed in world axes. Each degree of freedom k has one unit axis: it translates its body
-along it or turns it about the line through the body's origin; hence one formula serves every joint kind.
-Order of calls: `forward_kinematics` fills the workspace, everything else reads it.
+All vectors are in world axes. Each degree of freedom k has one unit axis. It moves its body along this axis, or
+turns the body about this axis through the body's origin, so one formula serves every joint kind.
+Call `forward_kinematics` first: it fills the workspace that all other kernels read.
 """

@@ -1,4 +1,4 @@
-"""What the kernels read (MechanismArrays, constant) and where they write (Workspace, one per thread)."""
+"""Input of the kernels (MechanismArrays, constant) and their scratch (Workspace, one per thread)."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class MechanismArrays(NamedTuple):
     mass: NDArray[np.float64]  # (n,) [kg]
     center_of_mass: NDArray[np.float64]  # (n, 3) [m] body frame
     inertia: NDArray[np.float64]  # (n, 3, 3) [kg m^2] about the centre of mass, body axes
-    last_dof: NDArray[np.int64]  # (n,) last dof on the way from the world to the body, -1 = none
+    last_dof: NDArray[np.int64]  # (n,) last dof on the path from the world to the body, -1 = none
     dof_body: NDArray[np.int64]  # (d,) body that the dof moves
-    dof_parent: NDArray[np.int64]  # (d,) dof before it on the way from the world, -1 = none
+    dof_parent: NDArray[np.int64]  # (d,) dof before it on the path from the world, -1 = none
     dof_rotates: NDArray[np.bool_]  # (d,) turns about its axis; otherwise moves along it
 
 
@@ -35,7 +35,7 @@ class Workspace(NamedTuple):
     position: NDArray[np.float64]  # (n, 3) [m] body origin
     center: NDArray[np.float64]  # (n, 3) [m] centre of mass
     axis: NDArray[np.float64]  # (d, 3) unit, axis of each dof
-    composite_mass: NDArray[np.float64]  # (n,) the body and all it carries
+    composite_mass: NDArray[np.float64]  # (n,) mass of the body and all bodies that it carries
     composite_center: NDArray[np.float64]  # (n, 3)
     composite_inertia: NDArray[np.float64]  # (n, 3, 3) about the composite centre
     angular_velocity: NDArray[np.float64]  # (n, 3)
@@ -44,18 +44,18 @@ class Workspace(NamedTuple):
     linear_acceleration: NDArray[np.float64]  # (n, 3) of the body origin, minus gravity
     force: NDArray[np.float64]  # (n, 3) that the joint transmits to the body
     moment: NDArray[np.float64]  # (n, 3) about the body origin
-    placed_q: NDArray[np.float64]  # (2 d,) first nq: where the first four are; NaN: nowhere yet
+    placed_q: NDArray[np.float64]  # (2 d,) first nq: the q of the first four fields; NaN: not computed yet
 
 
 class Evaluation(NamedTuple):
-    """A mechanism and the scratch to evaluate it with: one argument, as each costs Python a tenth of a µs."""
+    """A mechanism with its scratch, passed as one argument: each argument costs a call from Python 0.1 µs."""
 
     mechanism: MechanismArrays
     workspace: Workspace
 
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:
-    """Return scratch for a mechanism with that many bodies and dofs (no joint has more than two entries in q a dof)."""
+    """Return scratch for a mechanism for that many bodies and dofs (joints have at most two entries of q per dof)."""
     rows, frames = (bodies, 3), (bodies, 3, 3)
     shapes = (frames, rows, rows, (dofs, 3), (bodies,), rows, frames, *([rows] * 6))
     nowhere = np.full(2 * dofs, np.nan)

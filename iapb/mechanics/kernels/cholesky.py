@@ -30,7 +30,7 @@ def cholesky(mass_matrix, lower):
 
 @kernel
 def to_whitened(lower, v, u):
-    """Whitened velocity u = Lᵀ v, so that KE = ½|u|²."""
+    """Write the whitened velocity u = Lᵀ v, so that KE = ½|u|²."""
     d = v.shape[0]
     for k in range(d):
         total = 0.0
@@ -52,7 +52,7 @@ def from_whitened(lower, u, v):
 
 @kernel
 def to_momentum(lower, u, momentum):
-    """Generalized momentum L u."""
+    """Write the generalized momentum L u."""
     d = u.shape[0]
     for k in range(d):
         total = 0.0
@@ -65,8 +65,8 @@ def to_momentum(lower, u, momentum):
 def whiten_columns(lower, columns, count):
     """Solve L X = columns in place for the first `count` columns: rows of J become columns of Aᵀ = L⁻¹ Jᵀ.
 
-    One contact is one column, so the inner loops run over contacts: contiguous, and vectorized
-    without reordering any sum.
+    One contact is one column, so the inner loops run over contacts: they are contiguous and vectorize without
+    reordering any sum.
     """
     d = lower.shape[0]
     for k in range(d):
@@ -82,7 +82,7 @@ def whiten_columns(lower, columns, count):
 
 @kernel
 def solve_mass(lower, force, acceleration):
-    """Solve M a = f through both triangles; `force` may be the same array as `acceleration`."""
+    """Solve M a = f by forward and back substitution; `force` may be the same array as `acceleration`."""
     _solve_block(lower, 0, force.shape[0], force, acceleration)
 
 
@@ -90,8 +90,9 @@ def solve_mass(lower, force, acceleration):
 def _solve_block(lower, start, stop, force, acceleration):
     """`solve_mass` on coordinates start .. stop.
 
-    Zeros of L are passed over: a multiplication by zero would make each coordinate wait for the one before. So would
-    a division: 1 / L_kk waits for nothing. Backwards the entry that was computed last comes last in its sum.
+    All three measures shorten the chain of dependent operations. Zeros of L are skipped, since a product with zero
+    would still wait for the coordinate before. Factors 1 / L_kk replace divisions, since they do not depend on the sum.
+    In the back substitution the entry that was computed last comes last in the sum.
     """
     for k in range(start, stop):
         total = force[k]
@@ -111,14 +112,14 @@ def _solve_block(lower, start, stop, force, acceleration):
 
 @kernel
 def solve_tree_blocks(lower, start, stop, force, acceleration):
-    """The same for a block diagonal M, tree by tree: linear in their number, to the same last bit."""
+    """`solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the same bits."""
     for t in range(start.shape[0]):
         _solve_block(lower, start[t], stop[t], force, acceleration)
 
 
 @kernel
 def cholesky_tree_blocks(matrix, start, stop, lower):
-    """`cholesky` of each block of a block diagonal M; entries outside the blocks of `lower` are left alone."""
+    """`cholesky` of each block of a block diagonal M; other entries of `lower` stay; return 0, or 1 on failure."""
     for t in range(start.shape[0]):
         i, j = start[t], stop[t]
         if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:

@@ -1,8 +1,8 @@
-"""Moving on the configuration manifold: q (+) v dt and its inverse, joint by joint.
+"""Steps on the configuration manifold: q (+) v dt and its inverse, joint by joint.
 
-Vector joints add; (cos, sin) pairs and quaternions turn by the group exponential and are put back on the
-unit circle or sphere; velocities in body axes (free flyer, planar_se2) follow the screw of SE(3) or SE(2),
-as Pinocchio does.
+Coordinates of vector joints are added. (cos, sin) pairs and quaternions turn by the group exponential and are
+normalized to length one. Velocities in body axes (free flyer, planar_se2) follow the screw motion of SE(3) or SE(2),
+as in Pinocchio.
 """
 
 from math import sqrt
@@ -77,7 +77,7 @@ def integrate_free_flyer(q, i, v, k, dt, out):
 
 @kernel
 def integrate_planar_se2(q, i, v, k, dt, out):
-    """The same in the plane: q = (x, y, cos, sin), v = (u_x, u_y, omega) in body axes."""
+    """`integrate_free_flyer` in the plane: q = (x, y, cos, sin), v = (u_x, u_y, omega) in body axes."""
     u, phi = (v[k] * dt, v[k + 1] * dt, 0.0), (0.0, 0.0, v[k + 2] * dt)
     first, second = screw_coefficients(abs(phi[2]))
     turned = cross(phi, u)
@@ -110,7 +110,7 @@ def integrate(m, q, v, dt, out):
 
 @kernel
 def quaternion_difference(q0, q1, i):
-    """Rotation vector phi in the body axes of q0 with q1 = q0 * exp(phi / 2), |phi| <= pi."""
+    """Return the rotation vector phi, in the body axes of q0, with q1 = q0 * exp(phi / 2) and |phi| <= pi."""
     a, s = (-q0[i], -q0[i + 1], -q0[i + 2]), q0[i + 3]
     b, t = (q1[i], q1[i + 1], q1[i + 2]), q1[i + 3]
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
@@ -124,7 +124,7 @@ def quaternion_difference(q0, q1, i):
 
 @kernel
 def inverse_screw(path, phi):
-    """u with (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path)."""
+    """Return u with (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path)."""
     angle = sqrt(dot(phi, phi))
     square = angle * angle
     if angle < SMALL_ANGLE:
@@ -138,7 +138,7 @@ def inverse_screw(path, phi):
 
 @kernel
 def difference(m, q0, q1, out):
-    """out (d,) <- the v with integrate(q0, v, 1) = q1, taking the shortest turns."""
+    """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
     for b in range(m.kind.shape[0]):
         kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
         if kind == FIXED:

@@ -24,7 +24,7 @@ from iapb.mechanics.kernels.vectors import (
 
 @kernel
 def turned_inertia(m, w, b, omega):
-    """R I R^T omega of body b alone."""
+    """Return R I R^T omega of body b alone."""
     return transform(w.rotation, b, transform(m.inertia, b, transform_back(w.rotation, b, omega)))
 
 
@@ -63,7 +63,7 @@ def merge_composite(w, into, b):
 
 @kernel
 def composite_bodies(m, w):
-    """For each body: mass, centre and inertia of itself and all it carries."""
+    """Write, for each body, mass, centre and inertia of the body and all bodies that it carries."""
     for b in range(m.kind.shape[0]):
         start_composite(m, w, b)
     for b in range(m.kind.shape[0] - 1, -1, -1):
@@ -73,10 +73,10 @@ def composite_bodies(m, w):
 
 @kernel
 def mass_matrix(m, w, out):
-    """out (d, d) <- M(q), symmetric; entries between dofs that do not share a chain are zero.
+    """out (d, d) <- M(q), symmetric; entries of two dofs on different branches are zero.
 
     Column j: a unit velocity of dof j gives its composite the linear momentum l and the angular momentum h
-    about the composite centre c; dof i before it sees a_i . l or a_i . (h + (c - o_i) x l).
+    about the composite centre c; its entry with dof i before it is a_i . l or a_i . (h + (c - o_i) x l).
     """
     composite_bodies(m, w)
     out[:] = 0.0
@@ -126,7 +126,7 @@ def project_forces(m, w, out):
 
 @kernel
 def relative_motion(m, w, b, rates):
-    """Linear and angular part of the joint's motion for these rates of its dofs, world axes."""
+    """Return linear and angular part of the joint's motion, in world axes, for the given rates of its dofs."""
     linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
         if m.dof_rotates[k]:
@@ -138,7 +138,7 @@ def relative_motion(m, w, b, rates):
 
 @kernel
 def body_velocities(m, w, v):
-    """Angular velocity of each body and velocity of its origin."""
+    """Write the angular velocity of each body and the velocity of its origin."""
     zero = (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
         parent = m.parent[b]
@@ -152,7 +152,7 @@ def body_velocities(m, w, v):
 
 @kernel
 def body_accelerations(m, w, v, dv, g):
-    """Acceleration of each body for dv/dt = dv, the world accelerating by -g (so that weight is included).
+    """Write the accelerations of each body for dv/dt = dv; the world accelerates by -g, which includes the weight.
 
     With r = p_b - p_parent and joint motion (u, s) for v, (u', s') for dv:
     alpha = alpha_p + omega_p x s + s',
@@ -177,7 +177,7 @@ def body_accelerations(m, w, v, dv, g):
 
 @kernel
 def newton_euler(m, w, b, omega, alpha, a):
-    """Force and moment about its origin that give body b its motion; a is the acceleration of its origin.
+    """Write force and moment, about the origin of b, that give body b its motion; a: acceleration of this origin.
 
     With r = c - p: f = m (a + alpha x r + omega x (omega x r)) and, the inertia I being given in body axes,
     n = R (I R^T alpha + R^T omega x I R^T omega) + r x f.

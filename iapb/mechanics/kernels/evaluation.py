@@ -1,6 +1,6 @@
-"""One state, or many in one call, from q to the quantity: what Python calls most, without a stop in between.
+"""Kernels that compute a quantity from q, for one state or for many, in one call from Python.
 
-The configurations come from outside, so these kernels check them; all others trust what they are given.
+Their configurations come from the user, so these kernels check them; all other kernels do not check their input.
 """
 
 from math import isfinite, sqrt
@@ -14,13 +14,13 @@ from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, 
 from iapb.mechanics.kernels.kinematics import forward_kinematics, motion_at
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
-# Length of a quaternion or (cos, sin) pair given at the public border: single precision input passes.
+# Tolerance on the length of a given quaternion or (cos, sin) pair: single precision input passes.
 UNIT_TOLERANCE = 1e-6
 
 
 @kernel
 def all_finite(values):
-    """No NaN and no infinity in a vector."""
+    """Return whether a vector has no NaN and no infinity."""
     for k in range(values.shape[0]):  # noqa: SIM110 - a kernel has no generators
         if not isfinite(values[k]):
             return False
@@ -29,7 +29,7 @@ def all_finite(values):
 
 @kernel
 def is_unit(q, first, count):
-    """Entries first .. first + count of q have total length one."""
+    """Return whether the `count` entries of q from `first` on have total length one."""
     square = 0.0
     for i in range(first, first + count):
         square += q[i] * q[i]
@@ -38,7 +38,7 @@ def is_unit(q, first, count):
 
 @kernel
 def misplaced_body(m, q):
-    """Return the first body whose quaternion or (cos, sin) pair is not of length one, -1 if there is none."""
+    """Return the first body whose quaternion or (cos, sin) pair has not length one, -1 if there is none."""
     for b in range(m.kind.shape[0]):
         kind, i = m.kind[b], m.q_start[b]
         if kind == CONTINUOUS and not is_unit(q, i, 2):
@@ -54,13 +54,13 @@ def misplaced_body(m, q):
 
 @kernel
 def is_configuration(m, q):
-    """Finite, and where it must be, of length one."""
+    """Return whether q is finite and its quaternions and (cos, sin) pairs have length one."""
     return all_finite(q) and misplaced_body(m, q) < 0
 
 
 @kernel
 def mass_matrix_at(at, q, out):
-    """out (d, d) <- M(q); False if q is no configuration."""
+    """out (d, d) <- M(q); return False if q is not a valid configuration."""
     if not is_configuration(at.mechanism, q):
         return False
     forward_kinematics(at.mechanism, q, at.workspace)
@@ -70,7 +70,7 @@ def mass_matrix_at(at, q, out):
 
 @kernel
 def bias_at(at, q, v, out):
-    """out (d,) <- B(q, v); False if q is no configuration or v not finite."""
+    """out (d,) <- B(q, v); return False if q is not a valid configuration or v not finite."""
     if not (is_configuration(at.mechanism, q) and all_finite(v)):
         return False
     forward_kinematics(at.mechanism, q, at.workspace)
@@ -80,7 +80,7 @@ def bias_at(at, q, v, out):
 
 @kernel
 def mass_matrices_at(at, q, out):
-    """out (n, d, d) <- M at each row of q (n, nq); return the rows done: fewer than n if one is refused."""
+    """out (n, d, d) <- M at each row of q (n, nq); return the number of rows done: fewer than n if one is invalid."""
     for k in range(q.shape[0]):
         if not mass_matrix_at(at, q[k], out[k]):
             return k
@@ -89,7 +89,7 @@ def mass_matrices_at(at, q, out):
 
 @kernel
 def biases_at(at, q, v, out):
-    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return the rows done."""
+    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return the number of rows done."""
     for k in range(q.shape[0]):
         if not bias_at(at, q[k], v[k], out[k]):
             return k
@@ -98,9 +98,9 @@ def biases_at(at, q, v, out):
 
 @kernel
 def rows_along(m, w, q, body, point, direction, out):
-    """out (n, d) <- velocity of n world points, fixed to a body each, along directions; return the rows done.
+    """out (n, d) <- Jacobian rows of n world points, each fixed to a body, along directions; return the rows done.
 
-    A body -1 does not move. q (n, nq) holds the configuration of each.
+    Row i belongs to the configuration q[i], q (n, nq). Body -1 is the world, which does not move.
     """
     for i in range(q.shape[0]):
         if not is_configuration(m, q[i]):
@@ -120,7 +120,7 @@ def rows_along(m, w, q, body, point, direction, out):
 
 @kernel
 def center_velocity(w, b):
-    """Velocity of body b's centre of mass: v_o + omega x (c - o)."""
+    """Return the velocity of body b's centre of mass: v_o + omega x (c - o)."""
     lever = subtract(load(w.center, b), load(w.position, b))
     return add(load(w.linear_velocity, b), cross(load(w.angular_velocity, b), lever))
 
@@ -138,7 +138,7 @@ def kinetic_energy(m, w, v):
 
 @kernel
 def potential_energy(m, w, g):
-    """Return -sum of m g . c [J] over the bodies that can move; zero with every centre at the world origin."""
+    """Return -sum of m g . c [J] over the bodies that can move; zero if every centre of mass is at the world origin."""
     total = 0.0
     for b in range(m.kind.shape[0]):
         if m.last_dof[b] >= 0:
@@ -196,7 +196,7 @@ def poses_along(m, w, q, out):
 
 @kernel
 def quaternion_of(r):
-    """Quaternion x, y, z, w >= 0 of a rotation (3, 3), from its largest component: no cancellation."""
+    """Quaternion x, y, z, w >= 0 of a rotation (3, 3), computed from its largest component to avoid cancellation."""
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     if trace > max(r[0, 0], r[1, 1], r[2, 2]):
         s = 2.0 * sqrt(1.0 + trace)

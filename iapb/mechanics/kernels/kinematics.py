@@ -1,4 +1,4 @@
-"""Where every body is, and the world axis of every degree of freedom."""
+"""Forward kinematics: the pose of every body, and the world axis of every degree of freedom."""
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
@@ -75,7 +75,7 @@ def body_axes_to_dofs(w, b, first):
 
 @kernel
 def move_joint(m, q, w, b):
-    """Carry body b from its joint frame to its place; write the axes of the joint's dofs."""
+    """Move body b from its joint frame to its pose; write the axes of the joint's dofs."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
@@ -112,7 +112,7 @@ def move_joint(m, q, w, b):
 
 @kernel
 def is_placed(q, w):
-    """Are the bodies at q already, to the last bit? (Those without coordinates are placed each time.)"""
+    """Return whether the workspace holds exactly this q already; always False if there are no coordinates."""
     for k in range(q.shape[0]):
         if q[k] != w.placed_q[k]:
             return False
@@ -121,7 +121,7 @@ def is_placed(q, w):
 
 @kernel
 def forward_kinematics(m, q, w):
-    """Fill rotation, position, center and axis of the workspace w for the configuration q, if they are not yet at q.
+    """Fill rotation, position, center and axis of the workspace w for the configuration q, unless w holds q already.
 
     Quaternions and (cos, sin) pairs must have length one; kernels do not check.
     """
@@ -144,14 +144,14 @@ def forward_kinematics(m, q, w):
 
 @kernel
 def motion_at(m, w, k, x):
-    """Velocity of the point x per unit velocity of dof k."""
+    """Return the velocity of the point x per unit velocity of dof k."""
     a = load(w.axis, k)
     return cross(a, subtract(x, load(w.position, m.dof_body[k]))) if m.dof_rotates[k] else a
 
 
 @kernel
 def point_jacobian(m, w, body, point, out):
-    """out (3, d) <- Jacobian of the velocity of the world point, taken as fixed to the body."""
+    """out (3, d) <- Jacobian of the velocity of the world point, regarded as fixed to the body."""
     out[:] = 0.0
     x = (point[0], point[1], point[2])
     k = m.last_dof[body]
@@ -190,7 +190,7 @@ def add_point_force(m, w, body, point, force, out):
 
 @kernel
 def point_velocity(m, w, body, point, v, out):
-    """out (3,) <- velocity J v of the world point as fixed to the body; zero for body -1."""
+    """out (3,) <- velocity J v of the world point, regarded as fixed to the body; zero for body -1."""
     total = (0.0, 0.0, 0.0)
     if body >= 0:
         x = (point[0], point[1], point[2])

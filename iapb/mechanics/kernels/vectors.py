@@ -13,7 +13,7 @@ def load(rows, i):
 
 @kernel
 def store(rows, i, a):
-    """Write a into row i of an (n, 3) array, whose place is worked out once."""
+    """Write a into row i of an (n, 3) array; the address of the row is computed once."""
     row = rows[i]
     row[0] = a[0]
     row[1] = a[1]
@@ -58,7 +58,7 @@ def cross(a, b):
 
 @kernel
 def transform(frames, i, a):
-    """frames[i] a: from the axes of frame i to those it is given in."""
+    """frames[i] a: transform a from the axes of frame i to the axes in which the frame is given."""
     return (
         frames[i, 0, 0] * a[0] + frames[i, 0, 1] * a[1] + frames[i, 0, 2] * a[2],
         frames[i, 1, 0] * a[0] + frames[i, 1, 1] * a[1] + frames[i, 1, 2] * a[2],
