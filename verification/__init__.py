@@ -1,6 +1,6 @@
-"""Evidence: proofs, properties, hard cases, accuracy against time, claims. Returns records, writes no files.
+"""Evidence: proofs, physical laws, hard cases, accuracy against time, claims. Studies return records and write no files.
 
-The names below are loaded when they are first used, so ``import verification`` is fast.
+Each name below is loaded at its first use, so ``import verification`` is fast.
 """
 
 from __future__ import annotations

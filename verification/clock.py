@@ -1,9 +1,9 @@
-"""The one way to time: a warm sample first, contestants in random order, the processor time of this thread.
+"""Timing for all studies: a warm-up call before each sample, contestants in random order, CPU time of this thread.
 
-Other processes are not in a thread's time. They do empty caches, and so does the contestant that ran before: so every
-round calls all contestants in a new random order, and linear algebra runs on one thread. Ratios are made within one
-run. Compiled code is timed within compiled code: a call that has a method `repeated(times)` repeats itself there, and
-no call from Python is counted.
+The CPU time of a thread excludes other processes. However, other processes and the previous contestant replace the
+contents of the caches. Every round therefore calls all contestants in a new random order, and linear algebra runs on
+one thread. Ratios compare samples of the same run. Compiled code is timed within compiled code: if a call has a method
+`repeated(times)`, that method runs the loop, so the overhead of calls from Python is excluded.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ Key = TypeVar("Key")
 Result = TypeVar("Result")
 Call = Callable[[], object]
 
-LEAST_ROUNDS = 3  # even of what takes long
+LEAST_ROUNDS = 3  # for slow contestants, too
 _SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
-_WARMED = 2e-2  # seconds: what takes longer feels cold caches too little for a call more
+_WARMED = 2e-2  # seconds: cold caches hardly affect longer samples, so those get no warm-up call
 
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds per call of one contestant, a sample per round; statistics of no samples are NaN."""
+    """Seconds per call of one contestant, one sample per round. Without samples every statistic is NaN."""
 
     samples: tuple[float, ...] = ()
 
@@ -64,11 +64,11 @@ class Times:
         return self.quantile(1.0)
 
     def quantile(self, share: float) -> float:
-        """Return the sample below which this share of the samples lies, interpolated."""
+        """Return the quantile of the samples at `share` in [0, 1], interpolated."""
         return float(np.quantile(self.samples, share)) if self.samples else np.nan
 
     def over(self, other: Times) -> Times:
-        """Return the ratio to another contestant, round by round."""
+        """Return the ratio of these samples to those of another contestant, round by round."""
         return Times(tuple(ours / theirs for ours, theirs in zip(self.samples, other.samples, strict=True)))
 
 
@@ -85,14 +85,14 @@ def time_cells(times: Times) -> dict[str, float]:
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
-    """Return what `work` returns, and the processor time of this thread that it took [s]."""
+    """Return the result of `work` and the CPU time of this thread that it took [s]."""
     started = time.thread_time()
     result = work()
     return result, time.thread_time() - started
 
 
 def seconds(call: Call, times: int = 1) -> float:
-    """Return the seconds per call, over `times` calls."""
+    """Return the mean CPU time per call [s] over `times` calls."""
     repeated = getattr(call, "repeated", None)
     started = time.thread_time()
     if repeated is not None:
@@ -104,10 +104,11 @@ def seconds(call: Call, times: int = 1) -> float:
 
 
 def sampler(call: Call) -> Callable[[], float]:
-    """Return a contestant for `take_turns`: `call`, as often in one sample as the clock needs, and before it as often.
+    """Return a contestant for `take_turns`. One sample repeats `call` until the clock resolves it.
 
-    One warm call is not enough: after another contestant has run, the caches fill over many. Nor does the very first
-    call say how many a sample needs: it loads machine code.
+    The same number of warm-up calls precedes each sample of less than 0.02 s: after another contestant has run, the
+    caches need many calls to fill. The first call of all does not count when the number of calls is chosen, because it
+    loads machine code.
     """
     call()
     times = 1
@@ -131,12 +132,12 @@ def take_turns(
 
     Parameters
     ----------
-    contestants : functions that return the seconds of one sample, such as `sampler(call)` or one that sets up
-        something before it starts the clock
-    warm : whether a round that does not count goes first; False where all have just run
-    enough : a contestant that has run so many seconds and LEAST_ROUNDS rounds takes no further turns
-    failures : receives the contestants that raise, as `attempt` does; they are left out of what is returned
-    name : of a contestant in a failure
+    contestants : functions that return the seconds of one sample, such as `sampler(call)` or a function that does its
+        setup before it starts the clock
+    warm : whether one uncounted round goes first; False if all contestants have just run
+    enough : a contestant stops after LEAST_ROUNDS rounds once its samples add up to more than this [s]
+    failures : receives a Failure for each contestant that raises; the result leaves these contestants out
+    name : returns the name of a contestant for its Failure
     progress : called with (rounds done, rounds)
     """
     found: dict[Key, list[float]] = {key: [] for key in contestants}

@@ -1,8 +1,8 @@
-"""Finding: what a study found, the one record that every study returns and that reports store and print.
+"""Finding: the record that every study returns and that reports store and print.
 
-A Finding answers a question by a sentence with its number, a verdict, the parts that were judged, and the tables
-behind them. A case that raises costs its own row: `attempt` records it as a Failure and the study goes on.
-Nothing here knows a page or a file.
+A Finding answers a question by a sentence with a number, a verdict, the parts that were judged, and the tables with
+the data. If a case raises an exception, `attempt` records a Failure, the table lacks that row, and the study goes on.
+This module is independent of pages and files.
 """
 
 from __future__ import annotations
@@ -24,27 +24,28 @@ Case = TypeVar("Case")
 Result = TypeVar("Result")
 Row = Mapping[str, Any]
 
-# WHERE: every trial inside a region that `Part.region` names holds. MIXED: some hold, and no region is confirmed.
+# WHERE: the claim holds in every trial inside `Part.region`. MIXED: it holds in some trials; no region is confirmed.
 REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
     "reproduced", "reproduced where", "mixed", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
-# What fails in more trials than it holds in is refuted, not "true with exceptions".
+# A claim that fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
-# Trials that confirm a region, at least, and that reproduce a part: were a quarter of the region wrong, ten in a row
-# would hold in one case of twenty (0.74¹⁰ = 0.05); as tosses of a coin, in one of 1024. A failure needs no ten.
+# Least number of trials that confirm a region or reproduce a part. If the claim were wrong in a quarter of the region,
+# ten trials in a row would hold with probability 0.05 (0.74¹⁰); if it were wrong in half, with probability 1/1024. A
+# single failure counts.
 LEAST_CONFIRMING = LEAST_DECIDED = 10
 SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
-_MOST_ENDS = 8  # more than two intervals have
+_MOST_ENDS = 8  # above the number of ends of two intervals
 _DECADES = 1e3  # a condition that spans more is measured by decades
-_LISTED = 8  # more values than this are given by their ends
-# What is unknown of one part keeps the whole from being reproduced.
+_LISTED = 8  # if there are more values, only the smallest and largest are printed
+# A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
 HOLDS = "holds"  # heading of the outcomes, where a table is printed
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
 FAILED_CASES = "not computed"  # name of the table of cases that failed
-# Quantities that sentences of several pages quote: in a report each has one value and one verdict. To add one: a name
-# here; the Part or Finding whose sentence says it names it with its value, as printed.
+# Quantities that several pages quote: in a report each has one value and one verdict. To add one, add its name here;
+# the Part or Finding whose sentence quotes it lists the name with the value as printed.
 QUANTITIES = ("impacts certified", "adverse impacts certified", "time of a peg step", "exponent of bodies",
               "hard cases of the engine", "speed targets")  # fmt: skip
 Quantities = tuple[tuple[str, str], ...]  # names and values
@@ -55,11 +56,12 @@ _UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
 class Column:
     """One quantity of every row.
 
-    key : by which code finds it; heading : in words, by default the key; unit : empty where there is none
-    condition : chosen, not measured; part : rows with the same value are judged apart
-    cases : how many cases a row stands for, such as the impacts of a batch, of which the worst is judged
-    timed : a measured time, or made from some: it need not repeat
-    prose : sentences, whose numbers stand in other tables and are compared there
+    key : name of the column in code; heading : printed name, by default the key; unit : empty if there is none
+    condition : True if the study chooses the value, False if it measures it
+    part : True if the rows with the same value form one part, which is judged separately
+    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst one is judged
+    timed : True for a measured time or a value computed from one; it may differ in the next run
+    prose : True for sentences; the numbers in them are compared through other tables
     """
 
     key: str
@@ -73,18 +75,18 @@ class Column:
 
     @property
     def title(self) -> str:
-        """Heading with its unit."""
+        """The heading with the unit."""
         words = self.heading or self.key
         return f"{words} [{self.unit}]" if self.unit else words
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of numbers, texts or None ("does not apply"), with what each column is.
+    """Rows of numbers, texts or None ("does not apply"), and the description of each column.
 
-    holds : per row, whether what is claimed held; None where the row cannot tell; empty where nothing is judged
-    digits : significant digits in print; note : printed below
-    timed_rows : which rows there are depends on measured times
+    holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if nothing is judged
+    digits : significant digits in print; note : text printed below the table
+    timed_rows : True if the selection of rows depends on measured times
     """
 
     columns: tuple[Column, ...]
@@ -118,7 +120,7 @@ class Table:
         return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
 
     def judged(self, holds: Callable[[dict[str, Any]], bool | None]) -> Table:
-        """Return the table with the outcome of every row."""
+        """Return the table with the outcome `holds(row)` of every row."""
         return replace(self, holds=tuple(holds(row) for row in self.records()))
 
     def without(self, *keys: str) -> Table:
@@ -127,7 +129,7 @@ class Table:
 
     @property
     def passed(self) -> bool | None:
-        """Whether every row that can tell holds; None where none can."""
+        """Whether the claim holds in every row with an outcome; None if no row has one."""
         decided = [outcome for outcome in self.holds if outcome is not None]
         return all(decided) if decided else None
 
@@ -138,19 +140,19 @@ class Table:
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """Headings in print, the outcomes' last."""
+        """Printed headings; the heading of the outcomes comes last."""
         return (*(column.title for column in self.columns), *([HOLDS] if self.holds else ()))
 
     @property
     def cells(self) -> tuple[tuple[Any, ...], ...]:
-        """Rows in print: each with its outcome in words, where there are outcomes."""
+        """Printed rows; if the table has outcomes, each row ends with its outcome in words."""
         if not self.holds:
             return self.rows
         return tuple((*row, WORDS[held]) for row, held in zip(self.rows, self.holds, strict=True))
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """Titles of what need not repeat; an outcome rests on all that is measured."""
+        """Titles of the timed columns; the outcomes are included, since they may depend on any measured value."""
         found = tuple(column.title for column in self.columns if column.timed)
         return (*found, HOLDS) if found and self.holds else found
 
@@ -160,14 +162,14 @@ class Table:
         return tuple(column.title for column in self.columns if column.prose)
 
     def only(self, kept: Iterable[bool]) -> Table:
-        """Return the rows that are kept, with their outcomes."""
+        """Return the rows whose entry in `kept` is true, with their outcomes."""
         kept = list(kept)
         rows = tuple(row for row, keep in zip(self.rows, kept, strict=True) if keep)
         return replace(self, rows=rows, holds=tuple(h for h, keep in zip(self.holds, kept, strict=False) if keep))
 
 
 def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) -> Table:
-    """Return a table of these columns from dictionaries; what a dictionary lacks is None."""
+    """Return a table of these columns from dictionaries; missing keys become None."""
     rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
     return Table(tuple(columns), rows, **options)
 
@@ -176,9 +178,9 @@ def titled(
     titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
     timed: Sequence[str] = (), timed_rows: bool = False, prose: Sequence[str] = (),
 ) -> Table:
-    """Return a table from titles such as "step [ms]": the unit in brackets, the rest is key and heading.
+    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is key and heading.
 
-    `timed` and `prose` name some of the titles.
+    `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
     """
     for kind, names in (("timed", timed), ("prose", prose)):
         if unknown := [name for name in names if name not in titles]:
@@ -194,11 +196,12 @@ def titled(
 
 @dataclass(frozen=True)
 class Region:
-    """Where a part holds: bounds on one or two conditions, and the trials inside. All of those hold.
+    """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
 
-    bounds : condition, its unit, lowest and highest value; None where the tested range ends
-    searched : trials of the half in which the region was found; others : of the other half
-    fresh : trials drawn for the confirmation; share : of the tested range, by length or by decades
+    bounds : condition, its unit, lowest and highest value; None if the tested range has no bound on that side
+    searched : number of trials inside, from the half in which the region was found; others : from the other half
+    fresh : number of trials drawn for the confirmation
+    share : share of the tested range that the region covers, by length or by decades
     """
 
     bounds: tuple[tuple[str, str, float | None, float | None], ...]
@@ -208,12 +211,12 @@ class Region:
     share: float = 0.0
 
     def contains(self, row: Row) -> bool:
-        """Whether a trial lies inside, its bounds included."""
+        """Whether a trial lies inside the region or on its bounds."""
         return all((low is None or row[key] >= low) and (high is None or row[key] <= high)
                    for key, _, low, high in self.bounds)  # fmt: skip
 
     def ends(self, key: str, tested: Sequence[float]) -> tuple[float, float]:
-        """Return the bounds of a condition; where one is open, the end of what was tested."""
+        """Return the bounds of a condition; the end of the tested range replaces a missing bound."""
         low, high = next(((low, high) for name, _, low, high in self.bounds if name == key), (None, None))
         return min(tested) if low is None else low, max(tested) if high is None else high
 
@@ -224,17 +227,17 @@ class Region:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the answer that is judged by itself.
+    """A part of the answer, judged separately.
 
-    name : where the parts of one question are told apart; sentence : what was found, with its number
-    held, decided : trials in which it held, of those that could tell; unknown : trials that could not
-    cases : how many cases the trials that decide stand for, where they are fewer than LEAST_DECIDED
-    region : where it is reproduced, of a verdict WHERE; fails : the conditions of the trials that fail
-    timed : measured times are in it
-    optional : about what does not come with the project, as another engine: absent, it leaves the verdict to others
-    miss : where ours falls short, in a clause of one short line for the first page; "" where it does not, or another
-        falls short
-    quantities : those of QUANTITIES that the sentence says, each with its value as it stands there
+    name : distinguishes the parts of one question; sentence : the result, with its number
+    held, decided : trials in which the claim held, and trials that had an outcome; unknown : trials without one
+    cases : number of cases in the decided trials, if it is below LEAST_DECIDED
+    region : region in which the part is reproduced, if the verdict is WHERE; fails : conditions of the failed trials
+    timed : True if measured times enter
+    optional : True if the part needs software that the project does not include, such as another engine; if that
+        software is absent, the other parts decide the verdict
+    miss : one short clause for the first page that says where our method falls short; "" if it does not
+    quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
     """
 
     sentence: str
@@ -256,7 +259,7 @@ class Part:
 
     @property
     def outcome(self) -> str:
-        """The verdict in words, with its region."""
+        """The verdict in words, with the region if there is one."""
         return f"{self.verdict} {self.region}" if self.region else self.verdict
 
 
@@ -264,9 +267,9 @@ class Part:
 class Failure:
     """A case that could not be computed.
 
-    case : the case, as its row is named
+    case : name of the case, as in its table row
     error : type of the exception; reason : first line of its message
-    traceback : where it was raised
+    traceback : the Python traceback
     """
 
     case: str
@@ -277,17 +280,17 @@ class Failure:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a study found.
+    """The result of a study.
 
-    key : of the question, such as "C07" or "mechanics"; title : its heading
-    question : what is asked, and how; answer : what was found, in one sentence with its number
-    verdict : one of VERDICTS; parts : what it was made from
-    tables : by name; a figure asks for one as "<key>/<name>"
-    details : what else a reader needs, by label (place, tolerance, source, law ...)
-    axes : keys of the columns over which the outcome is best drawn: across, up, and what splits the maps
-    failures : the cases that raised; their rows are missing from the tables
-    timed : the verdict or the answer rests on measured times
-    quantities : those of QUANTITIES that the answer says, each with its value as it stands there
+    key : name of the question, such as "C07" or "mechanics"; title : heading of the question
+    question : the question and the method; answer : the result, in one sentence with its number
+    verdict : one of VERDICTS; parts : the parts that give the verdict
+    tables : the data, by name; a figure refers to a table as "<key>/<name>"
+    details : further information by label (place, tolerance, source, law ...)
+    axes : keys of the columns for a map of the outcome: horizontal axis, vertical axis, and one map per value
+    failures : the cases that raised an exception; the tables lack their rows
+    timed : True if the verdict or the answer depends on measured times
+    quantities : the QUANTITIES that the answer quotes, each with its value as printed there
     """
 
     key: str
@@ -308,17 +311,17 @@ class Finding:
 
     @property
     def computed(self) -> bool:
-        """Whether anything was found."""
+        """Whether the study gave a result."""
         return self.verdict != NOT_COMPUTED
 
     @property
     def miss(self) -> str:
-        """Where ours falls short, the clauses of all parts; "" where none says so."""
+        """The clauses of all parts that say where our method falls short; "" if there is none."""
         return "; ".join(part.miss for part in self.parts if part.miss)
 
 
 def check_quantities(quantities: Quantities, sentence: str) -> None:
-    """Raise ArgumentError unless each quantity is one of QUANTITIES and the sentence says its value."""
+    """Raise ArgumentError unless each quantity is one of QUANTITIES and the sentence contains its value."""
     for name, value in quantities:
         if name not in QUANTITIES:
             raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
@@ -327,7 +330,7 @@ def check_quantities(quantities: Quantities, sentence: str) -> None:
 
 
 def said_as(value: str) -> re.Pattern[str]:
-    """Return what finds a value in a sentence as a number of its own, not as a piece of a longer one."""
+    """Return a pattern that matches the value in a sentence, but not as a piece of a longer number."""
     return re.compile(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)")
 
 
@@ -343,10 +346,11 @@ def worst(verdicts: Iterable[str]) -> str:
 
 
 def verdict_of_trials(holds: Iterable[bool | None]) -> str:
-    """Return the verdict on something that was tried many times, from the outcomes of its trials.
+    """Return the verdict on a claim from the outcomes of many trials.
 
-    All that can tell hold: reproduced. At least LEAST_SHARE of them: mixed. Fewer: refuted. None can tell: not
-    testable here. "Reproduced where" takes a confirmed region: see `judge_part`.
+    Only trials with an outcome count. The claim is reproduced if it holds in all of them, mixed if it holds in at least
+    the share LEAST_SHARE, refuted if it holds in fewer, and not testable here if no trial has an outcome. The verdict
+    "reproduced where" needs a confirmed region: see `judge_part`.
     """
     decided = [outcome for outcome in holds if outcome is not None]
     if not decided:
@@ -358,7 +362,7 @@ def verdict_of_trials(holds: Iterable[bool | None]) -> str:
 
 
 def verdict_of_law(holds: Iterable[bool | None]) -> str:
-    """Return the verdict on a law from its trials: one that fails refutes it."""
+    """Return the verdict on a law from its trials: a single failure refutes the law."""
     found = verdict_of_trials(holds)
     return REFUTED if found == MIXED else found
 
@@ -366,10 +370,11 @@ def verdict_of_law(holds: Iterable[bool | None]) -> str:
 def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
     """Return the verdict on the trials of one part.
 
-    What is mixed is "reproduced where" a region is confirmed: found on one half of the trials, it must hold in all
-    trials of the other half that lie inside, and in all that `fresh` draws inside. At least LEAST_CONFIRMING trials
-    must confirm it: fresh ones where they can be drawn, else those of the other half. Where all hold, but fewer than
-    LEAST_DECIDED cases decide, the part is not testable here. What fails in some is mixed or refuted, however few.
+    A mixed part becomes "reproduced where" if a region is confirmed. The region is found on one half of the trials; the
+    claim must hold in all trials of the other half that lie inside the region, and in all that `fresh` draws inside. At
+    least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can be drawn, else those of the other
+    half. If all trials hold but fewer than LEAST_DECIDED cases have an outcome, the part is not testable here. A part
+    with failures is mixed or refuted, however few trials there are.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
     held, decided = trials.holds.count(True), sum(outcome is not None for outcome in trials.holds)
@@ -390,16 +395,16 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
 
 
 def _decided_cases(trials: Table) -> int:
-    """How many cases the trials that can tell stand for."""
+    """Number of cases in the trials that have an outcome."""
     decided = trials.only(held is not None for held in trials.holds)
     counts = [column.key for column in trials.columns if column.cases]
     return max(len(decided.rows), *(sum(count or 0 for count in decided.column(key)) for key in counts), 0)
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
-    """Return the verdict of a finding: that of its worst part. What failed never counts as holding.
+    """Return the verdict of a finding: that of its worst part. A failed case never counts as holding.
 
-    An optional part in which nothing was decided counts only where it is all there is.
+    An optional part without any decided trial counts only if there is no other part.
     """
     given = list(parts)
     absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
@@ -408,7 +413,7 @@ def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
-    """Return the finding with cases that failed: a part, a table of reasons, and a word in its answer."""
+    """Return the finding with failed cases: this adds a part, a table of the reasons, and a clause in the answer."""
     if not failures:
         return finding
     every, count = (*finding.failures, *failures), len(failures)
@@ -426,7 +431,7 @@ def finding_of(
     key: str, title: str, question: str, answer: str, parts: Iterable[Part],
     tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (), quantities: Quantities = (),
 ) -> Finding:  # fmt: skip
-    """Return the finding that parts make: the verdict of the worst of them, timed where one is, with what failed."""
+    """Return the finding made of `parts` and `failures`: it has the worst verdict, and is timed if any part is."""
     parts = tuple(parts)
     timed = any(part.timed for part in parts)
     made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed,
@@ -435,17 +440,18 @@ def finding_of(
 
 
 def ranges(table: Table) -> str:
-    """Return the conditions of a table in words: each with its values, or its ends where there are many."""
+    """Return the conditions of a table in words: each with its values, or with its range if there are many."""
     return "; ".join(f"{column.key} {_span(table.column(column.key))} {column.unit}".rstrip()
                      for column in table.columns if column.condition and table.rows)  # fmt: skip
 
 
 def search_region(trials: Table) -> Region | None:
-    """Return the bounds on one or two conditions that keep most trials and no failure; None where none do.
+    """Return the region, bounded in one or two conditions, with most trials and no failure; None if there is none.
 
-    Every interval between values of a condition is tried, alone and with every interval of every other. Of those that
-    keep equally many trials, the one with the fewest ends is taken, then the first in the order of the columns. A
-    second condition is taken only where it keeps half as many trials again: the simpler region generalizes better.
+    The search tries every interval between values of a condition, alone and with every interval of every other
+    condition. Among regions with equally many trials it takes the one with the fewest bounds, then the first in the
+    order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
+    because the simpler region generalizes better.
     """
     scales = [_intervals(column, trials) for column in trials.columns if column.condition]
     scales = [scale for scale in scales if len(scale) > 1]
@@ -460,7 +466,7 @@ def search_region(trials: Table) -> Region | None:
 
 
 def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, tuple[_Interval, ...]]:
-    """How many trials the best pair of intervals keeps without a failure, and those of the two that bound anything."""
+    """Number of trials that the best pair of intervals keeps without a failure, and those of the two with a bound."""
     held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
     inside, other = (np.array([interval.inside(trials) for interval in scale]) for scale in (first, second))
     kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
@@ -477,7 +483,7 @@ def _kept_simply(found: tuple[int, tuple[_Interval, ...]]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Interval:
-    """Values of one condition between two ends; None where the tested range ends."""
+    """Values of one condition between `low` and `high`; None means no bound on that side."""
 
     key: str = ""
     unit: str = ""
@@ -499,7 +505,7 @@ class _Interval:
 
 
 def _intervals(column: Column, trials: Table) -> list[_Interval]:
-    """All intervals of more than one value, the unbounded one among them; none where a value is no number."""
+    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number."""
     values = trials.column(column.key)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
@@ -516,9 +522,9 @@ def _intervals(column: Column, trials: Table) -> list[_Interval]:
 
 
 def _confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
-    """The region that the other half and fresh trials confirm, and what came of the search in words.
+    """The region that the other half and fresh trials confirm, and the result of the search in words.
 
-    Where the other half contradicts the region, both halves are searched, and fresh trials alone can confirm.
+    If the other half contradicts the region, both halves are searched; then only fresh trials can confirm a region.
     """
     first = np.zeros(len(trials.rows), np.bool_)
     first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
@@ -546,14 +552,14 @@ def _failing(trials: Table) -> str:
 
 
 def _count(part: Part) -> str:
-    """In how many trials a part holds, and how many cannot tell."""
+    """The number of trials in which a part holds and the number without an outcome, in words."""
     told = f"holds in {part.held} of {part.decided} trials" if part.decided else "no trial can tell"
     total = part.decided + part.unknown
     return f"{told}; {part.unknown} of {total} cannot tell" if part.unknown and part.decided else told
 
 
 def _where_it_fails(trials: Table) -> str:
-    """In how many trials, and under which conditions."""
+    """The number of failed trials and their conditions, in words; "" if none failed."""
     failed = trials.that(False)
     if not failed.rows:
         return ""
@@ -587,11 +593,11 @@ def failure_of(case: str, error: Exception) -> Failure:
 
 
 def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | None) -> Result | None:
-    """Return compute(), or append a Failure and return None where it raises an Exception.
+    """Return compute(); if it raises an Exception, append a Failure to `failures` and return None.
 
-    Without a list of failures the exception passes through.
+    If `failures` is None, the exception propagates.
 
-    An interrupt (KeyboardInterrupt, SystemExit) is no failure of the case and passes through.
+    KeyboardInterrupt and SystemExit always propagate, because they are no failure of the case.
     """
     try:
         return compute()
@@ -606,7 +612,7 @@ def of_each(
     cases: Iterable[Case], results: Callable[[Case], Iterable[Result]], failures: list[Failure] | None,
     name: Callable[[Case], str] | None = None,
 ) -> Iterator[Result]:
-    """Yield the results of each case; one that raises is a Failure of that name, and yields none."""
+    """Yield the results of each case; a case that raises an exception yields none and is recorded as a Failure."""
     for case in cases:
 
         def listed(case: Case = case) -> list[Result]:
@@ -616,7 +622,7 @@ def of_each(
 
 
 def counted(cases: Collection[Case], progress: Callable[[int, int], None]) -> Iterator[Case]:
-    """Yield the cases; before each, and at the end, say how many of them are done."""
+    """Yield the cases; call `progress` with (cases done, cases) before each case and at the end."""
     for done, case in enumerate(cases):
         progress(done, len(cases))
         yield case
@@ -624,7 +630,7 @@ def counted(cases: Collection[Case], progress: Callable[[int, int], None]) -> It
 
 
 def _words(case: Any) -> str:
-    """A case in words: the parts of a tuple, with their names where it has names."""
+    """A case in words: the entries of a tuple, with the field names of a named tuple."""
     if not isinstance(case, tuple):
         return str(case)
     names = getattr(case, "_fields", ())

@@ -1,4 +1,4 @@
-"""One impact, the one type of it, and every generator of impacts: a generator and a seed always give the same ones."""
+"""ImpactCase, the type of one impact, and all generators of impacts. The same seed always gives the same impacts."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from reference.exact import exact_impact
 
 Floats = NDArray[np.floating[Any]]
 
-# Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion: a sound
-# resolver may take them for either, so laws that compare velocities do not judge such impacts.
+# Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion. A correct
+# resolver may treat them as either, so laws that compare velocities skip such impacts.
 ROUNDING_BELOW, MOTION_ABOVE = 1e-13, 1e-5
 RANK_CUT = 1e-9  # anywhere in the gap
 
 
 @dataclass(frozen=True)
 class ImpactCase:
-    """M (d, d), J (c, d), v (d,), scalar e, and what is known about them.
+    """One impact: M (d, d), J (c, d), v (d,), scalar e, and known properties of them.
 
     Attributes
     ----------
-    family : where the impact comes from.
+    family : name of the generator's family.
     translations : (k, d) motions z with J z = 0 exactly.
-    unequal : (c,) restitutions, each in [0, 1], that take the place of e.
+    unequal : (c,) restitutions, each in [0, 1], that replace e.
     touching : (k, d) rows of contacts that touch and do not approach.
-    tangents, friction : (c, m, d) rows of m tangents of each contact, and (c,) Coulomb's μ; both, or neither.
-    rank : the first `rank` rows are independent, the others depend on them.
-    mass_condition, closeness : κ(M), and the distance of nearly dependent rows (1 = generic) it was made with.
+    tangents, friction : (c, m, d) rows of m tangents per contact, and (c,) Coulomb's μ; give both or neither.
+    rank : the first `rank` rows are independent; the others depend on them.
+    mass_condition, closeness : κ(M), and the distance between nearly dependent rows (1 = generic), as generated.
     """
 
     mass_matrix: Floats
@@ -72,20 +72,20 @@ class ImpactCase:
 
     @property
     def label(self) -> str:
-        """Short name for a table."""
+        """Short name for tables."""
         return f"d={self.coordinates} c={self.contacts} κ(M)={self.mass_condition:.0e} rows {self.closeness:.0e} apart"
 
     @cached_property
     def truth(self) -> tuple[Fraction, ...]:
-        """Exact v⁺ of the numbers given."""
+        """Exact v⁺ for these doubles."""
         return exact_impact(*self.arrays, self.restitution).velocity
 
     def given_restitution(self) -> Any:
-        """What a resolver gets: the scalar e, or a copy of the unequal ones."""
+        """The restitution that a resolver gets: the scalar e, or a copy of the unequal ones."""
         return self.restitution if self.unequal is None else self.unequal.copy()
 
     def given(self) -> tuple[Any, ...]:
-        """Copies of what a resolver is called with: M, J, v and e; with friction M, J, T, v, e and μ."""
+        """Copies of the arguments for a resolver: M, J, v and e; with friction M, J, T, v, e and μ."""
         e = self.given_restitution()
         if self.tangents is None or self.friction is None:
             return self.mass_matrix.copy(), self.contact_jacobian.copy(), self.velocity.copy(), e
@@ -110,7 +110,7 @@ class ImpactCase:
 
     @cached_property
     def unit_rows(self) -> Floats:
-        """Rows of A scaled to unit length; zero rows stay."""
+        """Rows of A scaled to unit length; zero rows stay zero."""
         length = np.linalg.norm(self.rows, axis=1, keepdims=True)
         return np.divide(self.rows, length, out=np.zeros_like(self.rows), where=length > 0.0)
 
@@ -155,13 +155,13 @@ class ImpactCase:
 
     @cached_property
     def _answers(self) -> dict[int, Any]:
-        """What resolvers gave for this very case, by their identity; kept with them, so that it stays theirs."""
+        """Answers of resolvers for this case, by id(resolver). Each entry holds the resolver, so the id stays valid."""
         return {}
 
 
-# Random impacts of many kinds: what the kit draws.
+# Random impacts of many kinds, as the kit draws them.
 MASS_KINDS = ("spectral", "graded", "arrow", "diagonal", "identity")
-# Nearly dependent rows come three times: most bugs of rank and conditioning live there.
+# Nearly dependent rows are listed three times, because most bugs of rank and conditioning show there.
 _NEAR = ("nearly dependent",) * 3
 ROW_KINDS = ("generic", "kinetic", "dependent", "scaled", "copies", "zeros", "none", "cradle", *_NEAR)
 VELOCITY_KINDS = ("normal", "kinetic normal", "light direction", "grazing", "unseen")
@@ -181,7 +181,7 @@ SCALE_POWERS = 27
 
 
 def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: float = 1e8) -> ImpactCase:
-    """Return impact `number` of a series: one in ten large, half in other units, some at rest or partly at rest."""
+    """Return impact `number` of a series. One in ten is large, half use other units, some are at rest or partly so."""
     contacts, size = None, None
     if number % LARGE_EVERY == LARGE_EVERY // 2:
         kind = LARGE_KINDS[number // LARGE_EVERY % len(LARGE_KINDS)]
@@ -207,7 +207,7 @@ def draw_case(
     rng: np.random.Generator, largest_condition: float = 1e8, coordinates: int | None = None,
     contacts: int | None = None, row_kinds: tuple[str, ...] = ROW_KINDS,
 ) -> ImpactCase:  # fmt: skip
-    """Return one random impact with κ(M) up to `largest_condition`; unless given d is up to 10, c up to 2 d + 1."""
+    """Return one random impact with κ(M) up to `largest_condition`; by default d ≤ 10 and c ≤ 2 d + 1."""
     rows_kind = _one_of(rng, row_kinds)
     d = int(rng.integers(1, 11)) if coordinates is None else coordinates
     condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
@@ -223,9 +223,9 @@ def draw_case(
 
 
 def adverse_cases(rng: np.random.Generator) -> Iterator[ImpactCase]:
-    """Yield the elastic impacts that break a formula through the inverse of W under every BLAS.
+    """Yield elastic impacts for which a formula with the inverse of W gains energy under every BLAS.
 
-    Nothing here passes through BLAS: a seed gives the same bits on every processor.
+    The generator does not use BLAS, so a seed gives the same bits on every processor.
     """
     for k in range(ADVERSE):
         d = 2 + k % 3
@@ -236,12 +236,12 @@ def adverse_cases(rng: np.random.Generator) -> Iterator[ImpactCase]:
 
 
 def _one_of(rng: np.random.Generator, kinds: tuple[str, ...]) -> str:
-    """As `rng.choice`, which first makes an array of them."""
+    """Return a random kind, like `rng.choice` but without making an array of the kinds."""
     return kinds[int(rng.integers(0, len(kinds)))]
 
 
 def with_unequal_restitution(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
-    """The case with a restitution in [0, 1] per row: 0 and 1 side by side, or anything."""
+    """Return the case with a restitution per row: either 0 and 1 at random, or uniform in [0, 1]."""
     extremes = rng.random() < 0.5
     e = rng.choice([0.0, 1.0], size=case.contacts) if extremes else rng.uniform(0.0, 1.0, size=case.contacts)
     return replace(case, family=case.family + ", unequal e", unequal=e)
@@ -255,7 +255,7 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
         return np.eye(d)
     if kind == "diagonal":
         return np.diag(rng.permutation(spectrum))
-    if kind == "graded":  # a well conditioned matrix in units that differ
+    if kind == "graded":  # a well conditioned matrix in different units per coordinate
         s = np.sqrt(rng.permutation(spectrum))
         inner = draw_mass_matrix(rng, "spectral", d, 10.0)
         return s[:, None] * inner * s
@@ -271,7 +271,7 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
 def draw_rows(
     rng: np.random.Generator, kind: str, mass: Floats, contacts: int | None = None
 ) -> tuple[Floats, str]:
-    """Return J (c, d) of the kind, and a word on how close to dependent its rows are."""
+    """Return J (c, d) of the kind, and a label that says how close to dependent its rows are ("" for most kinds)."""
     d = len(mass)
     c = int(rng.integers(1, 2 * d + 2)) if contacts is None else contacts
     generic = rng.normal(size=(c, d))
@@ -298,12 +298,16 @@ def draw_rows(
 
 
 def cradle_rows(d: int) -> Floats:
-    """Bodies in a line, each against the next: rows with +1 and −1."""
+    """Return the rows (d − 1, d) of d bodies in a line, each in contact with the next: entries +1 and −1."""
     return np.eye(d)[: d - 1] - np.eye(d, k=1)[: d - 1]
 
 
 def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Floats) -> Floats:
-    """Return v (d,): normal, with Lᵀv normal, along M's lightest direction, barely seen or unseen by the rows."""
+    """Return v (d,) of the kind.
+
+    The kinds are: v normally distributed, Lᵀv normally distributed, v along M's lightest direction, and v with rows @ v
+    nearly or exactly zero.
+    """
     d = len(mass)
     v = rng.normal(size=d)
     lower = np.linalg.cholesky(mass)
@@ -319,17 +323,17 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
     return v
 
 
-# Impacts for one-sided contacts and for friction. A textbook method goes through W = J M⁻¹ Jᵀ, which squares the
-# closeness of rows, so nearly dependent rows are left out; exact copies and sums, as a face on a floor has, are not.
+# Impacts for unilateral contacts and for friction. A textbook method uses W = J M⁻¹ Jᵀ, which squares the closeness of
+# rows, so nearly dependent rows are left out. Exact copies and sums of rows, as for a face on a floor, are included.
 ONE_SIDED_ROW_KINDS = ("generic", "kinetic", "dependent", "copies", "zeros", "none", "cradle")
 ONE_SIDED_COORDINATES, ONE_SIDED_CONTACTS = 6, 6
-ONE_SIDED_POWERS = 10  # of two, about ±3 decades, in M and v: absolute thresholds show
+ONE_SIDED_POWERS = 10  # powers of two in M and v, about ±3 decades: they reveal absolute thresholds
 SIGNS = ("approaching", "approaching", "mixed")
 FRICTIONAL_KINDS = ("body in the plane", "two bodies in the plane", "body in space", "generic")
 
 
 def draw_one_sided_case(rng: np.random.Generator, number: int, largest_condition: float = 1e4) -> ImpactCase:
-    """Return an impact of one-sided contacts, e in [0, 1]; in two of three every contact approaches."""
+    """Return an impact of unilateral contacts, e in [0, 1]; in two of three impacts every contact approaches."""
     d, c = int(rng.integers(1, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, ONE_SIDED_CONTACTS + 1))
     if rng.random() < 0.2:
         case = _standing_box(rng, c)
@@ -362,14 +366,14 @@ def _push_restitution(rng: np.random.Generator) -> float:
 
 
 def _standing_box(rng: np.random.Generator, contacts: int) -> ImpactCase:
-    """A body in the plane whose face meets the floor at several points: two independent rows at most."""
+    """Return a planar body whose face touches the floor at several points: at most two rows are independent."""
     rows = np.column_stack([np.zeros(contacts), np.ones(contacts), rng.uniform(-0.5, 0.5, size=contacts)])
     mass = np.diag([1.0, 1.0, float(rng.uniform(0.02, 1.0))])
     return ImpactCase(mass, rows, rng.normal(size=3), 0.0, f"a face on the floor at {contacts} points")
 
 
 def _signed(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
-    """The case in other units of M and v, with normals turned so that every contact approaches, or left as drawn."""
+    """Return the case, perhaps in other units of M and v; the normals either all approach or stay as drawn."""
     signs = _one_of(rng, SIGNS)
     rows = case.contact_jacobian
     if signs == "approaching":
@@ -380,7 +384,7 @@ def _signed(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
 
 
 def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats | None]:
-    """M, rows (c, 1 + m, d) of normals and tangents, and translations, of one or two rigid bodies."""
+    """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations, for one or two rigid bodies."""
     inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
     if kind == "body in space":
         frames = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(int(rng.integers(1, 4)))]
@@ -399,14 +403,14 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
     return mass, np.concatenate([one, -other], axis=2), np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]])
 
 
-# Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are small whole numbers,
-# and redundant rows are whole-number combinations of independent ones: rank and redundancy are then exact in doubles,
-# and the same impact can be solved in rationals.
+# Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are small integers, and
+# redundant rows are integer combinations of independent ones. Rank and redundancy are therefore exact in doubles, and
+# the same impact can be solved in rationals.
 WHOLE = 5  # entries of rows lie in -5..5
 
 
 class Family(NamedTuple):
-    """What the impacts of a batch have in common."""
+    """Properties that all impacts of a batch share."""
 
     coordinates: int
     contacts: int
@@ -424,7 +428,7 @@ def draw_of_rank(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
 
 
 def approaching(case: ImpactCase) -> ImpactCase:
-    """The case with its first row's sign chosen so that this contact approaches."""
+    """Return the case with the sign of its first row chosen so that this contact approaches."""
     jacobian = case.contact_jacobian.copy()
     if jacobian[0] @ case.velocity > 0.0:
         jacobian[0] *= -1.0
@@ -432,7 +436,7 @@ def approaching(case: ImpactCase) -> ImpactCase:
 
 
 def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
-    """Yield impacts in whole numbers (as doubles): M = B Bᵀ + 1, so that rationals stay short."""
+    """Yield impacts of integers (as doubles) with M = B Bᵀ + I, so that exact rationals stay short."""
     rng = np.random.default_rng([seed, *(round(number) for number in family), 1])
     d = family.coordinates
     for _ in range(count):
@@ -452,7 +456,7 @@ def _mass_of_condition(rng: np.random.Generator, size: int, condition_number: fl
 
 
 def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
-    """Return (c, d) whole-number rows of exact rank `family.rank`, the first `rank` of them independent."""
+    """Return integer rows (c, d) of exact rank `family.rank`; the first `rank` of them are independent."""
     rank, spare = family.rank, family.contacts - family.rank
     while True:
         basis = rng.integers(-WHOLE, WHOLE + 1, (rank, family.coordinates)).astype(np.float64)
@@ -469,7 +473,10 @@ TIMED_HARDNESS = tuple((condition, closeness) for condition in (1e0, 1e3, 1e6) f
 
 
 def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[ImpactCase, ...]:
-    """Return nine impacts of one size: three conditions of M, three distances of the rows, e = 0, 1/2 and 1 in turn."""
+    """Return nine impacts of one size: three condition numbers of M times three closenesses of the rows.
+
+    The restitution takes the values 0, 1/2 and 1 in turn.
+    """
     return tuple(_timed_problem(coordinates, contacts, condition, closeness, (0.0, 0.5, 1.0)[(k + k // 3) % 3], seed)
                  for k, (condition, closeness) in enumerate(TIMED_HARDNESS))
 
@@ -494,7 +501,10 @@ def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float,
 
 
 def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Floats:
-    """Half of the rows lie beside the other half, by this share of them; many contacts span two thirds of d."""
+    """Return rows (c, d) whose second half copies the first half up to the relative distance `closeness`.
+
+    For c > d the rows span at most two thirds of the d dimensions.
+    """
     rank = min(c, (2 * d) // 3)
     base = rng.integers(-4, 5, size=(c, rank)) @ rng.integers(-4, 5, size=(rank, d)).astype(float)
     if c <= d:
