@@ -1,4 +1,4 @@
-"""Evidence: proofs, physical laws, hard cases, accuracy against time, claims. Studies return records and write no files.
+"""Evidence: proofs, physical laws, hard cases, accuracy against time, claims. Studies return records, not files.
 
 Each name below is loaded at its first use, so ``import verification`` is fast.
 """

@@ -171,12 +171,12 @@ RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
 ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
 
 
-# Sizes and units that ordinary draws never meet. Every LARGE_EVERY-th impact is large, of these kinds in turn: contacts
-# beyond any table of a small solver on few coordinates, coordinates beyond it, and rarely both, which is dear.
+# Sizes and units that ordinary draws never reach. Every LARGE_EVERY-th impact is large and takes these kinds in turn:
+# many contacts on few coordinates, many coordinates, and rarely both, because that is slow.
 LARGE_EVERY = 10
 LARGE_KINDS = ("contacts", "coordinates", "contacts", "coordinates", "contacts and coordinates")
 LARGE_COORDINATES, LARGE_CONTACTS = (11, 40), (101, 500)
-# Powers of two about ±8 decades: they round nothing, so dependent rows stay dependent.
+# Powers of two about ±8 decades: scaling by them is exact, so dependent rows stay dependent.
 SCALE_POWERS = 27
 
 

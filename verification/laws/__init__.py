@@ -1,4 +1,4 @@
-"""What every impact must keep: the laws, the tolerances, planted bugs, and the passivity kit for anybody's resolver."""
+"""Laws of every impact, their tolerances, planted bugs, and the passivity kit that tests any resolver."""
 
 from verification.impacts import ImpactCase
 from verification.laws.bounds import LawResidual

@@ -1,7 +1,7 @@
-"""Many random impacts of one method: relative energy gain against 10·d·ε·√κ(M), and the restitution residual.
+"""Many random impacts of one method: relative energy gain compared with 10·d·ε·√κ(M), and the restitution residual.
 
-The families are adverse on purpose: masses of known spectrum with κ log-uniform, rows random in the metric of the
-coordinates or of the kinetic energy (the latter mix light and heavy motion, where Cholesky's error is felt).
+The families are adverse: mass matrices of known spectrum with log-uniform κ, and rows that are random in the metric of
+the coordinates or of the kinetic energy (the latter mix light and heavy motion, so Cholesky's error matters).
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ _BATCH = 200  # impacts of one d drawn together
 
 @dataclass(frozen=True)
 class BulkImpacts:
-    """Every impact of a bulk study; all arrays (n,).
+    """All impacts of a bulk study; all arrays have shape (n,).
 
     Attributes
     ----------
-    method, clamp, seed, seconds : what was run, and the time inside the resolver [s].
-    coordinates, contacts, rank : d, c, rank used.
+    method, clamp, seed, seconds : settings of the study, and the time inside the resolver [s].
+    coordinates, contacts, rank : d, c, and the rank that the resolver used.
     condition : κ(M).  restitution : e.
     velocity_family, row_family : indices into VELOCITY_FAMILIES and ROW_FAMILIES.
-    gain : (KE⁺ − KE⁻)/KE⁻ in double-double.  gain_error : bound of its own error.
+    gain : (KE⁺ − KE⁻)/KE⁻ in double-double.  gain_error : error bound of `gain`.
     residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
     """
 
@@ -65,12 +65,12 @@ class BulkImpacts:
 
     @property
     def cholesky_bound(self) -> Floats:
-        """d·ε·κ(M): what is left to a Cholesky factor without the clamp."""
+        """d·ε·κ(M): bound of the gain from a Cholesky factor without the clamp."""
         return self.coordinates * EPS * self.condition
 
     @property
     def worst_ratio(self) -> float:
-        """Largest gain / bound; the promise is kept while it is at most 1."""
+        """Largest gain / bound; the bound holds if this is at most 1."""
         return float(np.max(self.gain / self.bound))
 
     @property
@@ -79,12 +79,12 @@ class BulkImpacts:
         return int(np.sum(self.gain > self.bound))
 
     def by_condition(self) -> tuple[BulkRow, ...]:
-        """One row per decade of κ(M), for the report."""
+        """One row per decade of κ(M)."""
         decade = np.floor(np.log10(self.condition) + 1e-9).astype(int)
         return tuple(self._row(int(k), decade == k) for k in np.unique(decade))
 
     def by_family(self) -> tuple[tuple[str, str, BulkRow], ...]:
-        """One row per velocity and row family."""
+        """One row per pair of velocity family and row family."""
         return tuple(
             (velocity, rows, self._row(-1, (self.velocity_family == i) & (self.row_family == j)))
             for i, velocity in enumerate(VELOCITY_FAMILIES)
@@ -107,7 +107,7 @@ class BulkImpacts:
 
 @dataclass(frozen=True)
 class BulkRow:
-    """Summary of some impacts; κ(M) in [10^decade, 10^(decade + 1)), or all of them where decade is −1."""
+    """Summary of the impacts with κ(M) in [10^decade, 10^(decade + 1)); decade −1 stands for any κ(M)."""
 
     decade: int
     impacts: int
@@ -120,7 +120,7 @@ class BulkRow:
 
 
 class _Batch(NamedTuple):
-    """Impacts of one d, and per impact the indices of its families."""
+    """Impacts of one d, and the family indices of each impact."""
 
     cases: list[ImpactCase]
     velocity_family: Floats
@@ -139,8 +139,8 @@ def bulk_impacts(
 
     Parameters
     ----------
-    impacts, seed : how many, and of which random numbers.
-    method, clamp : as `iapb.resolve_impact` takes them.
+    impacts, seed : number of impacts, and seed of the random numbers.
+    method, clamp : arguments of `iapb.resolve_impact`.
     largest_condition : κ(M) is log-uniform up to it.
     progress : called with (done, impacts) after each batch.
 
@@ -211,7 +211,7 @@ def _draw(rng: np.random.Generator, n: int, d: int, largest_condition: float) ->
 
 
 def _masses(rng: np.random.Generator, n: int, d: int, largest_condition: float) -> Floats:
-    """Random orthogonal axes, log-uniform spectrum between 1 and 1/κ, κ log-uniform; random unit of mass."""
+    """Draw M with random orthogonal axes, a log-uniform spectrum between 1 and 1/κ, log-uniform κ and a random unit."""
     axes = np.linalg.qr(rng.normal(size=(n, d, d)))[0]
     exponent = rng.uniform(0.0, np.log10(largest_condition), size=(n, 1))
     share = rng.uniform(0.0, 1.0, size=(n, d))
@@ -221,7 +221,7 @@ def _masses(rng: np.random.Generator, n: int, d: int, largest_condition: float) 
 
 
 def _rows(rng: np.random.Generator, d: int) -> Floats:
-    """c rows of random rank: generic, dependent, copies, or close to dependent by 1e-1 … 1e-16."""
+    """Draw c rows of random rank: generic, dependent, copies, or dependent up to a distance of 1e-1 … 1e-16."""
     c = int(rng.integers(0, LARGEST_CONTACTS + 1))
     kind = rng.integers(0, 4)
     rank = int(rng.integers(1, min(max(c, 1), d) + 1))

@@ -1,6 +1,6 @@
-"""The laws at length: parts of many cases in batches, each case from a seed of its own, so that any can be redrawn.
+"""Long campaigns of law checks: each part has many cases in batches, and each case has its own seed to redraw it.
 
-`plan` says which batches there are, `do_batch` does one and returns plain records; who stores them is not known here.
+`plan` returns the batches; `do_batch` computes one batch and returns plain records. This module stores nothing.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectory_laws import judge_run
 
 IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"
-PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the order enters the seeds: add at the end
+PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the seeds depend on the order: add at the end
 SCENES = {TRAJECTORIES: draw_scene, IN_SPACE: draw_spatial_scene}
-# Laws of one call are put to every impact. The others compare it with calls on variants of it, up to three and an SVD
-# each; they are put to one impact in ONE_IN, each law to its own choice of them.
+# Laws that need one call check every impact. The other laws also call the resolver on up to three variants of the
+# impact, with an SVD each; each of them checks its own sample of one impact in ONE_IN.
 ONE_IN = 10
-# Cases of a part for each impact or trajectory asked for, and cases per batch (a few seconds of work).
+# Cases of a part per requested impact or trajectory, and cases per batch (a few seconds of work).
 _SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0.1, "hand_port": 0.02}
 _PER_TRAJECTORY = {IN_SPACE: 0.4, "group_splitting": 0.2, "device_port": 0.1}
 BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, IN_SPACE: 50, "group_splitting": 20, "device_port": 20}
 _BATCH = 2000
-# Counterexamples kept of each law and batch. All are counted, and all are kept unless a resolver breaks the law in more
-# than one case in forty: then the first say what is wrong with it, and a million files would say no more.
+# Largest number of counterexamples stored per law and batch. All are counted. The limit matters only if a resolver
+# breaks the law in more than one case in forty; then the first ones show the fault.
 STORED_PER_LAW = 100
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is put to the laws: a resolver, its tolerances, the largest κ(M) of its impacts, the seed of all draws."""
+    """The subject of a campaign: a resolver, its tolerances, the largest κ(M) of its impacts, the seed of all draws."""
 
     resolver: Resolver
     bounds: Bounds
@@ -63,7 +63,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Found:
-    """A counterexample: the law it breaks, where it was drawn, the case, and the run of a scene or what was struck."""
+    """A counterexample: the broken law, the part and index, the case, and the run of a scene or the resolved impact."""
 
     law: str
     part: str
@@ -76,7 +76,7 @@ class Found:
 
 @dataclass(frozen=True)
 class BatchOutcome:
-    """What came of one batch."""
+    """Result of one batch."""
 
     counts: tuple[LawCount, ...]
     found: tuple[Found, ...]
@@ -84,7 +84,7 @@ class BatchOutcome:
 
 
 def plan(impacts: int, trajectories: int, parts: tuple[str, ...] = PARTS) -> tuple[Batch, ...]:
-    """Return the batches of so many impacts and trajectories, with their share of the other parts."""
+    """Return the batches for these numbers of impacts and trajectories; the other parts get numbers in proportion."""
     totals = {IMPACTS: impacts, TRAJECTORIES: trajectories}
     totals |= {part: round(share * impacts) for part, share in _SHARE.items()}
     totals |= {part: round(share * trajectories) for part, share in _PER_TRAJECTORY.items()}
@@ -98,7 +98,7 @@ def _batches(part: str, total: int) -> Iterator[Batch]:
 
 
 def drawn(part: str, index: int, subject: Subject) -> Any:
-    """Return case `index` of a part: always the same one."""
+    """Return case `index` of a part; it is the same in every call."""
     rng = np.random.default_rng([subject.seed, PARTS.index(part), index])
     if part in SCENES:
         return SCENES[part](rng)
@@ -109,7 +109,7 @@ def drawn(part: str, index: int, subject: Subject) -> Any:
 
 
 def tried_laws(part: str, index: int) -> Iterator[str]:
-    """Yield the impact laws that case `index` of a part is put to, the rarer ones by a hash of law and number."""
+    """Yield the impact laws that check case `index` of a part; a hash of law and index selects the sampled ones."""
     for name in UNEQUAL_LAWS if part == UNEQUAL else LAWS:
         every = name.removeprefix("unequal_") in OF_ONE_CALL
         if every or zlib.crc32(f"{name} {index}".encode()) % ONE_IN == 0:
@@ -119,14 +119,14 @@ def tried_laws(part: str, index: int) -> Iterator[str]:
 def residuals(
     part: str, case: Any, subject: Subject, index: int | None = None
 ) -> tuple[dict[str, LawResidual], Run | None]:
-    """Return the residuals of the laws of the part that apply, and the run if there is one.
+    """Return the residuals of the applicable laws of the part, and the run if there is one.
 
-    With the case's `index` an impact is put to the laws that it has been chosen for, without it to all.
+    If `index` is given, only the laws that sample this impact check it; otherwise all laws do.
     """
     if part in SCENES:
         try:
             run = case.simulate()
-        except IapbError:  # refused by name before the first step: nothing to judge
+        except IapbError:  # refused with a named error before the first step: nothing to judge
             return {}, None
         return dict(judge_run(run)), run
     if part in ENGINE_LAWS:
@@ -138,7 +138,7 @@ def residuals(
 
 
 def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | None = None) -> BatchOutcome:
-    """Put every case of a batch to the laws of its part."""
+    """Check every case of a batch against the laws of its part."""
     started, counts, found = time.perf_counter(), dict[str, RunningCount](), list[Found]()
     with one_thread():
         for index in range(batch.first, batch.first + batch.count):

@@ -1,7 +1,7 @@
-"""Three contracts between an impact and its resolver: which arguments it gets, and which laws its answer keeps.
+"""Three contracts of an impact resolver: the arguments that it gets, and the laws that its answer keeps.
 
-``equality``: J v⁺ = −e J v⁻ on every row, impulses of either sign (the paper's (15)); `LAWS`. The other two are about
-contacts that only push. With u = Lᵀv, A = J L⁻ᵀ, γ = J v and Δu = u⁺ − u⁻ = Aᵀp:
+``equality``: J v⁺ = −e J v⁻ on every row, impulses of either sign (the paper's (15)); its laws are `LAWS`. In the other
+two contracts, contacts only push. With u = Lᵀv, A = J L⁻ᵀ, γ = J v and Δu = u⁺ − u⁻ = Aᵀp:
 
 ============ ============================================================ =============================================
 contract     the law of a textbook                                        source
@@ -11,17 +11,18 @@ unilateral   0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ �
 frictional   K ∋ p ⟂ w + μ|w_t| n ∈ K*, w = γ⁺ + e γ⁻ on the normals      Coulomb: Moreau 1988; de Saxcé and Feng 1998
 ============ ============================================================ =============================================
 
-Where every contact approaches and e is one number, Newton's and Poisson's law have the same v⁺: p = (1 + e) p_c solves
-both, and v⁺ is unique. Where only some approach the two differ, and v⁺ must be one of them. So both kinds of resolver
-keep all of UNILATERAL_LAWS. A resolver with another law of restitution (one contact after the other, an energetic
-coefficient) is judged by ``laws=``: all but `OF_RESTITUTION` and those that compare calls hold for any contacts that
-only push.
+If every contact approaches and e is one number, Newton's and Poisson's laws have the same v⁺: p = (1 + e) p_c solves
+both, and v⁺ is unique. If only some contacts approach, the two laws differ, and v⁺ must satisfy one of them. Both kinds
+of resolver therefore keep all of UNILATERAL_LAWS. For a resolver with another law of restitution (sequential contacts,
+an energetic coefficient) choose the laws with ``laws=``: all laws except `OF_RESTITUTION` and those that compare calls
+hold for any contacts that only push.
 
-Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985), and ``kinetic_energy`` finds that it does. Laws of
-the tangents take e = 0, where all forms of Coulomb's law agree: ``sticking`` and ``friction_opposes`` one contact,
-``maximal_dissipation`` all contacts together where their rows are independent. The convex relaxation (Anitescu and
-Tasora 2010) strikes contacts that separate while they slide, and breaks ``separating``. A pyramid inside the friction
-cone keeps ``cone`` and, with two tangents, breaks ``maximal_dissipation``; one around it breaks ``cone``.
+Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985); ``kinetic_energy`` detects this gain. The laws for
+tangents use e = 0, for which all forms of Coulomb's law agree. ``sticking`` and ``friction_opposes`` check one contact;
+``maximal_dissipation`` checks all contacts together if their rows are independent. The convex relaxation (Anitescu and
+Tasora 2010) gives impulses to contacts that separate while they slide, and breaks ``separating``. A friction pyramid
+inside the cone keeps ``cone`` and, with two tangents, breaks ``maximal_dissipation``; a pyramid around it breaks
+``cone``.
 """
 
 from __future__ import annotations
@@ -45,13 +46,13 @@ from verification.laws.bounds import KIT, ONE_SIDED, Bounds, LawResidual
 from verification.laws.impact_laws import LAWS, Law, elastic_conserves
 from verification.laws.resolver import Resolver, least_push, outcome, own_outcome
 
-TOUCHING = 1e-12  # of ‖Aᵢ‖ |u|: a normal velocity below it is the rounding of none
+TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
 _REFINEMENTS, NEAR = 30, 1e-9  # searches for the direction of friction in a cone, and the distance that ends them
 
 
 def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
-    """γᵢ / (‖Aᵢ‖ |u⁻|) (c,); 0 on zero rows, infinite where motion appears from rest."""
+    """Return γᵢ / (‖Aᵢ‖ |u⁻|) (c,); 0 on zero rows, infinite if motion appears from rest."""
     gamma, scale = case.contact_jacobian @ velocity, np.linalg.norm(case.rows, axis=1) * case.speed
     appeared = np.where(gamma == 0.0, 0.0, np.copysign(np.inf, gamma))
     return np.divide(gamma, scale, out=appeared, where=scale > 0.0)
@@ -67,7 +68,7 @@ def _change(case: ImpactCase, resolver: Resolver) -> Floats:
 
 
 def _with_tangents(case: ImpactCase) -> ImpactCase:
-    """The case whose rows are normals and tangents alike; never put to a resolver."""
+    """Return the case with normals and tangents as its rows; it is not meant for resolvers."""
     if case.tangents is None:
         return case
     rows = np.vstack([case.contact_jacobian, case.tangents.reshape(-1, case.coordinates)])
@@ -85,9 +86,9 @@ def impulse_comes_from_the_contacts(case: ImpactCase, resolver: Resolver, bounds
     return LawResidual("impulse_range", float(np.linalg.norm(outside)) / case.speed, bounds.comparison(every))
 
 
-# p ≥ 0, and |p_t| ≤ μ p: p is not unique, so what counts is whether any such p explains the motion.
+# p ≥ 0, and |p_t| ≤ μ p: p is not unique, so the law holds if any such p explains the motion.
 def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of Δu's part in the rows' span from {Aᵀp : p ≥ 0} or, with friction, from the sum of the cones."""
+    """Distance of Δu, projected on the span of the rows, from {Aᵀp : p ≥ 0}; with friction from the sum of cones."""
     every = _with_tangents(case)
     if not every.is_separated or case.speed == 0.0:
         return None
@@ -100,9 +101,9 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     """Return the least |Aᵀp − target| over impulses p that push, each inside its friction cone.
 
-    Least squares over rays of the cones. With two tangents each contact gets two more rays and the search begins again:
-    along the friction found, and in the direction that shortens the rest most. Any p found lies inside the cones: the
-    distance is never too small. Where the target lies in the cones it is found to be so to 1e-8 or better.
+    The method is least squares over rays of the cones. With two tangents, each iteration adds two rays per contact: one
+    along the friction found, and one in the direction that reduces the remainder most. Every p found lies inside the
+    cones, so the distance is never too small. If the target lies in the cones, the distance found is 1e-8 or less.
     """
     tangents, friction = _friction(case)
     m = tangents.shape[1]
@@ -130,7 +131,7 @@ def _friction(case: ImpactCase) -> tuple[Floats, Floats]:
     return np.linalg.solve(case.lower, flat.T).T.reshape(case.tangents.shape), case.friction
 
 
-# Whatever the law of restitution: what approached does not approach any more, and nothing else faster than at e γ⁻.
+# For any law of restitution: approaching contacts stop approaching, and no separating one approaches faster than e γ⁻.
 def nothing_is_driven_in(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
     """Largest of min(0, −e γ⁻) − γ⁺, relative to ‖Aᵢ‖ |u|."""
     before, after = (_normal_velocities(case, v) for v in (case.velocity, own_outcome(resolver, case)))
@@ -138,9 +139,9 @@ def nothing_is_driven_in(case: ImpactCase, resolver: Resolver, bounds: Bounds) -
     return LawResidual("no_penetration", float(np.max(short, initial=0.0)), bounds.restitution)
 
 
-# Newton's inequality, which Poisson's law with one e shares where every contact approaches.
+# Newton's inequality; Poisson's law with one e satisfies it, too, if every contact approaches.
 def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|, where every contact approaches."""
+    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|, if every contact approaches."""
     if not _all_approach(case):
         return None
     before, after = (_normal_velocities(case, v) for v in (case.velocity, own_outcome(resolver, case)))
@@ -148,9 +149,9 @@ def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds:
     return LawResidual("restitution", float(np.max(short, initial=0.0)), bounds.restitution)
 
 
-# pᵀ(γ⁺ + e γ⁻) = Δu·(u⁺ + e u⁻): a sum of terms ≥ 0 that is known without p, which redundant rows leave open.
+# pᵀ(γ⁺ + e γ⁻) = Δu·(u⁺ + e u⁻): this sum of terms ≥ 0 is known without p, which redundant rows do not determine.
 def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """|Δu·(u⁺ + e u⁻)| / |u⁻|², where every contact approaches."""
+    """|Δu·(u⁺ + e u⁻)| / |u⁻|², if every contact approaches."""
     if not _all_approach(case) or case.speed == 0.0:
         return None
     u, change = case.lower.T @ case.velocity, _change(case, resolver)
@@ -158,11 +159,11 @@ def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, boun
     return LawResidual("complementarity", value, 2.0 * bounds.restitution)
 
 
-# Where some contacts approach and others separate, Newton's and Poisson's v⁺ differ; each is unique (a projection).
+# If some contacts approach and others separate, Newton's and Poisson's v⁺ differ; each is unique (a projection).
 def mixed_impacts_follow_newton_or_poisson(
     case: ImpactCase, resolver: Resolver, bounds: Bounds
 ) -> LawResidual | None:
-    """Distance of v⁺ from Newton's or from Poisson's, whichever is nearer, where only some contacts approach."""
+    """Smaller of the distances of v⁺ from Newton's and from Poisson's v⁺, if only some contacts approach."""
     before = _normal_velocities(case, case.velocity)
     if not case.is_separated or case.speed == 0.0 or not np.any(before < -TOUCHING) or not np.any(before > TOUCHING):
         return None
@@ -175,20 +176,20 @@ def mixed_impacts_follow_newton_or_poisson(
 
 
 def separating_contacts_do_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """Distance of v⁺ from v⁻ for the case with its normals turned so that none approaches."""
+    """Distance of v⁺ from v⁻ after the normals are turned so that no contact approaches."""
     J = case.contact_jacobian
     v_plus = outcome(resolver, replace(case, contact_jacobian=np.where((J @ case.velocity < 0.0)[:, None], -J, J)))
     return LawResidual("separating", case.distance(v_plus, case.velocity), bounds.restitution)
 
 
 def elastic_approach_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """|KE⁺ − KE⁻| / KE⁻ with e = 1, where every contact approaches."""
+    """|KE⁺ − KE⁻| / KE⁻ with e = 1, if every contact approaches."""
     return elastic_conserves(case, resolver, bounds) if _all_approach(case) else None
 
 
-# Friction without restitution, at one contact alone or at all together.
+# Friction without restitution, at a single contact or at all contacts together.
 class _Tried(NamedTuple):
-    """A case with e = 0 and independent rows: normals, then tangents (c + c m, d), as given and whitened, W and μ."""
+    """A case with e = 0, its independent rows (normals, then tangents; (c + c m, d)) as given and whitened, W and μ."""
 
     case: ImpactCase
     given: Floats
@@ -198,7 +199,7 @@ class _Tried(NamedTuple):
 
 
 def _single(case: ImpactCase) -> _Tried | None:
-    """The first contact alone; None where it does not approach clearly, or its rows are too close to dependent."""
+    """The first contact alone; None if it hardly approaches or its rows are too close to dependent."""
     if case.tangents is None or case.friction is None or case.contacts == 0 or case.speed == 0.0:
         return None
     alone = replace(case, contact_jacobian=case.contact_jacobian[:1], tangents=case.tangents[:1],
@@ -207,7 +208,7 @@ def _single(case: ImpactCase) -> _Tried | None:
 
 
 def _tried(case: ImpactCase) -> _Tried | None:
-    """None where the rows are too close to dependent to tell the impulses."""
+    """The case with its rows and W; None if the rows are too close to dependent to determine the impulses."""
     every = _with_tangents(case)
     if case.friction is None or every.contacts > case.coordinates:
         return None
@@ -217,11 +218,11 @@ def _tried(case: ImpactCase) -> _Tried | None:
 
 
 def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """|v_t⁺| / (‖A_t‖ |u|) of one contact, e = 0, where p = −W⁻¹γ⁻ lies so far inside the cone that no other p solves.
+    """|v_t⁺| / (‖A_t‖ |u|) of one contact with e = 0, if p = −W⁻¹γ⁻ lies so far inside the cone that p is unique.
 
-    Another p' of Coulomb's law slides. From (p' − p)ᵀW(p' − p) ≥ 0 and its |p'_t| = μ p'_n follows μ p'_n ≤ |p_t|; from
-    w_n = 0 of both follows p_n − p'_n ≤ κ (p'_n + |p_t|/μ) with κ = μ|W_nt|/W_nn. Both hold only if
-    μ p_n ≤ (1 + 2κ)|p_t|.
+    Any other solution p' of Coulomb's law slides, so |p'_t| = μ p'_n. With (p' − p)ᵀW(p' − p) ≥ 0 this gives
+    μ p'_n ≤ |p_t|. Both solutions have w_n = 0, which gives p_n − p'_n ≤ κ (p'_n + |p_t|/μ) with κ = μ|W_nt|/W_nn. Both
+    inequalities hold only if μ p_n ≤ (1 + 2κ)|p_t|.
     """
     single = _single(case)
     if single is None:
@@ -237,7 +238,7 @@ def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: 
 
 
 def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """p_t·v_t⁺ / |u|² of one contact, e = 0: positive where friction pushes the way it slides."""
+    """p_t·v_t⁺ / |u|² of one contact with e = 0; it is positive if friction pushes in the direction of sliding."""
     single = _single(case)
     if single is None:
         return None
@@ -246,10 +247,10 @@ def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bound
 
 
 def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Largest |p_t·v_t⁺ + μ p_n |v_t⁺|| / |u|² of a contact, e = 0: 0 where friction at its limit opposes sliding.
+    """Largest |p_t·v_t⁺ + μ p_n |v_t⁺|| / |u|² of a contact with e = 0; 0 if friction at its limit opposes sliding.
 
-    All contacts together where their rows tell every impulse, else the first one alone. Coulomb's law says nothing of
-    a contact that pulls: ``cone`` finds it.
+    The law checks all contacts together if their rows determine every impulse, else the first contact alone. It skips
+    contacts that pull; ``cone`` detects those.
     """
     tried = _together(case) or _single(case)
     if tried is None:
@@ -259,14 +260,14 @@ def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds
 
 
 def _together(case: ImpactCase) -> _Tried | None:
-    """All contacts, e = 0; None for fewer than two, or where their rows are too close to dependent."""
+    """All contacts with e = 0; None if there are fewer than two or their rows are too close to dependent."""
     if case.tangents is None or case.friction is None or case.contacts < 2 or case.speed == 0.0:
         return None
     return _tried(replace(case, restitution=0.0))
 
 
 def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
-    """p_t·v_t⁺ and μ p_n |v_t⁺| of each contact (c,), both relative to |u|²; 0 where it pulls."""
+    """p_t·v_t⁺ and μ p_n |v_t⁺| of each contact (c,), both relative to |u|²; 0 for a contact that pulls."""
     case = tried.case
     v_plus = outcome(resolver, case)
     p = np.linalg.solve(tried.delassus, tried.rows @ (case.lower.T @ (v_plus - case.velocity)))
@@ -277,9 +278,9 @@ def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
     return pushes * np.einsum("cm,cm->c", friction, slip), pushes * limit
 
 
-# Theorems 1 and 2 of the doubles themselves: a resolver may promise that no impact gains, not even in the last bit.
+# Theorems 1 and 2 in exact arithmetic on the doubles: a resolver may promise no gain at all, not even in the last bit.
 def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """(KE⁺ − KE⁻)/KE⁻ by rationals, against 0; infinite where motion appears from rest."""
+    """(KE⁺ − KE⁻)/KE⁻ in rationals, with tolerance 0; infinite if motion appears from rest."""
     v_plus = own_outcome(resolver, case)
     gain = exact_gain(case.mass_matrix, case.velocity, v_plus)
     before = -exact_gain(case.mass_matrix, case.velocity, np.zeros_like(v_plus))
@@ -289,7 +290,7 @@ def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bou
 
 EXACT_LAWS = {"exact_energy": Law("KE⁺ ≤ KE⁻ in real arithmetic", no_gain_in_real_arithmetic)}
 
-# Laws that compare a call with another: v⁺ of contacts that only push is unique, whatever p is.
+# Laws that compare two calls: v⁺ of contacts that only push is unique, even if p is not.
 _UNIQUE = ("free_motion", "momentum", "duplicated_rows", "row_order", "units", "coordinates", "groups")
 
 UNILATERAL_LAWS: dict[str, Law] = {
@@ -325,12 +326,12 @@ OF_RESTITUTION = ("restitution", "complementarity", "mixed_restitution", "elasti
 
 
 class Contract(NamedTuple):
-    """What a kind of resolver is tried on and judged by.
+    """Laws, tolerances and impacts for one kind of resolver.
 
-    laws, optional : by name; those of `optional` judge only where they are asked for.
-    bounds, largest_condition : tolerances, and the largest κ(M) drawn, unless the caller has others.
-    draw : impact of a number; first : impacts that come before the drawn ones.
-    table : name of its table of laws in `verification.laws`, for a test to paste.
+    laws, optional : the laws by name; those in `optional` are checked only on request.
+    bounds, largest_condition : default tolerances, and default largest κ(M) drawn.
+    draw : makes the impact of a number; first : makes the impacts that come before the drawn ones.
+    table : name of the table of laws in `verification.laws`, for generated tests.
     unjudged : what a resolver that keeps all laws may still get wrong.
     """
 

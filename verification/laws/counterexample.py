@@ -1,4 +1,4 @@
-"""A failing impact: made smaller, written as a test to paste, and with what the resolver made of it."""
+"""Counterexamples: shrink a failing impact, write it as a test, and record the resolver's answers to it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _DIGITS = (0, 1, 2, 4, 8)
 def search_counterexample(
     fails: Callable[[ImpactCase], bool], examples: int, seed: int, kind: str = "equality"
 ) -> ImpactCase | None:
-    """Let hypothesis search impacts of whole numbers and shrink what it finds; None if it finds nothing.
+    """Let hypothesis search impacts of small integers and shrink the first failure; None if it finds none.
 
-    kind : a contract, or ``unequal``, one of `strategies.SEARCHED`
+    kind : key of `strategies.SEARCHED`: a contract or ``unequal``
     """
     import random
 
@@ -48,8 +48,8 @@ def search_counterexample(
 def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
     """Return a smaller case that still fails, greedily; the case itself if nothing smaller does.
 
-    It ends: each step takes away translations, a row, a coordinate, a restitution other than 1, or written digits. What
-    it returns follows from the answers of `fails` alone.
+    The search ends, because each step removes the translations, a row, a coordinate, a restitution other than 1, or
+    digits. The result depends only on the answers of `fails`.
     """
     improved = True
     while improved:
@@ -92,7 +92,7 @@ def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
 
 
 def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
-    """The array in `digits` decimals, if that changes it and it was not rounder already."""
+    """Yield the case with the array rounded to `digits` decimals, if that makes the array's text shorter."""
     array = getattr(case, name)
     if array is None:
         return
@@ -102,12 +102,12 @@ def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
 
 
 def _length(array: np.ndarray) -> int:
-    """Length of the array as text: the measure of roundness, so that shrinking ends."""
+    """Length of the array as text; each rounding must reduce it, so that shrinking ends."""
     return sum(len(repr(float(x))) for x in array.ravel())
 
 
 def _is_valid(case: ImpactCase) -> bool:
-    """Whether elimination, in floats and in a fixed order, meets no pivot near zero: no BLAS takes part."""
+    """Whether M is positive definite up to rounding, by elimination in a fixed order and without BLAS."""
     rows = case.mass_matrix.tolist()
     least = 1e-14 * max(rows[k][k] for k in range(len(rows)))
     for k, pivot_row in enumerate(rows):
@@ -119,15 +119,15 @@ def _is_valid(case: ImpactCase) -> bool:
     return tangents_are_independent(case)
 
 
-# A counterexample as the source of a test that can be pasted beside the resolver it breaks.
+# A counterexample as the source code of a test, to paste next to the resolver.
 
 _BY_NAME = {"KIT": KIT, "FACTORED": FACTORED, "ONE_SIDED": ONE_SIDED}
 
 
 def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None, contract: str = "equality") -> str:
-    """Return the case as source of a test of `law`; without a resolver that can be imported, its line is a gap.
+    """Return the source code of a test of `law` on the case; if the resolver cannot be imported, its line is a gap.
 
-    A law of the engine's own (a budget, extreme inputs) is put to the engine, whatever the resolver and the bounds.
+    The laws in ENGINE_LAWS (a budget, extreme inputs) always test the engine; `resolver` and `bounds` are then unused.
     """
     if law in ENGINE_LAWS:
         return _test_of_the_engine(case, law)
@@ -158,7 +158,7 @@ def _test_of_the_engine(case: ImpactCase, law: str) -> str:
 
 
 def _test_of(case: ImpactCase, law: str) -> list[str]:
-    """The head of the test, and its case."""
+    """Lines of the test function's head and of its case."""
     optional = {name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")}
     arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
     arrays |= {name: array for name, array in optional.items() if array is not None}
@@ -173,7 +173,7 @@ def _test_of(case: ImpactCase, law: str) -> list[str]:
 
 
 def import_line(resolver: Any) -> str:
-    """Return the lines that give `resolver`, or an empty text for a lambda or something made in place."""
+    """Return the lines that import `resolver`; empty for a lambda or another function that cannot be imported."""
     if isinstance(resolver, partial) and not resolver.args:
         line = _import_of(resolver.func, resolver.func.__name__) if _can_be_imported(resolver.func) else ""
         return line and f"{line}\nfrom functools import partial\n\nresolver = {name_of(resolver, 'partial')}"
@@ -181,7 +181,7 @@ def import_line(resolver: Any) -> str:
 
 
 def name_of(resolver: Any, word: str = "") -> str:
-    """Return what a resolver is called, the options of a partial included; `word` writes that as a call."""
+    """Return the name of a resolver with the options of a partial; `word` writes it as a call of that function."""
     if isinstance(resolver, partial) and not resolver.args:
         options = ", ".join(f"{key}={value!r}" for key, value in resolver.keywords.items())
         name = getattr(resolver.func, "__name__", repr(resolver.func))
@@ -205,18 +205,18 @@ def _bounds(bounds: Bounds) -> str:
 
 
 def _written(array: np.ndarray) -> str:
-    """The array as source; an empty one needs its shape."""
+    """The array as source code; an empty array also needs its shape."""
     text = f"np.array({array.tolist()!r}, dtype=float)"
     return text if array.size else f"{text}.reshape({array.shape})"
 
 
-# What a resolver made of one impact, as plain numbers: a reader of a counterexample need not call the resolver.
+# A resolver's answers to one impact, as plain numbers, so that readers of a counterexample need not call the resolver.
 @dataclass(frozen=True)
 class Struck:
-    """An impact and the velocity after it: once, or once for each budget of rows that the law tries.
+    """An impact and the velocity after it: one velocity, or one for each row budget that the law tries.
 
-    rows : (k,) rows that the resolver might use.
-    velocity_after : (k, d), NaN where the resolver gave no finite velocity; `complaint` says why.
+    rows : (k,) number of rows that the resolver may use.
+    velocity_after : (k, d), NaN if the resolver gave no finite velocity; `complaint` gives the reason.
     """
 
     case: ImpactCase
@@ -226,9 +226,9 @@ class Struck:
 
 
 def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
-    """Return what comes of a case of a part: by `resolver` or, in the engine's own parts, by the engine.
+    """Resolve a case of a part by `resolver` or, in the parts of ENGINE_LAWS, by the engine.
 
-    None where the case is no impact: a wall in the hand, two rooms, a device that limits an impulse.
+    Returns None if the case is not an impact, such as a wall in the hand, two rooms, or a device with force limits.
     """
     if not isinstance(case, ImpactCase):
         return None

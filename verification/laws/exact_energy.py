@@ -1,7 +1,8 @@
-"""Many adverse impacts through the compiled resolver, each judged exactly: none may gain energy; what that costs.
+"""Exact check that no adverse impact gains energy in the compiled resolver, and the energy that this guarantee costs.
 
-The families are those in which rounding gains most: light directions of M, rows nearly dependent, M asymmetric in the
-last bit, subnormal velocities, magnitudes over 600 decades, and unremarkable ones. Three quarters are elastic.
+The families are those in which rounding gains most: light directions of M, nearly dependent rows, M asymmetric in the
+last bit, subnormal velocities, and magnitudes over 600 decades; one family is ordinary. Three quarters of the impacts
+are elastic.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from verification.proofs.attack_kernel import resolve_batch
 Floats = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 LARGEST_COORDINATES, LARGEST_CONTACTS = 8, 8
-LEAST_MOVED = 0.9  # share of a family's impacts that must change v, or "none gains" says nothing of it
-SCALED = ("600 decades",)  # resolved as `resolve_impact` does it; the others as the compiled step does, in given units
+LEAST_MOVED = 0.9  # share of a family's impacts that must change v; otherwise "none gains" is no evidence
+SCALED = ("600 decades",)  # scaled as in `resolve_impact`; the other families stay in their units, as in compiled steps
 _BATCH = 5000
 
 
@@ -40,15 +41,18 @@ class Impacts(NamedTuple):
 
 @dataclass(frozen=True)
 class ExactEnergy:
-    """What came of the impacts of one family.
+    """Result for the impacts of one family.
 
     Attributes
     ----------
-    family : its name.  impacts, gains : how many, and how many gained energy, exactly.
-    by_integers, checked : decided by integers alone; bounds that integers confirmed.
-    moved : share of the impacts with v⁺ ≠ v⁻.  cancelled : impacts without any passive step, v⁺ = v⁻.
-    price : 0.5, 0.99 and 1-quantiles, over the impacts with e = 1, of the relative energy that passivity costs: the
-        loss beyond that of the same impact without clamp and last step, in units of 10 d ε √κ(M).
+    family : name of the family.
+    impacts, gains : number of impacts, and number of those that gained energy in exact arithmetic.
+    by_integers, checked : number of impacts that floating-point bounds left undecided, so that integers decided them,
+        and number of bounds that integers confirmed.
+    moved : share of the impacts with v⁺ ≠ v⁻.
+    cancelled : number of impacts without any passive step, for which v⁺ = v⁻.
+    price : 0.5, 0.99 and 1-quantiles, over the impacts with e = 1, of the relative energy that passivity costs. The
+        cost is the loss beyond that of the same impact without clamp and last step, in units of 10 d ε √κ(M).
     """
 
     family: str
@@ -62,12 +66,12 @@ class ExactEnergy:
 
     @property
     def holds(self) -> bool | None:
-        """No impact gained; None where too few moved for that to say anything."""
+        """Whether no impact gained energy; None if too few impacts changed v for a conclusion."""
         return False if self.gains else True if self.moved >= LEAST_MOVED else None
 
 
 def resolved(impacts: Impacts, clamped: bool = True, *, scale: bool = False) -> tuple[Floats, Floats]:
-    """Return v⁺ (n, d) and the clamps (n,); `scale`: by powers of two before and after, as `resolve_impact` does."""
+    """Return v⁺ (n, d) and the clamps (n,). `scale` applies powers of two before and after, like `resolve_impact`."""
     if not scale:
         return resolve_batch(impacts.mass, impacts.rows, impacts.v, impacts.restitution, clamped)
     found = resolve_impacts(impacts.mass, impacts.rows.transpose(0, 2, 1), impacts.v, impacts.restitution,
@@ -76,7 +80,7 @@ def resolved(impacts: Impacts, clamped: bool = True, *, scale: bool = False) -> 
 
 
 def ordinary(rng: np.random.Generator, n: int, d: int, c: int, decades: float = 3.0) -> Impacts:
-    """M of κ up to 10^decades, normal rows and velocities."""
+    """Draw M with κ up to 10^decades, and normally distributed rows and velocities."""
     basis = np.linalg.qr(rng.normal(size=(n, d, d)))[0]
     power = rng.uniform(0.0, decades, n)
     spectrum = 10.0 ** (-power[:, None] * np.linspace(0.0, 1.0, d))
@@ -88,7 +92,7 @@ def ordinary(rng: np.random.Generator, n: int, d: int, c: int, decades: float = 
 
 
 def light(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
-    """κ(M) to 1e12, v along the lightest direction, rows random in the kinetic metric."""
+    """Draw M with κ up to 1e12, v along the lightest direction, and rows that are random in the kinetic metric."""
     given = ordinary(rng, n, d, c, 12.0)
     values, vectors = np.linalg.eigh(given.mass)
     rows = (vectors * np.sqrt(np.abs(values))[:, None, :]) @ given.rows
@@ -96,14 +100,14 @@ def light(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
 
 
 def dependent(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
-    """Rows that differ by 1e-3 to 1e-14 of themselves."""
+    """Draw rows with relative differences between 1e-3 and 1e-14."""
     given = ordinary(rng, n, d, c, 6.0)
     noise = 10.0 ** -rng.uniform(3.0, 14.0, (n, 1, 1))
     return given._replace(rows=given.rows[:, :, :1] + noise * given.rows)
 
 
 def asymmetric(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
-    """Light directions, M moved by one unit in the last place above the diagonal."""
+    """Draw the family `light`, with M changed by one unit in the last place above the diagonal."""
     given = light(rng, n, d, c)
     upper = np.triu(np.ones((d, d), bool), 1)
     moved = np.nextafter(given.mass, np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf))
@@ -111,14 +115,14 @@ def asymmetric(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
 
 
 def subnormal(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
-    """Velocities of a few to some thousand units of 2⁻¹⁰⁷⁴."""
+    """Draw velocities of small integers times a power of two between 2⁻¹⁰⁷⁴ and 2⁻¹⁰⁵¹."""
     given = ordinary(rng, n, d, c)
     units = np.ldexp(1.0, rng.integers(-1074, -1050, n).astype(np.int32))[:, None]
     return given._replace(v=np.rint(4.0 * given.v) * units)
 
 
 def far_apart(rng: np.random.Generator, n: int, d: int, c: int) -> Impacts:
-    """Units of coordinates, of M and of v drawn over 600 decades: the energy still fits, some products do not."""
+    """Draw units of the coordinates, of M and of v over 600 decades: the energy fits a double, some products do not."""
     given = ordinary(rng, n, d, c)
     unit = 10.0 ** rng.uniform(-75.0, 75.0, (n, d))
     whole, speed = 10.0 ** rng.uniform(-120.0, 120.0, (n, 1)), 10.0 ** rng.uniform(-75.0, 75.0, (n, 1))
@@ -133,7 +137,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator, int, int, int], Impacts]] = {
 
 
 def exact_energy(family: str, impacts: int, seed: int = 0) -> ExactEnergy:
-    """Draw, resolve and judge the impacts of one family."""
+    """Draw and resolve the impacts of one family, and check each for an energy gain."""
     rng, gains, integers = np.random.default_rng([seed, *family.encode()]), 0, 0
     checked, moved, cancelled = 0, 0, 0
     prices: list[Any] = []
@@ -161,14 +165,14 @@ def _batches(family: str, impacts: int, rng: np.random.Generator) -> Iterator[Im
 
 @kernel
 def _relative_losses(masses, v, v_plus, lost):  # type: ignore[no-untyped-def]
-    """(KE⁻ − KE⁺)/KE⁻ in double-double, rounded once."""
+    """Write (KE⁻ − KE⁺)/KE⁻, computed in double-double and rounded once, into `lost`."""
     for k in range(v.shape[0]):
         high, low, _, _ = gain(masses[k], v[k], v_plus[k])
         lost[k] = -0.25 * (high + low) / kinetic_energies(masses[k], v[k], v_plus[k])[0]
 
 
 def _losses(given: Impacts, v_plus: Floats) -> Floats:
-    """Losses of the elastic impacts over 10 d ε √κ."""
+    """Return the relative losses of the elastic impacts, divided by 10 d ε √κ."""
     lost, elastic = np.empty(len(v_plus)), given.restitution == 1.0
     _relative_losses(given.mass, given.v, v_plus, lost)
     bound = 10.0 * v_plus.shape[1] * EPS * np.sqrt(given.condition)

@@ -1,7 +1,7 @@
-"""What every impact must keep: each law a function of a case, a resolver and bounds; `LAWS` names them.
+"""The laws of every impact; `LAWS` lists them by name.
 
-A law is a function (case, resolver, bounds) -> LawResidual, or None where it does not apply. To add one: write it here,
-and add a line to LAWS.
+A law is a function (case, resolver, bounds) -> LawResidual; it returns None if it does not apply. To add a law, write
+the function here and add a line to LAWS.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from verification.laws.resolver import Resolver, outcome, own_answer, own_outcom
 
 # Theorems 1 and 2: kinetic energy never rises, for every e in [−1, 1].
 def relative_gain(case: ImpactCase, v_plus: Floats) -> float:
-    """Return (KE⁺ − KE⁻)/KE⁻ of the given numbers in double-double; infinite where motion appears from rest."""
+    """Return (KE⁺ − KE⁻)/KE⁻ in double-double; infinite if motion appears from rest."""
     if not case.velocity.any():
         return np.inf if v_plus.any() else 0.0
     gain, bound = bulk_energy_gain(case.mass_matrix, case.velocity, v_plus)
@@ -28,13 +28,13 @@ def relative_gain(case: ImpactCase, v_plus: Floats) -> float:
 
 
 def kinetic_energy_never_rises(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """Relative gain against what rounding excuses."""
+    """Relative energy gain; the tolerance is the gain that rounding can cause."""
     return LawResidual("kinetic_energy", relative_gain(case, own_outcome(resolver, case)), bounds.energy_gain(case))
 
 
 # (15): J v⁺ = −e J v⁻ on every row, dependent rows included.
 def restitution_residual(case: ImpactCase, v_plus: Floats) -> float:
-    """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows cannot fail, and rest must stay rest."""
+    """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows give 0, and a system at rest must stay at rest."""
     unmet = np.abs(case.contact_jacobian @ v_plus + case.restitution * (case.contact_jacobian @ case.velocity))
     scale = np.linalg.norm(case.rows, axis=1) * case.speed
     relative = np.divide(unmet, scale, out=np.where(unmet > 0.0, np.inf, 0.0), where=scale > 0.0)
@@ -46,9 +46,9 @@ def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
     return LawResidual("restitution", restitution_residual(case, own_outcome(resolver, case)), bounds.restitution)
 
 
-# (9): the generalized impulse M(v⁺ − v⁻) is Jᵀp for some p. v⁺ = −e v⁻ keeps energy and restitution, not this.
+# (9): the generalized impulse M(v⁺ − v⁻) is Jᵀp for some p. v⁺ = −e v⁻ keeps energy and restitution but breaks (9).
 def impulse_comes_from_the_contacts(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Part of Δu outside the row space of A, relative to |u|."""
+    """Length of the part of Δu outside the row space of A, relative to |u|."""
     if not case.is_separated or case.speed == 0.0:
         return None
     change = case.lower.T @ (own_outcome(resolver, case) - case.velocity)
@@ -56,13 +56,13 @@ def impulse_comes_from_the_contacts(case: ImpactCase, resolver: Resolver, bounds
     return LawResidual("impulse_range", float(np.linalg.norm(outside)) / case.speed, bounds.comparison(case))
 
 
-# Motion that no contact sees is kept: f(v + z) = f(v) + z for every z with J z = 0.
+# Motion without any contact velocity is kept: f(v + z) = f(v) + z for every z with J z = 0.
 
 _SEED = 20050621  # the same z for the same case, so that a failure repeats
 
 
 def unseen_motion(case: ImpactCase) -> Floats:
-    """A z of kinetic size |u| with J z = 0, orthogonal to the row space of A."""
+    """Return a z with J z = 0 and kinetic norm |u|, or 0 if the rows span all directions."""
     w = np.random.default_rng(_SEED).normal(size=case.coordinates)
     w -= case.row_space.T @ (case.row_space @ w)
     w -= case.row_space.T @ (case.row_space @ w)
@@ -81,7 +81,7 @@ def free_motion_is_kept(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
 
 # C09: e = −1 is no impulse at all.
 def minus_one_is_no_impulse(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """Distance of v⁺ from v⁻; returning from whitened coordinates may round by ε √κ(M)."""
+    """Distance of v⁺ from v⁻; the tolerance covers the rounding ε √κ(M) of the return from whitened coordinates."""
     v_plus = outcome(resolver, replace(case, restitution=-1.0))
     tolerance = 100.0 * case.coordinates * EPS * float(case.condition**0.5)
     return LawResidual("no_impulse", case.distance(v_plus, case.velocity), tolerance)
@@ -91,14 +91,14 @@ def minus_one_is_no_impulse(case: ImpactCase, resolver: Resolver, bounds: Bounds
 def elastic_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
     """|KE⁺ − KE⁻| / KE⁻ of the case with e = 1."""
     elastic = replace(case, restitution=1.0)
-    # A loss may also be the clamp's, which gives back Cholesky's error: d ε κ(M), whatever the gain's bound.
+    # The clamp may cause a loss up to Cholesky's error d ε κ(M), which can exceed the bound of the gain.
     tolerance = max(bounds.energy_gain(case), bounds.comparison(case))
     return LawResidual("elastic", abs(relative_gain(elastic, outcome(resolver, elastic))), tolerance)
 
 
 # Momentum: a translation of all bodies changes no contact velocity, so its momentum is conserved, in every frame.
 #
-# Energy alone does not see the paper's per-body rows (13)-(14); this does.
+# The energy law alone does not detect the paper's per-body rows (13)-(14); this law does.
 def momentum_is_conserved(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
     """Largest of |zᵀM(v⁺ − v⁻)| / (|z|_M |u|) and of the distance of f(v + z) from f(v) + z over translations z."""
     found = _change_and_ride(case, resolver)
@@ -106,12 +106,12 @@ def momentum_is_conserved(case: ImpactCase, resolver: Resolver, bounds: Bounds) 
 
 
 def momentum_is_conserved_unequal(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """The same, each over its tolerance, for restitutions that differ.
+    """The law of momentum for unequal restitutions; each of the two residuals is divided by its own tolerance.
 
-    There the sign of a contact's velocity matters, and a contact that grazes within the restitution's tolerance may be
-    taken for approaching in one frame and for leaving in another. And an impulse |Δu| ≤ √g |u| moves less energy than
-    the gain g that rounding excuses: the clamp that keeps passivity may cut it in one frame (of speed 2|u| at most) and
-    leave it in another. The momentum itself has no such excuse.
+    With unequal restitutions the sign of a contact's velocity matters, and a grazing contact within the restitution's
+    tolerance may approach in one frame and separate in another. In addition, an impulse |Δu| ≤ √g |u| changes the
+    energy by less than the gain g that rounding can cause, so the clamp may remove it in one frame (of speed 2|u| at
+    most) and keep it in another. Neither reason applies to the momentum itself.
     """
     found = _change_and_ride(case, resolver)
     if found is None:
@@ -122,7 +122,7 @@ def momentum_is_conserved_unequal(case: ImpactCase, resolver: Resolver, bounds: 
 
 
 def _change_and_ride(case: ImpactCase, resolver: Resolver) -> tuple[float, float] | None:
-    """Largest change of momentum, and largest distance of f(v + z) from f(v) + z."""
+    """Return the largest relative change of momentum and the largest distance of f(v + z) from f(v) + z, or None."""
     if case.translations is None or case.speed == 0.0 or not case.is_separated:
         return None
     v_plus, changed, apart = own_outcome(resolver, case), 0.0, 0.0
@@ -135,9 +135,9 @@ def _change_and_ride(case: ImpactCase, resolver: Resolver) -> tuple[float, float
     return changed, apart
 
 
-# C03, (25) and (33): redundant rows give the velocity that any maximal independent subset gives.
+# C03, (25) and (33): all rows together give the same velocity as any maximal independent subset of them.
 def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of the outcomes with all rows and with independent ones."""
+    """Distance between the velocities with all rows and with independent ones only."""
     rank = len(case.row_space)
     if not case.is_separated or rank == 0 or rank == case.contacts:
         return None
@@ -150,9 +150,9 @@ def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bound
     return LawResidual("redundancy", distance, tolerance)
 
 
-# A contact that is reported twice is one contact.
+# Reporting a contact twice does not change the outcome.
 def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of the outcomes without and with copies of the first rows."""
+    """Distance between the velocities without and with copies of the first rows."""
     if not case.is_separated or case.contacts == 0:
         return None
     copies = case.contact_jacobian[: (case.contacts + 1) // 2]
@@ -163,9 +163,9 @@ def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds:
     return LawResidual("duplicated_rows", distance, bounds.comparison(case))
 
 
-# The order in which contacts are listed carries no meaning.
+# The order of the contacts does not change the outcome.
 def row_order_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of the outcomes with the rows as given and reversed."""
+    """Distance between the velocities with the rows as given and in reverse order."""
     if not case.is_separated or case.contacts < 2:
         return None
     reversed_rows = replace(case, contact_jacobian=case.contact_jacobian[::-1].copy())
@@ -173,14 +173,14 @@ def row_order_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     return LawResidual("row_order", distance, bounds.comparison(case))
 
 
-# A row times a positive number is the same contact in other units: by powers of two bit for bit, else to ε/σ.
+# A row times a positive number is the same contact in other units. Powers of two change no bit, other factors ε/σ.
 
 _POWERS = np.array([0, 7, -5, 12, -11, 3])
 _FACTORS = np.array([3.0, 0.1, 7e2, 1.0, 1.3e-3])
 
 
 def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of the outcomes; infinite where a power of two changed a bit and that was promised."""
+    """Distance between the velocities; infinite if a power of two changed a bit although the bounds forbid it."""
     if not case.is_separated or case.contacts == 0:
         return None
     plain = own_outcome(resolver, case)
@@ -219,7 +219,7 @@ def units_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
     return LawResidual("units", distance, tolerance)
 
 
-# C06: any other coordinates q' = T⁻¹q give the same motion, v'⁺ = T⁻¹v⁺.
+# C06: other coordinates q' = T⁻¹q give the same motion, v'⁺ = T⁻¹v⁺.
 def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
     """Distance of v⁺ from T v'⁺ with T = 1 + a cyclic shift / 2, of condition at most 3."""
     if not case.is_separated:
@@ -241,9 +241,9 @@ def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     return LawResidual("coordinates", distance, tolerance)
 
 
-# Two groups of bodies that share no contact, resolved together or apart, move the same.
+# Two groups of bodies without common contacts move the same, whether resolved together or separately.
 def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of the outcomes of the group and its mirror image resolved together and apart."""
+    """Distance between the velocities of the case and its mirror image, resolved together and separately."""
     if not case.is_separated or case.speed == 0.0:
         return None
     d = case.coordinates
@@ -269,18 +269,18 @@ def _blocks(one: Floats, other: Floats) -> Floats:
     return joined
 
 
-# A resolver is a function: the same impact gives the same bits, whatever was resolved in between.
+# The same impact gives the same bits, even if another impact was resolved in between.
 def same_input_same_output(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """0 where the bits agree, else 1, against a tolerance of 0."""
+    """0 if the bits agree, else 1; the tolerance is 0."""
     first = own_outcome(resolver, case)
     outcome(resolver, replace(case, contact_jacobian=case.contact_jacobian[::-1] + 0.5, velocity=-case.velocity))
     again = outcome(resolver, case)
     return LawResidual("repeatability", 0.0 if np.array_equal(first, again) else 1.0, 0.0)
 
 
-# A resolver reads its arguments and writes its result elsewhere: the caller goes on using M, J and v⁻.
+# A resolver must not write to its arguments, because the caller continues to use M, J and v⁻.
 def arguments_are_left_alone(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """Number of arguments that the call has changed; none is allowed."""
+    """Number of arguments that the call has changed; the tolerance is 0."""
     return LawResidual("arguments", float(own_answer(resolver, case).changed), 0.0)
 
 
@@ -288,7 +288,7 @@ Check = Callable[[ImpactCase, Resolver, Bounds], LawResidual | None]
 
 
 class Law(NamedTuple):
-    """A law, in words and as a check."""
+    """A law: its statement in words and its check."""
 
     statement: str
     check: Check
@@ -313,10 +313,10 @@ LAWS: dict[str, Law] = {
     "arguments": Law("the arguments are left as they were", arguments_are_left_alone),
 }
 
-# Laws that need no answer but that of the impact itself, which they share.
+# Laws that need only the answer for the impact itself; they share this answer.
 OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
 
-# What holds for any law of unequal restitution, whatever it says of the separation velocities.
+# Laws that hold for any rule of unequal restitution, whatever separation velocities it prescribes.
 UNEQUAL_LAWS: dict[str, Law] = {
     f"unequal_{name}": Law(f"{LAWS[name].statement}, unequal e", LAWS[name].check)
     for name in ("kinetic_energy", "impulse_range", "momentum", "repeatability", "arguments")

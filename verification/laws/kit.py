@@ -1,4 +1,5 @@
-"""`check_passivity(resolver)`: does anybody's impact resolver ever create energy, and does it keep the other laws?"""
+"""`check_passivity(resolver)` tests whether an impact resolver ever creates energy and whether it keeps the other laws.
+"""
 
 from __future__ import annotations
 
@@ -31,18 +32,19 @@ from verification.laws.resolver import Answer, Resolver, ResolverFault, Watched,
 
 @dataclass(frozen=True)
 class LawVerdict:
-    """What became of one law over all impacts.
+    """Verdict on one law over all impacts.
 
     Attributes
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
-    severe : failures by more than rounding excuses; all of them, but for ``exact_energy``.
+    severe : number of failures that are larger than rounding; equal to `failures` except for ``exact_energy``.
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
-    largest_case : the impact that breaks the law with the largest residual; None if none does.
-    smallest_case : the impact with the fewest coordinates and contacts that breaks it, by 1e-6 or more if one does.
-    fault : first complaint where the resolver raised or returned nothing usable.
-    error : what the law itself raised; it was not tried any further.
+    largest_case : the impact that breaks the law with the largest residual; None if no impact breaks it.
+    smallest_case : the impact with the fewest coordinates and contacts that breaks the law; impacts with a residual of
+        1e-6 or more take precedence.
+    fault : first message if the resolver raised an exception or returned an unusable value.
+    error : exception that the law itself raised, after which it was not tried again; else None.
     """
 
     law: str
@@ -60,7 +62,7 @@ class LawVerdict:
 
     @property
     def passed(self) -> bool:
-        """No impact broke the law, and the law could be tried."""
+        """Whether no impact broke the law and the law itself raised no exception."""
         return self.failures == 0 and self.error is None
 
     def __str__(self) -> str:
@@ -74,16 +76,16 @@ class LawVerdict:
 
 @dataclass(frozen=True, eq=False)
 class PassivityReport(str):
-    """Verdict of `check_passivity`. It is a string, its own text: pytest shortens any other message of an assert.
+    """Report of `check_passivity`. It is a string with its own text, because pytest shortens other assert messages.
 
     Attributes
     ----------
-    impacts : random impacts that every law was tried on, after the contract's own first ones.
-    unfinished : why these are fewer than were asked for; empty if they are not.
-    counterexample, counterexample_law : the smallest one found, of the first broken law; None if there is none.
-    returned : (d,) v⁺ that the resolver gave for it, or what is wrong with its answer.
-    contract : what the resolver was taken for; `verification.laws.contracts`.
-    tested : the resolver, for the import line of the pasted test.
+    impacts : number of random impacts tried, not counting the contract's fixed first ones.
+    unfinished : why fewer impacts were tried than requested; empty if all were tried.
+    counterexample, counterexample_law : smallest counterexample found, for the first broken law; None if there is none.
+    returned : (d,) v⁺ that the resolver gave for the counterexample, or a text that says why its answer is unusable.
+    contract : contract that the resolver was tested against; see `verification.laws.contracts`.
+    tested : the resolver, for the import line of the generated test.
     """
 
     resolver: str
@@ -99,20 +101,20 @@ class PassivityReport(str):
     returned: Floats | str = ""
 
     def __new__(cls, *fields: Any, **named: Any) -> PassivityReport:
-        """The text is that of the fields."""
+        """Make the string from the text of the fields."""
         draft = str.__new__(cls)
         draft.__init__(*fields, **named)  # type: ignore[misc]
         return str.__new__(cls, draft._text())
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        """What makes the same report again in another process."""
+        """Arguments that recreate the report in another process."""
         return tuple(getattr(self, one.name) for one in fields(self))
 
     __repr__ = __str__ = str.__str__
 
     @property
     def passed(self) -> bool:
-        """Every law holds on every impact asked for."""
+        """Whether every law holds on every requested impact."""
         return not self.unfinished and all(verdict.passed for verdict in self.verdicts)
 
     @property
@@ -122,7 +124,7 @@ class PassivityReport(str):
 
     @property
     def worst(self) -> LawVerdict:
-        """The law that came closest to its tolerance, or exceeded it most."""
+        """The law with the largest value / tolerance."""
         return max(self.verdicts, key=lambda verdict: verdict.worst.ratio if verdict.worst else 0.0)
 
     def verdict(self, law: str) -> LawVerdict:
@@ -130,7 +132,7 @@ class PassivityReport(str):
         return next(verdict for verdict in self.verdicts if verdict.law == law)
 
     def raise_if_broken(self) -> None:
-        """Raise the report as an error unless it passed: M, J, v, e and what was returned are in the message.
+        """Raise the report as an error unless it passed; the message contains M, J, v, e and the returned velocity.
 
         Raises
         ------
@@ -142,7 +144,7 @@ class PassivityReport(str):
 
     @property
     def counterexample_test(self) -> str:
-        """The counterexample as a test to paste, or an empty text."""
+        """The counterexample as source code of a test, or an empty text if there is none."""
         if self.counterexample is None:
             return ""
         return as_test(self.counterexample, self.counterexample_law, self.bounds, self.tested, self.contract)
@@ -167,7 +169,7 @@ class PassivityReport(str):
 
 
 def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
-    """Lines with every argument of the case, and what came back."""
+    """Yield lines with every argument of the case and with the returned value."""
     names = ("M", "J", "v", "e") if case.tangents is None else ("M", "J", "T", "v", "e", "μ")
     for name, value in (*zip(names, case.given(), strict=True), ("returned", returned)):
         text = value if isinstance(value, str) else np.array2string(np.asarray(value), precision=9, threshold=400)
@@ -177,7 +179,7 @@ def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
 
 @dataclass
 class Tally:
-    """Counts, and the worst case so far."""
+    """Running counts and worst cases of one law."""
 
     name: str
     law: Law
@@ -191,11 +193,11 @@ class Tally:
     worst_case: ImpactCase | None = field(default=None, repr=False)
     largest_failure: float = -np.inf
     largest_case: ImpactCase | None = field(default=None, repr=False)
-    smallest: tuple[bool, int] = (True, 0)  # of the smallest case: whether it breaks the law by little, its size
+    smallest: tuple[bool, int] = (True, 0)  # smallest case: whether its residual is below NOTABLE, and its size
     smallest_case: ImpactCase | None = field(default=None, repr=False)
 
     def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
-        """Try one impact; a law that raises is not tried again."""
+        """Try the law on one impact; a law that raises an exception is not tried again."""
         if self.error is not None:
             return
         try:
@@ -219,7 +221,7 @@ class Tally:
             self.smallest, self.smallest_case = size, case
 
     def verdict(self) -> LawVerdict:
-        """What became of it."""
+        """Return the verdict so far."""
         return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
                           self.largest, self.largest_case, self.fault, self.error, self.severe, self.smallest_case)
 
@@ -229,7 +231,7 @@ def _size(case: ImpactCase) -> int:
 
 
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
-    """The law's residual; infinite, with the complaint, where the resolver gave nothing usable."""
+    """Return the law's residual and ""; if the answer is unusable, an infinite residual and the resolver's fault."""
     try:
         return law.check(case, resolver, bounds), ""
     except ResolverFault as fault:
@@ -238,7 +240,7 @@ def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) 
 
 @dataclass(frozen=True)
 class LawCount:
-    """One law over some cases; `worst` is the residual nearest to its tolerance, or furthest above it."""
+    """Counts of one law over some cases; `worst` is the residual with the largest value / tolerance."""
 
     law: str
     checked: int
@@ -248,7 +250,7 @@ class LawCount:
 
 @dataclass
 class RunningCount:
-    """The same in the making, case by case."""
+    """Running counts of one law, updated case by case."""
 
     checked: int = 0
     failures: int = 0
@@ -256,7 +258,7 @@ class RunningCount:
     worst_ratio: float = -np.inf
 
     def add(self, residual: LawResidual) -> bool:
-        """Count one case; return whether it keeps the law."""
+        """Count one case; return whether the law holds in it."""
         ratio = residual.ratio
         self.checked += 1
         self.failures += not ratio <= 1.0
@@ -265,7 +267,7 @@ class RunningCount:
         return ratio <= 1.0
 
     def count(self, law: str) -> LawCount:
-        """What there is so far."""
+        """Return the counts so far."""
         return LawCount(law, self.checked, self.failures, self.worst)
 
 
@@ -277,16 +279,16 @@ def added(one: LawCount, other: LawCount) -> LawCount:
 
 
 def residual_count(residuals: Iterable[LawResidual]) -> LawCount:
-    """Count many cases of one law."""
+    """Return the counts of one law from the residuals of many cases."""
     total = RunningCount()
     for residual in residuals:
         total.add(residual)
     return total.count("")
 
 
-NOTABLE = 1e-6  # a counterexample with a residual above this is looked for first: nobody calls it rounding
-IMPACTS = 5000  # by default: about a minute for a resolver of 50 µs a call
-PATIENCE = 600.0  # [s] ten times that
+NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
+IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
+PATIENCE = 600.0  # [s] ten times as long
 
 
 def check_passivity(
@@ -315,24 +317,24 @@ def check_passivity(
         velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
     laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract except ``exact_energy``,
         which allows no rounding error.
-    impacts : random impacts. ``equality``: up to 10 coordinates and 21 contacts; one in ten has up to 40 and 500 and
-        fewer laws. Half of them come in other units: M, J and v times powers of two from 1e-8 to 1e8.
-        `impacts.ADVERSE` more come first: elastic ones on nearly equal rows. The other contracts: up to 6 coordinates
-        and 6 contacts, no nearly dependent rows.
-    seed : of the draw; the same seed gives the same impacts.
-    search : examples hypothesis may try to find and shrink a counterexample (0 = shrink the drawn one only).
-    bounds : tolerances; default: the contract's, of `verification.laws.bounds`.
+    impacts : number of random impacts. ``equality``: up to 10 coordinates and 21 contacts; one impact in ten has up to
+        40 coordinates and 500 contacts, and fewer laws check it. Half of the impacts use other units: M, J and v are
+        multiplied by powers of two from 1e-8 to 1e8. `impacts.ADVERSE` elastic impacts on nearly equal rows come first,
+        in addition. Other contracts: up to 6 coordinates and 6 contacts, no nearly dependent rows.
+    seed : seed of the random numbers; the same seed gives the same impacts.
+    search : number of examples that hypothesis may try to find and shrink a counterexample (0 = shrink a drawn one).
+    bounds : tolerances; default: those of the contract, from `verification.laws.bounds`.
     largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2 (``frictional``).
     unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and test
         the laws that hold for every such rule: no energy gain, M(v⁺ − v⁻) in range(Jᵀ), momentum, repeatable bits,
         unchanged arguments.
-    patience : seconds after which no further impact is tried; the report then fails and says why.
-    progress : called with (impacts done, impacts) after each.
+    patience : time limit [s] after which no further impact is tried; the report then fails and says why.
+    progress : called with (impacts done, impacts) after each impact.
 
     Returns
     -------
     PassivityReport
-        `passed`, each law with its worst case, and the smallest counterexample found, as a test to paste.
+        `passed`, each law with its worst case, and the smallest counterexample found, also as a test to paste.
 
     Raises
     ------
@@ -342,11 +344,11 @@ def check_passivity(
 
     Notes
     -----
-    The energy of every answer is judged, about twelve answers for each impact. A fault that occurs in a share p of the
-    calls is found in n calls with probability 1 − (1 − p)ⁿ: with the default of 5,000 impacts (n ≈ 58,000) this is 95 %
-    for p = 5e-5 and 16 % for p = 3e-6. The kit does not find rarer faults, gains below `bounds` (at most 1e-7), faults
+    The kit checks the energy of every answer, about twelve answers for each impact. It finds a fault that occurs in a
+    share p of the calls with probability 1 − (1 − p)ⁿ in n calls. With the default of 5,000 impacts (n ≈ 58,000) this
+    is 95 % for p = 5e-5 and 16 % for p = 3e-6. The kit misses rarer faults, gains below `bounds` (at most 1e-7), faults
     beyond 40 coordinates (80 for laws that double them) or 750 contacts, faults with units beyond eight decades, and
-    answers that depend on the clock.
+    faults that depend on the time of the call.
 
     Examples
     --------
@@ -383,7 +385,7 @@ def _contract(name: str, unequal_restitution: bool) -> Contract:
 
 
 def _refuse_signature(resolver: Resolver, contract: str) -> None:
-    """Refuse a function that cannot be called as the contract calls it: no law would say more than that."""
+    """Raise ArgumentError if the resolver cannot be called with the arguments of the contract."""
     friction = contract == "frictional"
     wanted = ("mass_matrix", "contact_jacobian", *["tangents"] * friction, "velocity", "restitution",
               *["friction"] * friction)
@@ -397,12 +399,12 @@ def _refuse_signature(resolver: Resolver, contract: str) -> None:
 
 
 def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: bool = False) -> dict[str, Law]:
-    """Return the laws of a contract by name, all but the optional ones unless `laws` names some.
+    """Return the laws of a contract by name: those in `laws`, or all but the optional ones if `laws` is None.
 
     Raises
     ------
     ArgumentError
-        The contract has no law of that name; the message lists those it has.
+        The contract has no law of that name; the message lists the laws that it has.
     """
     terms = _contract(contract, unequal_restitution)
     known = terms.laws | (UNEQUAL_LAWS if unequal_restitution else {})
@@ -434,7 +436,7 @@ class _Draw:
 
 def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
-    """Put every impact to its laws; return for how many random ones there was time."""
+    """Check every impact against its laws; return the number of random impacts tried within the time limit."""
     watched = Watched(resolver)
     for done, case, mixed in _drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)):
         for name in _laws_for(case, done, tuple(tallies)):
@@ -452,7 +454,7 @@ def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw
 
 
 def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[str]:
-    """Every law; of a large impact those of one call, and of the others one in turn."""
+    """Yield every law; for a large impact only the laws that need one call, and one of the others in turn."""
     large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
     for k, name in enumerate(laws):
         if not large or name.removeprefix("unequal_") in OF_ONE_CALL or (number // LARGE_EVERY - k) % len(laws) == 0:
@@ -462,7 +464,7 @@ def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[
 def _judge_energy(
     tallies: dict[str, Tally], case: ImpactCase, v_plus: Any, resolver: Resolver, bounds: Bounds
 ) -> None:
-    """Put the answer that a law was given for a variant of an impact to the law of energy, without asking again."""
+    """Check the energy of an answer that another law got for a variant of an impact, without another call."""
     own = replace(case, family=f"{case.family}, a variant of it that another law tried")
     own._answers[id(resolver)] = resolver, Answer(v_plus, 0)
     name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
@@ -471,8 +473,8 @@ def _judge_energy(
 
 
 def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
-    """Yield the contract's first impacts, numbered up to 0, then the random ones from 1: each with one e, and with
-    unequal ones if that is asked for.
+    """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts have number 0, the random
+    ones count from 1. Without `unequal` the variant is the impact itself.
     """
     rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
     first = draw.contract.first(adverse)
@@ -486,7 +488,7 @@ def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, Impact
 def _counterexample(
     law: Law, broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float, contract: str
 ) -> ImpactCase | None:
-    """The smallest one found, by hypothesis or among the impacts drawn, shrunk as far as there is time."""
+    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk until the time limit."""
     kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
     for least in (NOTABLE, 0.0):
         fails = partial(_fails, law, resolver, bounds, least, ends)
@@ -499,7 +501,7 @@ def _counterexample(
 
 
 def _fails(law: Law, resolver: Resolver, bounds: Bounds, least: float, ends: float, case: ImpactCase) -> bool:
-    """Whether the law is broken, by at least `least`; never when the time is over."""
+    """Whether the case breaks the law with a residual of at least `least`; False after the time limit."""
     if time.monotonic() > ends:
         return False
     residual, _ = residual_of(law, case, resolver, bounds)

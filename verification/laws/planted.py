@@ -1,4 +1,4 @@
-"""Resolvers with one planted bug each, made from the sound one, and the law that must catch each."""
+"""Resolvers with one planted bug each, made from the correct resolver, and the law that must detect each bug."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from verification.laws.resolver import (
     whitened,
 )
 
-TOO_MUCH = Fraction(10001, 10000)  # of the impulse that e asks for
+TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
 
 
 def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -48,7 +48,7 @@ def too_tight_rank(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """L where Lᵀ belongs."""
+    """Uses L instead of Lᵀ."""
     parts = whitened(M, J, v)
     Q, u = row_space(parts.rows), parts.lower @ v
     return np.linalg.solve(parts.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
@@ -59,17 +59,17 @@ def forgotten_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def diagonal_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Coupling between coordinates dropped."""
+    """Ignores the coupling between coordinates in M."""
     return projecting(np.diag(np.diag(M)), J, v, 1.0 + e)
 
 
 def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Keeps energy and restitution, and needs no contact at all."""
+    """Returns −e v: this keeps energy and restitution but ignores the contacts."""
     return -e * v
 
 
 def one_after_the_other(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Each contact resolved once, in order: later ones undo earlier ones."""
+    """Resolves each contact once, in order, so later contacts undo earlier ones."""
     parts = whitened(M, J, v)
     u = parts.u.copy()
     for row in parts.rows:
@@ -78,31 +78,31 @@ def one_after_the_other(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def double_counted(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Impulses of all contacts added as if each were alone."""
+    """Adds the impulses that each contact would need alone."""
     parts = whitened(M, J, v)
     return back(parts, parts.u - (1.0 + e) * (parts.rows.T @ (parts.rows @ parts.u)))
 
 
 def approaching_only(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Leaves out the rows that separate, which the caller chose to give."""
+    """Drops the rows with a separating velocity, although the caller included them."""
     return sound_resolver(M, J[J @ v < 0.0], v, e)
 
 
 def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Adhesive impulses set to zero one by one."""
+    """Sets each pulling impulse to zero separately."""
     parts = whitened(M, J, v)
     p = -(1.0 + e) * (np.linalg.pinv(parts.rows.T, rcond=RANK_CUT) @ parts.u)
     return back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
 
 
 def printed_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """(21) as printed, with numpy's classical cutoff: W squares the condition number, pinv inverts noise."""
+    """(21) as printed, with numpy's classical cutoff: W squares the condition number, and pinv inverts noise."""
     X = np.linalg.solve(M, J.T)
     return v - (1.0 + e) * (X @ (np.linalg.pinv(J @ X, rcond=1e-15) @ (J @ v)))
 
 
 def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """(13)-(14): the two bodies of a self-collision are reversed separately (here: positive and negative entries)."""
+    """(13)-(14): reverses the two bodies of a self-collision separately (here: positive and negative entries)."""
     split = np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)])
     return sound_resolver(M, split, v, e)
 
@@ -112,14 +112,14 @@ def single_precision(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def damped_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """(W + λI)⁻¹ with a λ that one can see."""
+    """Uses (W + λI)⁻¹ with a λ far above rounding."""
     X = np.linalg.solve(M, J.T)
     W = J @ X
     return v - (1.0 + e) * (X @ np.linalg.solve(W + 1e-3 * np.eye(len(W)), J @ v))
 
 
 def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Rank decided on rows of unlike scale: the small ones are lost."""
+    """Decides the rank without scaling the rows, so short rows are lost."""
     lower = np.linalg.cholesky(M)
     rows = np.linalg.solve(lower, J.T).T
     _, values, right = np.linalg.svd(rows, full_matrices=False)
@@ -137,38 +137,38 @@ def absolute_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def nearly_elastic(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Loses 1e-4 of what it should return."""
+    """Gives 1e-4 less of the impulse than e requires."""
     return projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))
 
 
 def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Returns 1e-4 more than it should; the outcome of exact rationals, rounded once: the same under every BLAS."""
+    """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits under every BLAS."""
     before = [Fraction(x) for x in v.tolist()]
     exact = exact_impact(M, J, v, e).velocity
     return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
 
 
 def one_gradient_step(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """An iteration stopped after its first step, which depends on how often a row is there."""
+    """Stops an iteration after its first step, which depends on how often a row is repeated."""
     parts = whitened(M, J, v)
     largest = np.linalg.norm(parts.rows, 2) ** 2 if parts.rows.any() else 1.0
     return back(parts, parts.u - (1.0 + e) / largest * (parts.rows.T @ (parts.rows @ parts.u)))
 
 
 def short_rows_dropped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """A threshold on a length that depends on the units."""
+    """Drops rows below a fixed length, which depends on the units."""
     return sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e)
 
 
 def three_rows_at_most(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """A budget that all groups share."""
+    """Uses at most three rows for all groups together."""
     parts = whitened(M, J, v)
     Q = row_space(parts.rows)[:3]
     return back(parts, parts.u - (1.0 + e) * (Q.T @ (Q @ parts.u)))
 
 
 def makes_warm_start() -> Resolver:
-    """Starts from what is left of the call before."""
+    """Returns a resolver whose answer depends on the previous call."""
     left = [0.0]
 
     def warm_start(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -184,7 +184,7 @@ def nan_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def column_of_velocities(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Shape (d, 1)."""
+    """Returns v⁺ with shape (d, 1)."""
     return sound_resolver(M, J, v, e)[:, None]
 
 
@@ -198,7 +198,7 @@ def gives_up(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def makes_stale_jacobian() -> Resolver:
-    """Remembers the Jacobian of the first call of each shape."""
+    """Returns a resolver that reuses the Jacobian of the first call with each shape."""
     remembered: dict[tuple[int, ...], Floats] = {}
 
     def stale_jacobian(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -208,7 +208,7 @@ def makes_stale_jacobian() -> Resolver:
 
 
 def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
-    """Newton's law as equalities with a restitution per row: met on every row, and it makes energy."""
+    """Newton's law as equalities with a restitution per row: every row meets it, but it can create energy."""
     if np.ndim(e) == 0:
         return sound_resolver(M, J, v, float(e))
     parts = whitened(M, J, v)
@@ -217,14 +217,14 @@ def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats)
 
 
 class PlantedBug(NamedTuple):
-    """A bug by name: how to make the resolver, and a law that must catch it (others may as well)."""
+    """A bug: a function that makes the resolver, and a law that must detect it (other laws may detect it, too)."""
 
     make: Callable[[], Resolver]
     caught_by: str
 
 
 def plain(resolver: Resolver, caught_by: str) -> PlantedBug:
-    """A bug of a resolver that remembers nothing."""
+    """Return the planted bug of a resolver without memory."""
     return PlantedBug(lambda: resolver, caught_by)
 
 

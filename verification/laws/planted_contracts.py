@@ -1,4 +1,4 @@
-"""Textbook resolvers whose contacts only push, without and with friction, and the same with one planted bug each."""
+"""Textbook resolvers whose contacts only push, without and with friction, and variants with one planted bug each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _squared_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def _too_bouncy(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Leaves faster than e asks for; no inequality is broken, and energy need not rise."""
+    """Uses √e instead of e: contacts separate too fast, but no inequality is broken and energy need not rise."""
     return newton(M, J, v, float(np.sqrt(e)))
 
 
@@ -39,12 +39,12 @@ def _wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def _adhesive(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Stops what separates as well."""
+    """Also stops contacts that separate."""
     return sound_resolver(M, J[J @ newton(M, J, v, e) > 0.0], newton(M, J, v, e), 0.0)
 
 
 def _one_sweep(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Each contact once, in order: later ones undo earlier ones."""
+    """Resolves each contact once, in order, so later contacts undo earlier ones."""
     for row in J:
         v = newton(M, row[None], v, e)
     return v
@@ -55,16 +55,16 @@ def _forgotten_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def _slow_contacts_ignored(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """A threshold in m/s."""
+    """Ignores contacts that approach more slowly than 0.01 m/s."""
     return newton(M, J[J @ v < -0.01], v, e)
 
 
 def _plastic_where_some_separate(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Forgets e where some contacts separate."""
+    """Uses e = 0 if some contacts separate."""
     return newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e)
 
 
-# Friction: Moreau's law. The plastic impact obeys Coulomb's law, and e returns a share of all of it; so it is passive.
+# Friction: Moreau's law. The plastic impact obeys Coulomb's law; e scales its whole impulse by 1 + e. This is passive.
 def _plastic(M: Floats, J: Floats, T: Floats, v: Floats, mu: Floats, e: float = 0.0) -> tuple[Floats, Floats]:
     """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over the contacts."""
     c, m = len(J), T.shape[1]
@@ -81,18 +81,18 @@ def _struck(M: Floats, J: Floats, T: Floats, v: Floats, p: Floats, p_t: Floats) 
 
 
 def moreau(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """(v⁺ + e v⁻)/(1 + e) obeys Coulomb's law with e = 0 (Moreau 1988): passive for every e in [0, 1]."""
+    """Moreau (1988): (v⁺ + e v⁻)/(1 + e) obeys Coulomb's law with e = 0; passive for every e in [0, 1]."""
     p, p_t = _plastic(M, J, T, v, mu)
     return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * p_t)
 
 
 def _newton_and_coulomb(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Newton's e on the normals beside Coulomb's friction: it may gain energy (Kane and Levinson 1985)."""
+    """Newton's e on the normals and Coulomb's friction: may gain energy (Kane and Levinson 1985)."""
     return _struck(M, J, T, v, *_plastic(M, J, T, v, mu, e))
 
 
 def _friction_pushes(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Friction along the sliding, not against it."""
+    """Friction pushes in the direction of sliding, not against it."""
     p, p_t = _plastic(M, J, T, v, mu)
     return _struck(M, J, T, v, (1.0 + e) * p, -(1.0 + e) * p_t)
 
@@ -110,7 +110,7 @@ def _less_friction_returned(M: Floats, J: Floats, T: Floats, v: Floats, e: float
 
 
 def _pulls(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Every normal an equality, and no friction."""
+    """Treats every normal row as an equality and has no friction."""
     return sound_resolver(M, J, v, e)
 
 
@@ -124,7 +124,7 @@ def _strikes_what_separates(M: Floats, J: Floats, T: Floats, v: Floats, e: float
 
 
 def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Half of what Coulomb's law gives where it slides: inside the cone, passive, and too little."""
+    """Halves the friction of sliding contacts: this stays inside the cone and is passive, but breaks Coulomb's law."""
     p, p_t = _plastic(M, J, T, v, mu)
     limit = mu * p * (1.0 - 1e-9)
     share = np.where(np.linalg.norm(p_t, axis=1) < limit, 1.0, 0.5)
@@ -132,7 +132,7 @@ def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Flo
 
 
 def _friction_of_one_alone(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """No friction where there is more than one contact."""
+    """Drops friction if there is more than one contact."""
     return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
 
 

@@ -1,4 +1,4 @@
-"""One fault for each law of `engine_laws`, a subject; and one for each law of a trajectory, a run that went wrong."""
+"""One planted fault for each law of `engine_laws` (a faulty subject) and for each trajectory law (a faulty run)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ from verification.stability.device_loop import DeviceLoop, actuator_forces
 
 
 def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Floats:
-    """The first rows as they are, each with the impulse it would need alone: exact for one row, not for more."""
+    """Uses the first rows without orthogonalization, each with the impulse that it would need alone.
+
+    The result is exact for one row only.
+    """
     lower = np.linalg.cholesky(M)
     rows, u = np.linalg.solve(lower, J[:budget].T).T, lower.T @ v
     length = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -29,7 +32,7 @@ def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Fl
 
 
 def makes_late_wall() -> Wall:
-    """Pushes by the reading before the last one."""
+    """Returns a wall whose spring uses the previous reading of the depth."""
     before = [0.0]
 
     def late_wall(depth: float, rate: float, K: float, B: float) -> float:
@@ -40,7 +43,7 @@ def makes_late_wall() -> Wall:
 
 
 def one_factor_for_all(case: SceneCase) -> Run:
-    """Each impact, whoever it strikes, takes a thousandth of everybody's velocity at the end of its step."""
+    """Multiplies the velocities of all bodies by 0.999 for each impact, at the end of its step."""
     run = case.simulate()
     factor = np.ones(len(run.time))
     np.multiply.at(factor, run.impacts.step + 1, 0.999)
@@ -48,7 +51,7 @@ def one_factor_for_all(case: SceneCase) -> Run:
 
 
 def stiffer_coupler(loop: DeviceLoop, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A coupler a twentieth stiffer than it is said to be."""
+    """Uses a coupler whose stiffness is 5 % above the stated one."""
     return actuator_forces(replace(loop, stiffness=1.05 * loop.stiffness), positions)
 
 
@@ -63,15 +66,15 @@ PLANTED_ENGINE_FAULTS: dict[str, tuple[str, Callable[[], Callable[..., Any]]]] =
 }
 
 
-# One fault for each law of a trajectory: a run in which something was done wrong, or written down wrong.
+# One fault for each trajectory law: a run that was simulated or recorded wrongly.
 #
-# A fault takes a scene and returns such a run, or None where the scene gives it no occasion.
+# A fault function takes a scene and returns such a run, or None if the fault has no effect in the scene.
 
 Fault = Callable[[SceneCase], Run | None]
 
 
 def not_a_number(case: SceneCase) -> Run:
-    """A speed that is no number, in the last state only."""
+    """Sets one velocity of the last state to NaN."""
     run = case.simulate()
     v = run.v.copy()
     v[-1, 0] = np.nan
@@ -79,7 +82,7 @@ def not_a_number(case: SceneCase) -> Run:
 
 
 def energised_impact(case: SceneCase) -> Run | None:
-    """The last impact comes out a millionth too fast for an elastic one."""
+    """Makes the last impact return 1 + 1e-6 times the velocity before it."""
     run = case.simulate()
     if not len(run.impacts.step):
         return None
@@ -89,7 +92,7 @@ def energised_impact(case: SceneCase) -> Run | None:
 
 
 def doubled_impulse(case: SceneCase) -> Run | None:
-    """An impulse that is counted twice."""
+    """Records the impulses of the impacts with twice their value."""
     run = case.simulate()
     if not np.any(run.impulse):
         return None
@@ -97,7 +100,7 @@ def doubled_impulse(case: SceneCase) -> Run | None:
 
 
 def lost_gravity(case: SceneCase) -> Run | None:
-    """The scene says gravity, the simulation has none."""
+    """Simulates a scene with gravity as if it had none."""
     if not case.values.get("gravity"):
         return None
     weightless = replace(case, values={key: value for key, value in case.values.items() if key != "gravity"})
@@ -105,7 +108,7 @@ def lost_gravity(case: SceneCase) -> Run | None:
 
 
 def moved_by_the_old_velocity(case: SceneCase) -> Run:
-    """Positions of explicit Euler beside velocities of semi-implicit Euler."""
+    """Combines positions of explicit Euler with velocities of semi-implicit Euler."""
     run, mechanism = case.simulate(), System(case.scene()).mechanism
     q = [run.q[0]]
     for v in run.v[:-1]:
@@ -114,7 +117,7 @@ def moved_by_the_old_velocity(case: SceneCase) -> Run:
 
 
 def missing_half(case: SceneCase) -> Run | None:
-    """Erratum 1: impact losses without their ½."""
+    """Erratum 1: records the impact losses without their factor ½."""
     run = case.simulate()
     if run.energy["impact_loss"][-1] < 1e-3 * np.max(run.energy["kinetic"]):
         return None
@@ -122,7 +125,7 @@ def missing_half(case: SceneCase) -> Run | None:
 
 
 def unclamped_penalty(case: SceneCase) -> Run | None:
-    """The scene says that contacts never pull; the simulation lets them, as printed."""
+    """Lets contacts pull, as in the printed equation, although the scene forbids it."""
     if case.values["contact"].get("penalty") == "printed" or not case.values["contact"]["damping"]:
         return None
     printed = replace(case, values=case.values | {"contact": case.values["contact"] | {"penalty": "printed"}})
@@ -132,7 +135,7 @@ def unclamped_penalty(case: SceneCase) -> Run | None:
 
 
 def unclamped_friction(case: SceneCase) -> Run | None:
-    """Friction proportional to speed, without the bound of Coulomb's law."""
+    """Records 1.5 times the friction force, which exceeds the bound of Coulomb's law."""
     run = case.simulate()
     contacts, mu = run.contacts, run.scene_resolved["contact"]["friction"]
     length = np.linalg.norm(contacts.friction_force, axis=1)
@@ -142,7 +145,10 @@ def unclamped_friction(case: SceneCase) -> Run | None:
 
 
 def explicit_friction(case: SceneCase) -> Run | None:
-    """The scene says Coulomb's law; the simulation does (6), too sharp for its step, and drives bodies."""
+    """Simulates (6) instead of the scene's Coulomb law, with a threshold velocity too small for the step.
+
+    The friction then accelerates bodies.
+    """
     contact = case.values["contact"]
     if not contact.get("friction") or contact.get("friction_law") == "regularised":
         return None
@@ -153,7 +159,7 @@ def explicit_friction(case: SceneCase) -> Run | None:
 
 
 def device_beyond_its_limits(case: SceneCase) -> Run | None:
-    """The device gets what is asked for; the record says that it was cut to the limits."""
+    """Gives the device the full force although the record states that it was limited."""
     limit = (case.values.get("device") or {}).get("force_limit")
     if limit is None or case.rendering == "full":
         return None
@@ -162,7 +168,7 @@ def device_beyond_its_limits(case: SceneCase) -> Run | None:
     return replace(run, law_settings=run.law_settings | {"rendering": case.rendering}) if beyond else None
 
 
-# law -> the fault that it must catch
+# law -> the fault that it must detect
 PLANTED_TRAJECTORY_FAULTS: dict[str, Fault] = {
     "finite": not_a_number,
     "impact_energy": energised_impact,
@@ -178,5 +184,5 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Fault] = {
 
 
 def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
-    """The law's fault in the first of the scenes that gives it an occasion."""
+    """Return the run with the law's fault in the first scene in which the fault has an effect, or None."""
     return next((run for case in scenes if (run := PLANTED_TRAJECTORY_FAULTS[law](case)) is not None), None)

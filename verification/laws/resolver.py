@@ -1,4 +1,4 @@
-"""What anybody's resolver answers to a case, checked; and a sound resolver of plain numpy, apart from the engine."""
+"""Calls of any resolver with checks of its answer, and a correct resolver in plain numpy, independent of the engine."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from iapb.errors import IapbError
 from verification.impacts import Floats, ImpactCase
 
 Resolver = Callable[..., Any]  # called with `ImpactCase.given()`
-SUSPICIOUS = 1e-9  # a relative gain in plain doubles: below the least that the kit's bounds forbid at κ(M) above 1e4
+SUSPICIOUS = 1e-9  # relative gain in plain doubles; for κ(M) above 1e4 the kit's bounds allow more than this
 
 
 class ResolverFault(IapbError):
-    """A resolver raised, or returned no finite velocity of the right shape."""
+    """A resolver raised an exception, or returned no finite velocity of the right shape."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One call: v⁺ (d,), or why there is none, and how many of its arguments the call has changed."""
+    """Answer of one call: v⁺ (d,) or the fault, and the number of arguments that the call has changed."""
 
     velocity: Floats | ResolverFault
     changed: int
 
 
 class Watched:
-    """Anybody's resolver, whose every answer is looked at for energy, whichever law asked for it.
+    """A resolver whose every answer is checked for energy, whichever law made the call.
 
-    suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit judges them with care.
-    calls : how many there were.
+    suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them in double-double.
+    calls : number of calls.
     """
 
     def __init__(self, resolver: Resolver) -> None:
@@ -42,7 +42,7 @@ class Watched:
         return self.resolver(*given)
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
-        """Keep an answer whose energy is above that before it, by more than doubles round well conditioned sums."""
+        """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more than SUSPICIOUS."""
         self.calls += 1
         before = float(case.velocity @ (case.mass_matrix @ case.velocity))
         after = float(v_plus @ (case.mass_matrix @ v_plus))
@@ -51,7 +51,7 @@ class Watched:
 
 
 def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
-    """Return what the resolver gives for the case itself; all laws of a case share the one call."""
+    """Return the resolver's answer for the unchanged case; all laws of a case share one call."""
     known = case._answers.get(id(resolver))
     if known is None:
         own, given = case.given(), case.given()
@@ -62,7 +62,7 @@ def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
 
 
 def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
-    """Return v⁺ (d,) of the case itself, from the call that all its laws share."""
+    """Return v⁺ (d,) of the unchanged case, from the call that all its laws share."""
     velocity = own_answer(resolver, case).velocity
     if isinstance(velocity, ResolverFault):
         raise velocity
@@ -70,7 +70,7 @@ def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
 
 
 def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
-    """Return v⁺ (d,) of a call of its own, on copies of the case's arrays, checked for shape and finiteness."""
+    """Call the resolver on copies of the case's arrays and return v⁺ (d,), checked for shape and finiteness."""
     velocity = _velocity(resolver, case.given(), case)
     if isinstance(velocity, ResolverFault):
         raise velocity
@@ -78,7 +78,7 @@ def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
 
 
 def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> Floats | ResolverFault:
-    """Return v⁺, copied, or what is wrong with it; raise ResolverFault where the resolver raises."""
+    """Return a copy of v⁺, or the fault of an unusable answer; raise ResolverFault if the resolver raises."""
     try:
         answer = resolver(*given)
     except Exception as error:  # anybody's resolver: whatever it raises is the finding
@@ -94,7 +94,7 @@ def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> F
     return velocity
 
 
-# The sound resolver; the planted bugs are made from its parts.
+# The correct resolver; the planted bugs are made from its parts.
 RANK_CUT, ROUNDING = 1e-10, 1e-12
 
 
@@ -129,15 +129,15 @@ def projecting(M: Floats, J: Floats, v: Floats, factor: float, cut: float = RANK
 
 
 def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """u⁺ = u − (1 + e) Qᵀ Q u, Q from the singular value decomposition of the unit rows of A."""
+    """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the unit rows of A."""
     return projecting(M, J, v, 1.0 + e)
 
 
 def least_push(rows: Floats, target: Floats) -> Floats:
-    """Return the p ≥ 0 (c,) that brings Aᵀp closest to `target` (d,): active sets of Lawson and Hanson (1974).
+    """Return the p ≥ 0 (c,) that brings Aᵀp closest to `target` (d,), by the active sets of Lawson and Hanson (1974).
 
-    A row joins where it shortens the rest by more than rounding. (scipy 1.17's `nnls` knows no rounding: where p is 0
-    but for 1e-17 it was seen to return impulses of 0.1.)
+    A row joins the active set only if it reduces the remainder by more than rounding. scipy 1.17's `nnls` has no such
+    threshold: for a p that is 0 up to 1e-17 it returned impulses of 0.1.
     """
     p, used = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool)
     length = np.linalg.norm(rows, axis=1)

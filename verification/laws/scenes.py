@@ -1,7 +1,7 @@
-"""Random scenes: free bodies and short linkages among walls, with random starts, restitution, stiffness, step.
+"""Random scenes: free bodies and short linkages among walls, with random initial states, restitution, stiffness, step.
 
-In space boxes and balls fly, stand on planes and on one another, in a room of planes. A scene is drawn as the plain
-values of a scene file, so that it can be kept, shrunk and pasted.
+In spatial scenes, boxes and balls fly in a room of planes, or rest on a plane or on each other. A scene consists of the
+plain values of a scene file, so that it can be stored, shrunk and pasted.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from reference.worlds import run_world
 Values = dict[str, Any]
 
 ROOM = 0.5  # [m] half width of the room
-CELLS = tuple((x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27))  # one body starts in each at most
+CELLS = tuple((x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27))  # at most one body starts in each
 RENDERINGS = ("full", "full", "saturate", "scale", "spread")
-# √(K/m)·Δt above this is no wall but an explosion: (5) with one sample per quarter of its period.
+# With √(K/m)·Δt above this, (5) has less than one sample per quarter of its period and the motion diverges.
 STIFFEST = 0.5
-# In space: one flying body starts in each cell at most.
+# Spatial scenes: at most one flying body starts in each cell.
 SPATIAL_CELLS = tuple((x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (-0.25, 0.25))
 MIDDLE_CHAIN = 0.45  # share of scenes with a linkage, hung in the middle of the room
-STACK = 0.4  # share of scenes with a box on the floor and a smaller one, or a ball, on it
-# Up to four points of a face share a blow, and a corner turns its box: as stiff as a planar contact of a sixth of K.
+STACK = 0.4  # share of scenes with a box on the floor and a smaller box or a ball on it
+# Up to four points of a face share an impact, and a hit on a corner turns its box: K is limited as for a lighter mass.
 SOFTER = 6.0
 
 
 @dataclass(frozen=True)
 class SceneCase:
-    """A scene by its plain values, the law that moves it, and how impulses meet the device's limits."""
+    """A scene as plain values, its world, and how the device renders impulses beyond its limits."""
 
     values: Values
     world: str  # "IAPB" or "PB"
     rendering: str = "full"
 
     def scene(self) -> Scene:
-        """The scene, checked."""
+        """Return the validated scene."""
         return scene_from_text(json.dumps(self.values))
 
     def simulate(self) -> Run:
-        """Its run."""
+        """Return the run of the scene."""
         return run_world(self.scene(), self.world, self.rendering, partial=True)
 
 
 def draw_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
-    """Return a random planar scene of `steps` steps, its law and rendering."""
+    """Return a random planar scene of `steps` steps, with its world and rendering."""
     bodies = _bodies(rng)
     return _drawn(rng, steps, {"name": "random_scene"}, (256, 512, 1000, 2000), bodies, _walls, (0.5, [0.0, -9.81]),
                   min(body["mass"] for body in bodies), _add_hand)  # fmt: skip
 
 
 def draw_spatial_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
-    """Return a random scene in space of `steps` steps, its law and rendering."""
+    """Return a random spatial scene of `steps` steps, with its world and rendering."""
     bodies = _spatial_bodies(rng)
     return _drawn(rng, steps, {"name": "random_scene_in_space", "dimensions": 3}, (512, 1000, 2000), bodies, _room,
                   (0.6, [0.0, 0.0, -9.81]), min(body["mass"] for body in bodies) / SOFTER, _add_spatial_hand)
@@ -68,7 +68,10 @@ def _drawn(
     walls: Callable[[np.random.Generator], list[Values]], gravity: tuple[float, list[float]], least_mass: float,
     add_hand: Callable[[np.random.Generator, Values], None],
 ) -> SceneCase:
-    """A scene of these bodies, the rest drawn; gravity : the share of scenes that have it, and its field."""
+    """Return a scene of these bodies and draw the rest.
+
+    gravity : share of the scenes that have gravity, and its field [m/s²]
+    """
     values: Values = {**head, "rate": float(rng.choice(rates)), "bodies": bodies, "walls": walls(rng)}
     values["duration"] = steps / values["rate"]
     if rng.random() < gravity[0]:
@@ -101,7 +104,7 @@ def _free_body(rng: np.random.Generator, k: int, cell: tuple[float, float]) -> V
 
 
 def _linkage(rng: np.random.Generator) -> list[Values]:
-    """One to three links, pinned in the middle of the room."""
+    """Return a chain of one to three links, pinned in the middle of the room."""
     links = []
     for k in range(int(rng.integers(1, 4))):
         length, mass = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4)
@@ -128,7 +131,7 @@ def _walls(rng: np.random.Generator) -> list[Values]:
 
 
 def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
-    """Constants of contact for a lightest body [kg] and a step [s]."""
+    """Draw contact constants for the lightest body's mass [kg] and a step [s]."""
     stiffness = min(10.0 ** rng.uniform(2.0, 5.0), (STIFFEST / dt) ** 2 * least_mass)
     damping = rng.choice([0.0, 0.3, 1.0]) * np.sqrt(stiffness * least_mass)
     contact: Values = {
@@ -151,7 +154,7 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
 
 
 def _add_hand(rng: np.random.Generator, values: Values) -> None:
-    """A hand on the first free body, sometimes through a device with limits, delay and quantised sensors."""
+    """Add a hand on the first free body, sometimes through a device with limits, delay and quantised sensors."""
     values["hand"] = {"body": "body_0", "force": [round(x, 3) for x in rng.normal(scale=[2.0, 2.0, 0.05])]}
     if rng.random() < 0.3:
         return
@@ -160,7 +163,7 @@ def _add_hand(rng: np.random.Generator, values: Values) -> None:
 
 
 def _add_coupling(rng: np.random.Generator, values: Values, inertia: np.ndarray, limits: list[float]) -> None:
-    """A four-channel controller for a tool of these inertias, and a device with limits, delay and quantised sensors."""
+    """Add a four-channel controller for a tool of these inertias, and a device, perhaps with limits and delay."""
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
     values["couplings"] = {"four_channel": {
         "stiffness": [float(f"{x:.6g}") for x in inertia * rate**2 * 0.3],
@@ -182,7 +185,7 @@ def _room(_: np.random.Generator) -> list[Values]:
 
 
 def _spatial_bodies(rng: np.random.Generator) -> list[Values]:
-    """One to four bodies that fly, each in a cell of its own, sometimes a stack and a linkage besides."""
+    """Return one to four flying bodies in separate cells, and sometimes a stack and a linkage."""
     cells = rng.permutation(len(SPATIAL_CELLS))[: int(rng.integers(1, 5))]
     bodies = [_flying(rng, k, SPATIAL_CELLS[cell]) for k, cell in enumerate(cells)]
     if rng.random() < STACK:
@@ -199,7 +202,7 @@ def _flying(rng: np.random.Generator, k: int, cell: tuple[float, float, float]) 
 
 
 def _box_or_ball(rng: np.random.Generator, name: str, size: float, ball: bool) -> Values:
-    """A ball of this radius or a box within twice this size, uniform."""
+    """Return a uniform ball of radius `size`, or a uniform box with sides up to twice `size` [m]."""
     mass = round(10.0 ** rng.uniform(-1.5, 0.7), 4)
     sides = np.array([round(2.0 * size * rng.uniform(0.4, 1.0), 4) for _ in range(3)])
     squares = sides**2
@@ -209,7 +212,7 @@ def _box_or_ball(rng: np.random.Generator, name: str, size: float, ball: bool) -
 
 
 def _stack(rng: np.random.Generator) -> list[Values]:
-    """A box at rest on the floor, in the middle of the room, and on it a box or a ball; each sunk by a micrometre."""
+    """Return a box at rest in the middle of the floor, and a box or a ball on it; each contact penetrates by 1 µm."""
     below = _box_or_ball(rng, "below", 0.08, ball=False)
     above = _box_or_ball(rng, "above", 0.04, ball=rng.random() < 0.5)
     height = below["shapes"][0]["size"][2]
@@ -221,7 +224,7 @@ def _stack(rng: np.random.Generator) -> list[Values]:
 
 
 def _spatial_linkage(rng: np.random.Generator) -> list[Values]:
-    """One to three links about axes of any direction, the first sometimes in a ball joint."""
+    """Return one to three links with joint axes of any direction; the first sometimes has a ball joint."""
     links: list[Values] = []
     for k in range(int(rng.integers(1, 4))):
         length, mass = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4)
@@ -243,7 +246,7 @@ def _joint(rng: np.random.Generator, ball: bool) -> Values:
 
 
 def _add_spatial_hand(rng: np.random.Generator, values: Values) -> None:
-    """A hand on the first free body, mostly through a device: force, and torque about the axes of the world."""
+    """Add a hand on the first free body, usually through a device: force, and torque about the world axes."""
     force = rng.normal(scale=[2.0, 2.0, 2.0, 0.05, 0.05, 0.05])
     values["hand"] = {"body": "body_0", "force": [round(float(x), 3) for x in force]}
     if rng.random() < 0.7:

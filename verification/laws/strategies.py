@@ -1,4 +1,4 @@
-"""Hypothesis strategies: impacts of small whole numbers and powers of ten, which shrink to something one can read."""
+"""Hypothesis strategies: impacts of small integers and powers of ten, which shrink to readable counterexamples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from verification.laws.scenes import SceneCase, Values
 
 @st.composite
 def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
-    """M = T D Tᵀ with T unit triangular of small whole numbers and D powers of ten, κ of order 10^largest_exponent."""
+    """M = T D Tᵀ with T unit triangular of small integers and D powers of ten; κ is up to about 10^largest_exponent."""
     powers = draw(st.lists(st.integers(-largest_exponent, 0), min_size=d, max_size=d))
     entries = draw(st.lists(st.integers(-1, 1), min_size=d * d, max_size=d * d))
     T = np.tril(np.reshape(entries, (d, d)).astype(float), -1) + np.eye(d)
@@ -25,7 +25,7 @@ def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
 
 @st.composite
 def contact_jacobians(draw: st.DrawFn, d: int, largest: int = 5) -> Floats:
-    """Whole-number rows; some are copies of others moved by a power of ten, some are zero."""
+    """Rows of integers; some are close to the previous row, at a distance of a power of ten, and some are zero."""
     c = draw(st.integers(0, largest))
     rows = np.zeros((c, d))
     for i in range(c):
@@ -37,7 +37,7 @@ def contact_jacobians(draw: st.DrawFn, d: int, largest: int = 5) -> Floats:
 
 @st.composite
 def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
-    """Small whole numbers, as v or as Lᵀv, or M's lightest direction."""
+    """Small integers as v or as Lᵀv, or M's lightest direction as v."""
     d = len(mass)
     whole = np.array(draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d)), dtype=float)
     kind = draw(st.sampled_from(["v", "u", "light"]))
@@ -47,13 +47,13 @@ def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
 
 
 def restitutions() -> st.SearchStrategy[float]:
-    """e: the four that matter, or any."""
+    """e: one of 1, 0, −1 and 0.5, or any value in [−1, 1]."""
     return st.one_of(st.sampled_from([1.0, 0.0, -1.0, 0.5]), st.floats(-1.0, 1.0))
 
 
 @st.composite
 def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
-    """An impact with a restitution of its own for each row."""
+    """An impact with a separate restitution for each row."""
     case = draw(impact_cases(largest_exponent))
     e = draw(st.lists(st.sampled_from([0.0, 1.0, 0.5]), min_size=case.contacts, max_size=case.contacts))
     return replace(case, unequal=np.array(e, dtype=float))
@@ -61,7 +61,7 @@ def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
 
 @st.composite
 def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int = 4) -> ImpactCase:
-    """An impact with κ(M) about 10^largest_exponent at most."""
+    """An impact with κ(M) up to about 10^largest_exponent."""
     d = draw(st.integers(1, largest_size))
     if draw(st.booleans()):
         masses = 10.0 ** np.array(draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d)), dtype=float)
@@ -75,7 +75,7 @@ def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int =
 
 @st.composite
 def one_sided_cases(draw: st.DrawFn) -> ImpactCase:
-    """An impact whose contacts only push, e in [0, 1]; as often as not every contact approaches."""
+    """An impact whose contacts only push, e in [0, 1]; in half of the draws every contact approaches."""
     case = draw(impact_cases(largest_exponent=2))
     rows = case.contact_jacobian
     if draw(st.booleans()):
@@ -85,7 +85,7 @@ def one_sided_cases(draw: st.DrawFn) -> ImpactCase:
 
 @st.composite
 def frictional_cases(draw: st.DrawFn) -> ImpactCase:
-    """The same with one or two tangents a contact, whole numbers too, and μ."""
+    """An impact as in `one_sided_cases` with one or two integer tangents per contact, and μ."""
     case = draw(one_sided_cases())
     shape = case.contacts, draw(st.integers(1, 2)), case.coordinates
     entries = draw(st.lists(st.integers(-2, 2), min_size=int(np.prod(shape)), max_size=int(np.prod(shape))))
@@ -97,21 +97,21 @@ def frictional_cases(draw: st.DrawFn) -> ImpactCase:
 
 
 def tangents_are_independent(case: ImpactCase) -> bool:
-    """Whether no tangent of a contact depends on its normal and the others; without friction, yes."""
+    """Whether the normal and the tangents of each contact are linearly independent; True without friction."""
     if case.tangents is None:
         return True
     blocks = np.concatenate([case.contact_jacobian[:, None], case.tangents], axis=1)
     return all(len(independent_rows(block)) == len(block) for block in blocks)
 
 
-# Impacts to search for a counterexample: by contract, or with a restitution per row.
+# Strategies for the search of counterexamples: one per contract, and one with a restitution per row.
 SEARCHED = {"equality": impact_cases, "unequal": unequal_cases, "unilateral": one_sided_cases,
             "frictional": frictional_cases}
 
 
 @st.composite
 def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
-    """A short scene of whole numbers and simple shares: one or two discs or a link in a room, any law and rendering."""
+    """A short scene of simple numbers: one or two discs, and sometimes a link, in a room; any law and rendering."""
     count, linked = draw(st.integers(1, 2)), draw(st.booleans())
     bodies = [draw(_discs(k)) for k in range(count)]
     if linked:
@@ -133,7 +133,7 @@ def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
 
 @st.composite
 def _discs(draw: st.DrawFn, k: int) -> Values:
-    """A disc of a simple mass, at rest in its place or thrown."""
+    """A disc of 0.01 to 10 kg with a velocity of integers."""
     v = draw(st.lists(st.integers(-3, 3), min_size=3, max_size=3))
     return {"name": f"disc_{k}", "joint": "planar", "mass": 10.0 ** draw(st.integers(-2, 1)), "inertia": 1e-3,
             "shapes": [{"kind": "circle", "radius": 0.05}], "position": [0.1 * k, -0.1, 0.0],
@@ -142,7 +142,7 @@ def _discs(draw: st.DrawFn, k: int) -> Values:
 
 @st.composite
 def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
-    """A short scene in space of whole numbers: a ball, and a box that stands or is thrown, over a floor by a side."""
+    """A short spatial scene of simple numbers: a ball and a box, at rest or moving, above a floor and beside a wall."""
     v = [draw(st.lists(st.integers(-3, 3), min_size=6, max_size=6)) for _ in range(2)]
     turn = draw(st.sampled_from([[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, 0.8], [0.5, 0.5, 0.5, 0.5]]))
     common = {"joint": "free_flyer", "mass": 10.0 ** draw(st.integers(-1, 1)), "inertia": [1e-3] * 3}

@@ -1,6 +1,6 @@
-"""The laws tried: on random impacts, on the engine and along trajectories, each with a planted fault; the energy gains
-of very many impacts; the smallest inputs that break a law, found and shrunk by the kit, or made by hand where that says
-more.
+"""Studies of the laws: checks on random impacts, on the engine and along trajectories, each with a planted fault; the
+energy gains of very many impacts; and the smallest inputs that break a law. The kit finds and shrinks these inputs, or
+they are made by hand if that explains more.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ Row = dict[str, Any]
 
 
 def properties(run: Any, depth: str, progress: Progress) -> Finding:
-    """Try every law on our resolver, on the rest of the engine and along trajectories; each with a planted fault."""
+    """Check every law on our resolver, on the rest of the engine and along trajectories, each with a planted fault."""
     failures: list[Failure] = []
     rows: list[Row] = []
     total = len(LAWS) + len(ENGINE_LAWS) + len(TRAJECTORY_LAWS)
@@ -76,7 +76,7 @@ def properties(run: Any, depth: str, progress: Progress) -> Finding:
 
 
 def _impact_laws(failures: list[Failure]) -> Iterator[Row]:
-    """The kit on our resolver; a law that no planted bug names has none."""
+    """Yield a row per law of our resolver, with a planted bug that the law must detect if there is one."""
     first: dict[str, tuple[str, Any]] = {}
     for name, bug in PLANTED_BUGS.items():
         first.setdefault(bug.caught_by, (name, bug))
@@ -130,14 +130,14 @@ def _trajectory_laws(failures: list[Failure]) -> Iterator[Row]:
 
 
 def _row(law: str, cases: int, worst: Any, holds: bool, fault: str, caught: bool | None) -> Row:
-    """What came of a law; without a worst case it did not apply to any."""
+    """Return the row of a law; `worst` is None if the law applied to no case."""
     value, bound = (worst.value, worst.tolerance) if worst else (None, None)
     return {"law": law, "cases": cases, "worst": value, "bound": bound, "holds": holds,
             "fault": fault.replace("_", " "), "fault caught": caught}  # fmt: skip
 
 
 def energy_gains(run: Any, depth: str, progress: Progress) -> Finding:
-    """Measure the energy gain of random impacts: against 10 d ε √κ(M), without the clamp, by the printed formula."""
+    """Measure the energy gain of random impacts against 10 d ε √κ(M): with and without the clamp, and as printed."""
     failures: list[Failure] = []
     studies: tuple[tuple[str, str, bool | None, int], ...] = (
         ("factored", "factored", None, IMPACTS[depth]),
@@ -179,14 +179,14 @@ def _bulk_rows(
 
 
 def counterexamples(progress: Progress, failures: list[Failure]) -> tuple[Finding, ...]:
-    """Break a law by the printed formula, a restitution per contact as equalities, and saturation."""
+    """Return inputs that break a law: for the printed formula, for one restitution per contact, and for saturation."""
     makers = (printed_formula, restitution_per_contact, saturation)
     return tuple(of_each(counted(makers, progress), lambda make: [make()], failures,
                          lambda make: make.__name__.replace("_", " ")))  # fmt: skip
 
 
 def printed_formula() -> Finding:
-    """Equations (20)-(21) to the letter, `gram_pinv`: what the kit finds by itself, judged in exact rationals."""
+    """Return the kit's counterexample to equations (20)-(21) as printed (`gram_pinv`), checked in exact rationals."""
     resolver = partial(resolve_impact, method="gram_pinv")
     report = check_passivity(resolver, impacts=COUNTER_IMPACTS, search=SEARCH)
     verdict, case = report.verdict("kinetic_energy"), report.counterexample
@@ -206,7 +206,7 @@ def printed_formula() -> Finding:
 
 
 def restitution_per_contact() -> Finding:
-    """Newton's law as equalities with a restitution per row: erratum of whoever extends (15) in the obvious way."""
+    """Return the counterexample to the obvious extension of (15): equalities with one restitution per row."""
     resolver = each_contact_its_own_restitution
     report = check_passivity(resolver, impacts=COUNTER_IMPACTS // 2, search=SEARCH, unequal_restitution=True)
     verdict, case = report.verdict("unequal_kinetic_energy"), report.counterexample
@@ -223,7 +223,7 @@ def restitution_per_contact() -> Finding:
 
 
 def saturation() -> Finding:
-    """Section VI: clipping an impulse component by component."""
+    """Return the counterexample to clipping an impulse component by component (section VI)."""
     case = limits.saturation_counterexample()
     clipped = limits.limited_impulses_are_passive(case, limits.saturated)
     scaled = limits.limited_impulses_are_passive(case, limits.ours)
@@ -242,7 +242,7 @@ def saturation() -> Finding:
 def counterexample(
     who: str, law: str, sentence: str, given: tuple[tuple[str, str], ...], test: str = ""
 ) -> Finding:
-    """A law that a resolver or strategy breaks: the input and what came out by name, and a test to paste, if any."""
+    """Return the Finding for a broken law, with the input and the answer by name and the source of a test, if any."""
     return Finding(who, who, law, sentence, REFUTED, details={**dict(given), "test": test})
 
 

@@ -1,7 +1,7 @@
-"""Laws of a whole trajectory: each a function of a run's arrays, so that a stored run can be judged as well.
+"""Laws of a whole trajectory. Each law uses only the arrays of a run, so it can also check a stored run.
 
-A law returns a LawResidual, or None where it does not apply. To add one: write it here, add a line to TRAJECTORY_LAWS,
-and a fault to `planted_runs`.
+A law returns a LawResidual, or None if it does not apply. To add a law, write the function here, add a line to
+TRAJECTORY_LAWS, and add a fault to `planted_runs`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from iapb.system import System
 from reference.exact import bulk_energy_gain, relative_energy_gain
 from verification.laws.bounds import FACTORED, LawResidual
 
-# A run to be judged from its arrays and its scene text alone, so that a stored run will do as well as a fresh one.
+# A run is checked through its arrays and its scene text alone, so a stored run can be checked like a new one.
 
 Floats = NDArray[np.float64]
 
@@ -33,19 +33,19 @@ BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A run, and what follows from its scene."""
+    """A run, and quantities computed from it and its scene."""
 
     run: Run
 
     @property
     def by_the_engine(self) -> bool:
-        """One of the engine's laws, one force per step: v moves first, then q by the new v."""
+        """Whether the engine made the run with semi-implicit Euler: first v changes, then q moves by the new v."""
         run = self.run
         return run.law in BY_THE_ENGINE and run.law_settings.get("integrator") == "semi_implicit_euler"
 
     @property
     def carries_itself(self) -> bool:
-        """No unilateral coupler, which carries the tool from outside."""
+        """Whether there is no unilateral coupler, which moves the tool from outside."""
         return self.run.coupling != "unilateral"
 
     @cached_property
@@ -55,7 +55,7 @@ class Trajectory:
 
     @cached_property
     def masses(self) -> Floats:
-        """M at the beginning of each step, (n, d, d); one of them for all steps where M is constant."""
+        """M at the beginning of each step, (n, d, d); a constant M is computed once and broadcast."""
         mechanism, q = self.system.mechanism, self.run.q[:-1]
         if mechanism.has_constant_mass_matrix:
             one = mechanism.mass_matrix(q[0])
@@ -84,13 +84,13 @@ class Trajectory:
 
     @cached_property
     def forces(self) -> Floats:
-        """All generalized forces (n, d) that the record knows of."""
+        """Sum (n, d) of all recorded generalized forces."""
         run = self.run
         return run.hand_force + run.coupling_force + run.penalty_force + run.friction_force
 
     @property
     def turns_over(self) -> bool:
-        """Whether a body in space may turn by half a turn in a step: its displacement is not the motion then."""
+        """Whether a spatial body may turn by half a turn or more in a step, so that its displacement is ambiguous."""
         run, mechanism = self.run, self.system.mechanism
         return bool(mechanism.nq != mechanism.nv and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN)
 
@@ -108,14 +108,14 @@ def norm(vector: Floats) -> Floats:
     return np.asarray(np.max(np.abs(vector), axis=-1, initial=0.0))
 
 
-# The state stays finite, or the run ends and says why.
+# The state stays finite, or the run ends and gives a reason.
 
 _ARRAYS = ("time", "q", "v", "device_q", "device_v", "hand_force", "coupling_force", "penalty_force",
            "friction_force", "impulse", "environment_force", "device_force")  # fmt: skip
 
 
 def state_stays_finite(trajectory: Trajectory) -> LawResidual:
-    """Arrays with an entry that is not finite, plus one where an incomplete run gives no reason; 0 are allowed."""
+    """Number of arrays with an entry that is not finite, plus 1 if an incomplete run gives no reason; tolerance 0."""
     run = trajectory.run
     wrong = sum(not np.all(np.isfinite(getattr(run, name))) for name in _ARRAYS)
     wrong += sum(not np.all(np.isfinite(values)) for values in run.energy.values())
@@ -124,7 +124,7 @@ def state_stays_finite(trajectory: Trajectory) -> LawResidual:
 
 # Theorem 2 along a trajectory: no impact raises the kinetic energy of the bodies that it strikes.
 def impacts_take_energy(trajectory: Trajectory) -> LawResidual | None:
-    """Largest relative gain over its bound 10 d ε √κ(M), of M restricted to the trees that were struck."""
+    """Largest relative energy gain over its bound 10 d ε √κ(M), for M restricted to the trees with an impulse."""
     impacts = trajectory.run.impacts
     if not len(impacts.step):
         return None
@@ -144,7 +144,7 @@ def _ratio(trajectory: Trajectory, k: int) -> float:
 
 
 def _gain(mass: Floats, before: Floats, after: Floats) -> float:
-    """Relative gain in double-double; in exact rationals for speeds out of its range, of a run that flies apart."""
+    """Relative gain in double-double, or in exact rationals if the speeds of a diverging run exceed its range."""
     try:
         gain, bound = bulk_energy_gain(mass, before, after)
     except ArgumentError:
@@ -153,14 +153,16 @@ def _gain(mass: Floats, before: Floats, after: Floats) -> float:
 
 
 def struck_coordinates(trajectory: Trajectory, impulse: Floats) -> Any:
-    """Coordinates of all trees with an impulse; all of them where there is none."""
+    """Coordinates of all trees with an impulse; all coordinates if there is no impulse."""
     chosen = [np.arange(a, b) for a, b in trajectory.system.mechanism.tree_dofs if np.any(impulse[a:b])]
     return np.concatenate(chosen) if chosen else np.arange(len(impulse))
 
 
-# (8): what an impact changes is what its impulse says, M (v⁺ − v⁻) = Jᵀp, and it starts from the state recorded.
+# (8): the recorded impulse explains the impact, M (v⁺ − v⁻) = Jᵀp, and the impact starts from the recorded state.
 def impulses_explain_impacts(trajectory: Trajectory) -> LawResidual | None:
-    """Largest of |M (v⁺ − v⁻) − impulse|∞ over d ε ‖M‖ |v|, and of the impulses of a step against their sum."""
+    """Largest of |M (v⁺ − v⁻) − impulse|∞ over d ε ‖M‖ |v|, and of the difference between a step's impulse and the sum
+    of its impacts' impulses.
+    """
     impacts, run = trajectory.run.impacts, trajectory.run
     if not len(impacts.step):
         return None
@@ -172,7 +174,7 @@ def impulses_explain_impacts(trajectory: Trajectory) -> LawResidual | None:
     np.add.at(total, impacts.step, impacts.impulse)
     lost = norm(total - run.impulse) / max(float(np.max(np.abs(run.impulse))), np.finfo(float).tiny)
     worst = max(float(np.max(apart)), float(np.max(lost)))
-    # Solving with M, scaled to a unit diagonal, loses ε κ of that matrix: measured, not assumed.
+    # Solving with M, scaled to a unit diagonal, causes an error ε κ of the scaled matrix; κ is computed here.
     return LawResidual("impulse_momentum", worst, 10.0 * impacts.v_plus.shape[1] * EPS * _scaled_condition(masses))
 
 
@@ -181,7 +183,7 @@ def _scaled_condition(masses: np.ndarray) -> float:
     return float(np.max(np.linalg.cond(masses * scale[:, :, None] * scale[:, None, :])))
 
 
-# (1): the recorded forces, and nothing else, move the bodies: M (v_{k+1} − v_k⁺)/Δt + B + G = Σ F.
+# (1): the recorded forces alone move the bodies: M (v_{k+1} − v_k⁺)/Δt + B + G = Σ F.
 def forces_explain_motion(trajectory: Trajectory) -> LawResidual | None:
     """Largest |M Δv − Δt (Σ F − B − G)|∞ over |M|(|v| + |v'|) + Δt Σ|F|, in units of d ε."""
     if not (trajectory.by_the_engine and trajectory.carries_itself):
@@ -192,12 +194,12 @@ def forces_explain_motion(trajectory: Trajectory) -> LawResidual | None:
     speed = np.abs(run.v[1:]) + np.abs(trajectory.v_struck) + np.abs(run.v[:-1])
     parts = (run.hand_force, run.coupling_force, run.penalty_force, run.friction_force, trajectory.bias_and_gravity)
     size = np.einsum("kij,kj->ki", np.abs(masses), speed) + run.dt * sum(np.abs(part) for part in parts)
-    # One scale per step, not per coordinate: a force of one link rounds in the equations of the others.
+    # One scale per step, not per coordinate, because a force on one link causes rounding in the other equations.
     apart = norm(changed - pushed) / np.maximum(norm(size), np.finfo(float).tiny)
     return LawResidual("motion", float(np.max(apart)), 20.0 * run.v.shape[1] * EPS)
 
 
-# q moves by the new velocity, q_{k+1} = q_k ⊕ Δt v_{k+1}: integrated, never added where a rotation is no vector.
+# q moves by the new velocity, q_{k+1} = q_k ⊕ Δt v_{k+1}; rotations are integrated, because they are not vectors.
 def velocity_moves_configuration(trajectory: Trajectory) -> LawResidual | None:
     """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|."""
     if not (trajectory.by_the_engine and trajectory.carries_itself):
@@ -211,16 +213,16 @@ def velocity_moves_configuration(trajectory: Trajectory) -> LawResidual | None:
     return LawResidual("kinematics", float(np.max(norm(moved - run.q[1:]) / size)), 16.0 * EPS)
 
 
-# The energy ledger closes: every work is its force along the displacement, impacts lose what they lost, and with a
-# constant mass matrix the rest is known exactly: semi-implicit Euler loses ½ Δv·M Δv per step, Δv by the forces, and
-# takes the weight −G as constant over a step.
+# The energy balance closes: each work is the force times the displacement, and the impact losses follow from the
+# velocities. With a constant mass matrix the integrator's error is known exactly: semi-implicit Euler loses ½ Δv·M Δv
+# per step, with Δv due to the forces, and takes the weight −G as constant over a step.
 
 _FORCES = ("hand", "coupling", "penalty", "friction")
 HALF_TURN = np.pi / np.sqrt(3.0)  # [rad] of each of the three rates of a body
 
 
 def ledger_closes(trajectory: Trajectory) -> LawResidual | None:
-    """Largest difference of an account from its recomputation, over the energy that was turned over."""
+    """Largest difference between a recorded and a recomputed energy term, relative to the energy exchanged."""
     run = trajectory.run
     if not (trajectory.by_the_engine and trajectory.carries_itself) or not run.energy:
         return None
@@ -234,7 +236,7 @@ def ledger_closes(trajectory: Trajectory) -> LawResidual | None:
 
 
 def _energies(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """½ vᵀMv by einsum, and the potential energy of the scene, at all instants."""
+    """Kinetic energy ½ vᵀMv by einsum, and potential energy of the scene, at all instants."""
     run, system = trajectory.run, trajectory.system
     _, potential = system.mechanism.energies(run.q, run.v, system.gravity)
     last = system.mechanism.mass_matrix(run.q[-1])[None]
@@ -243,7 +245,7 @@ def _energies(trajectory: Trajectory) -> tuple[Floats, Floats]:
 
 
 def _impact_losses(trajectory: Trajectory) -> Floats:
-    """Energies lost by the impacts of each step, summed; each from its own velocities before and after."""
+    """Energy lost in impacts up to each step (n,), recomputed from each impact's velocities before and after."""
     impacts, losses = trajectory.run.impacts, np.zeros(trajectory.run.steps)
     masses = trajectory.masses[impacts.step]
     lost = -0.5 * np.einsum(
@@ -254,10 +256,10 @@ def _impact_losses(trajectory: Trajectory) -> Floats:
 
 
 def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """What the integration made, as recorded and as it must be.
+    """Energy error of the integration, recorded and as computed from the method.
 
-    Nothing to compare where M varies, or where a body in space turns by half a turn in a step: its displacement is
-    then no longer the motion that was integrated.
+    Both are 0 if M varies or if a spatial body turns by half a turn in a step, because its displacement then differs
+    from the integrated motion.
     """
     run, mechanism = trajectory.run, trajectory.system.mechanism
     if trajectory.turns_over or not mechanism.has_constant_mass_matrix:
@@ -273,9 +275,9 @@ def _apart(one: Floats, other: Floats) -> float:
     return float(np.max(np.abs(one - other), initial=0.0))
 
 
-# (5): a contact that rests pushes with −K s − B v_n, never pulls unless the scene says `printed`; else not at all.
+# (5): a contact with a force pushes with −K s − B v_n; it pulls only if the scene selects the `printed` penalty.
 def contacts_push_by_the_penalty(trajectory: Trajectory) -> LawResidual | None:
-    """Largest |F − (−K s − B v_n)| over its parts, of the contacts with a force; infinite for one that pulls."""
+    """Largest |F − (−K s − B v_n)| of the contacts with a force, relative to the terms; infinite if a contact pulls."""
     run, contacts = trajectory.run, trajectory.run.contacts
     if not trajectory.by_the_engine or not len(contacts.gap):
         return None
@@ -291,11 +293,12 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> LawResidual | None:
     return LawResidual("penalty", float(np.max(apart)), 16.0 * EPS)
 
 
-# (6) and Coulomb's law: friction is at most μ F_n, lies in the plane of contact, and is not there where nothing pushes.
+# (6) and Coulomb's law: friction is at most μ F_n, lies in the contact plane, and is zero without a normal force.
 def friction_stays_in_its_cone(trajectory: Trajectory) -> LawResidual | None:
-    """Largest of |F_f| − μ F_n and |F_f · n|, over μ F_n; infinite where there is friction and no push.
+    """Largest of |F_f| − μ F_n and |F_f · n|, relative to μ F_n; infinite if there is friction without a normal force.
 
-    Taking v_n off the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold at least: allowed for.
+    Subtracting v_n from the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold or more; the tolerance
+    covers this error.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
     if not trajectory.by_the_engine or not len(contacts.gap):
@@ -310,12 +313,12 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> LawResidual | None:
     return LawResidual("friction", float(np.max(relative)), 16.0 * EPS)
 
 
-# Friction by Coulomb's law takes energy in every step: its work is never positive.
+# Friction by Coulomb's law dissipates energy in every step: its work is never positive.
 def friction_takes_energy(trajectory: Trajectory) -> LawResidual | None:
-    """Largest F_f · Δq of a step, over the rounding of that sum; the paper's explicit (6) is not judged.
+    """Largest F_f · Δq of a step, relative to the rounding of that sum; the paper's explicit (6) is not checked.
 
-    A contact that sticks does no work but rounding: each entry of Δq is the difference of two coordinates, each of F_f
-    a sum over the contacts, which may cancel.
+    The work of a sticking contact is only rounding: each entry of Δq is the difference of two coordinates, and each
+    entry of F_f is a sum over the contacts, whose terms may cancel.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
     constants = run.scene_resolved["contact"]
@@ -331,9 +334,9 @@ def friction_takes_energy(trajectory: Trajectory) -> LawResidual | None:
     return LawResidual("friction_work", float(np.max(relative)), 16.0 * moved.shape[1] * EPS)
 
 
-# The device applies no more force than it can, whatever contact, coupling and rendering ask for.
+# The device never exceeds its force limit, whatever contact, coupling and rendering require.
 def device_keeps_its_limits(trajectory: Trajectory) -> LawResidual | None:
-    """Largest |device force| over its limit; applies where impulses are fitted to the limits at all."""
+    """Largest |device force| over its limit; the law applies if the rendering fits impulses to the limits."""
     run = trajectory.run
     limit = (run.scene_resolved.get("device") or {}).get("force_limit")
     if limit is None or not run.device_force.size or run.law_settings.get("rendering", "full") == "full":
@@ -342,7 +345,7 @@ def device_keeps_its_limits(trajectory: Trajectory) -> LawResidual | None:
 
 
 class TrajectoryLaw(NamedTuple):
-    """A law, in words and as a check."""
+    """A law: its statement in words and its check."""
 
     statement: str
     check: Callable[[Trajectory], LawResidual | None]
@@ -363,7 +366,7 @@ TRAJECTORY_LAWS: dict[str, TrajectoryLaw] = {
 
 
 def judge_run(run: Run) -> Iterator[tuple[str, LawResidual]]:
-    """Yield the residual of every law that applies to a run; the rest of a run that is not finite is not judged."""
+    """Yield the residual of every law that applies to a run; if the run is not finite, yield only that residual."""
     trajectory = Trajectory(run)
     for name, law in TRAJECTORY_LAWS.items():
         residual = law.check(trajectory)

@@ -1,8 +1,8 @@
-"""Laws that ask more than an impact resolver: a row budget, a device's limits, a wall or a device in the hand, inputs
+"""Laws that need more than an impact resolver: a row budget, device limits, a wall or a device held by the hand, inputs
 of any size.
 
-A law draws its own cases and judges a subject of its own kind; `ours` is the engine's. To add one: write the file,
-add a line to ENGINE_LAWS, and a fault to `planted`.
+Each law draws its own cases and judges its own kind of subject; `ours` is the engine's subject. To add a law, write its
+file, add a line to ENGINE_LAWS, and add a planted fault to `planted_runs`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from verification.laws.engine_laws import (
 
 
 class EngineLaw(NamedTuple):
-    """A law, in words, the cases it is tried on, its check and the engine's subject."""
+    """A law: its statement in words, the generator of its cases, its check and the engine's subject."""
 
     statement: str
     draw: Callable[[np.random.Generator], Any]
@@ -57,7 +57,9 @@ ENGINE_LAWS: dict[str, EngineLaw] = {
 
 @dataclass(frozen=True)
 class EngineVerdict:
-    """What became of one law; `largest` is the worst value / tolerance, `case` the first that broke it, else None."""
+    """Verdict on one law. `worst` is the residual closest to its tolerance or furthest above it; `case` is the first
+    case that breaks the law, or None.
+    """
 
     law: str
     statement: str
@@ -68,13 +70,13 @@ class EngineVerdict:
 
     @property
     def passed(self) -> bool:
-        """No case broke the law."""
+        """Whether no case broke the law."""
         return self.failures == 0
 
 
 def judge_engine_law(name: str, subject: Callable[..., Any] | None = None, cases: int = 300,
                      seed: int = 0) -> EngineVerdict:
-    """Try one law on `cases` random cases; `subject` replaces the engine's."""
+    """Check one law on `cases` random cases; `subject` replaces the engine's own subject."""
     law, rng = ENGINE_LAWS[name], np.random.default_rng([seed, list(ENGINE_LAWS).index(name)])
     worst, failures, broken = LawResidual(name, -np.inf, 1.0), 0, None
     for _ in range(cases):

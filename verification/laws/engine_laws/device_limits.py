@@ -1,5 +1,7 @@
-"""Paper section VI: an impulse that the device cannot render. One factor for the whole group keeps tool and device
-passive (it is an effective restitution in [−1, e]); clipping component by component does not.
+"""Law for an impulse that the device cannot render (paper section VI).
+
+One factor for the whole group keeps tool and device passive, because it acts as an effective restitution in [−1, e].
+Clipping each component separately does not.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ Renderer = Callable[[Floats, float, Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class LimitedImpact:
-    """An impact, its whole impulse, and a device of limited force; the device is the tool's equal."""
+    """An impact, its full impulse, and a device of limited force with the same mass matrix as the tool."""
 
     impact: ImpactCase
     impulse: Floats  # (d,) [N s, N m s]
@@ -29,7 +31,7 @@ class LimitedImpact:
 
 
 def draw(rng: np.random.Generator) -> LimitedImpact:
-    """An impact whose limits lie between a hundredth and ten times what its impulse asks for."""
+    """Draw an impact and force limits between 0.01 and 10 times the force that its impulse needs, or infinite."""
     case = draw_case(rng)
     Q, u = case.row_space, case.lower.T @ case.velocity
     impulse = -(1.0 + case.restitution) * (case.lower @ (Q.T @ (Q @ u)))
@@ -39,21 +41,21 @@ def draw(rng: np.random.Generator) -> LimitedImpact:
 
 
 def ours(impulse: Floats, dt: float, force_limit: Floats) -> tuple[Floats, Floats]:
-    """The engine's scaling."""
+    """Scale the impulse as the engine does."""
     share = largest_share(impulse, np.arange(len(impulse)), len(impulse), dt, force_limit)
     return share * impulse, share * impulse / dt
 
 
 def saturated(impulse: Floats, dt: float, force_limit: Floats) -> tuple[Floats, Floats]:
-    """The paper's first strategy: the tool gets all, the device each component clipped. Not passive."""
+    """The paper's first strategy: the tool gets the full impulse, the device each component clipped. Not passive."""
     return impulse, np.clip(impulse / dt, -force_limit, force_limit)
 
 
 def saturation_counterexample() -> LimitedImpact:
-    """A point mass of 1 kg slides past a slanted wall, e = 0, and its device can push along x but hardly along y.
+    """Return a point mass of 1 kg that hits an inclined wall with e = 0; its device can hardly push along y.
 
-    The whole impulse (0.12, 0.16) N s takes 2 % of the energy; the device renders (0.12, 0.01) of
-    it and gains 12 %.
+    The full impulse (0.12, 0.16) N s takes 2 % of the kinetic energy. The device renders only (0.12, 0.01) N s and
+    gains 12 %.
     """
     normal, velocity = np.array([0.6, 0.8]), np.array([1.0, -1.0])
     case = ImpactCase(np.eye(2), normal[None], velocity, 0.0, "clipped component by component")
@@ -61,7 +63,7 @@ def saturation_counterexample() -> LimitedImpact:
 
 
 def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> LawResidual:
-    """Larger relative gain of tool and device, both at v⁻ before; infinite where the device exceeds its limit."""
+    """Larger relative energy gain of tool and device, both from v⁻; infinite if the device exceeds its limit."""
     tool_impulse, device_force = subject(case.impulse.copy(), case.dt, case.force_limit.copy())
     gains = [_gain(case.impact, tool_impulse), _gain(case.impact, case.dt * device_force)]
     value = np.inf if np.any(np.abs(device_force) > case.force_limit) else max(gains)

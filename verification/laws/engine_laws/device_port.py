@@ -1,8 +1,9 @@
 """Passivity observer at the hand's port of a whole device scene: a unilateral coupler to a tool on a rigid wall.
 
-While b ≥ K_cpl T/2 + B_cpl, e = 0, the sensors are ideal and the hand, once in the wall, keeps the coupler pressing, no
-motion gets energy out of the loop of coupler, tool, rigid contact and device: the tool rests, and the coupler is the
-wall of `hand_port`. What happens otherwise is measured in `verification.stability.device_port`.
+Assume that b ≥ K_cpl T/2 + B_cpl, that e = 0, that the sensors are ideal, and that the hand, once in the wall, keeps
+the coupler pressing. Then no motion extracts energy from the loop of coupler, tool, rigid contact and device, because
+the tool rests and the coupler acts as the wall of `hand_port`. `verification.stability.device_port` measures the other
+cases.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from verification.stability.device_loop import (
 )
 
 Subject = Callable[[DeviceLoop, Floats], Floats]  # (loop, positions (n + 1,)) -> actuator forces (n,)
-STEPS, WAY = 150, 10  # of the motion; and how much slower the way in is: damping it must not fill the observer
+STEPS, WAY = 150, 10  # steps of the motion; how much slower the entry is, so that its damping adds little energy
 
 
 @dataclass(frozen=True)
 class HeldDevice:
-    """A loop, the device's physical damping [N s/m], and the positions (n + 1,) that the hand gives it [m]."""
+    """A loop, the device's physical damping [N s/m], and the positions (n + 1,) [m] that the hand imposes."""
 
     loop: DeviceLoop
     device_damping: float
@@ -37,7 +38,7 @@ class HeldDevice:
 
 
 def draw(rng: np.random.Generator) -> HeldDevice:
-    """Gains and masses over decades, b at the bound or above it; a slow way into the wall, then any pressing motion."""
+    """Draw gains and masses over decades, b at or above the bound, and a slow entry followed by any pressing motion."""
     dt = float(rng.choice([1.0 / 512.0, 1e-3]))
     stiffness = 10.0 ** rng.uniform(1.0, 5.0)
     damping = float(rng.choice([0.0, 1.0])) * stiffness * dt * rng.uniform(0.0, 2.0)
@@ -52,14 +53,14 @@ def draw(rng: np.random.Generator) -> HeldDevice:
 
 
 def ours(loop: DeviceLoop, positions: Floats) -> Floats:
-    """The engine's loop, with the reference's rigid contacts."""
+    """Actuator forces (n,) [N] of the engine's loop with the rigid contacts of `reference`."""
     return actuator_forces(loop, positions)
 
 
 def device_port_is_passive(case: HeldDevice, subject: Subject) -> LawResidual:
-    """Leak over the energy that coupler and damper turned over.
+    """Leak relative to the energy exchanged with coupler and damper.
 
-    n sums round, and the coupler's extension rounds with the places that it is the difference of.
+    The tolerance covers the rounding of n sums and of the coupler's extension, which is a difference of two positions.
     """
     x, dt = case.positions, case.loop.dt
     leak = max(0.0, -float(np.min(entered_energy(x, subject(case.loop, x), case.device_damping, dt))))

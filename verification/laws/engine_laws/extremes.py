@@ -1,4 +1,4 @@
-"""Any finite input, however large, small, singular or meaningless: a finite motion, or an error that has a name."""
+"""For every finite input, even huge, tiny or singular, the resolver returns a finite velocity or raises IapbError."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROW_KINDS = ("generic", "dependent", "scaled", "copies", "none", "zeros", "huge"
 
 
 def draw(rng: np.random.Generator) -> ImpactCase:
-    """M, J and v each of a size between the smallest and the largest double; M not always a mass matrix."""
+    """Draw M, J and v with magnitudes between the smallest and the largest double; M is not always a mass matrix."""
     d = int(rng.integers(1, 7))
     kind, rows_kind = str(rng.choice(MASS_KINDS)), str(rng.choice(ROW_KINDS))
     mass = _mass(rng, kind, d)
@@ -39,7 +39,7 @@ def _mass(rng: np.random.Generator, kind: str, d: int) -> Floats:
 
 
 def _sized(rng: np.random.Generator, array: Floats) -> Floats:
-    """One size for the whole, or one per entry (symmetric for a square one); kept finite."""
+    """Scale the array by one magnitude, or each entry by its own (symmetric for a square array); keep it finite."""
     sizes = rng.choice(SIZES, size=array.shape) if rng.random() < 0.2 else float(rng.choice(SIZES))
     if isinstance(sizes, np.ndarray) and array.ndim == 2 and array.shape[0] == array.shape[1]:
         sizes = np.maximum(sizes, sizes.T)
@@ -47,12 +47,12 @@ def _sized(rng: np.random.Generator, array: Floats) -> Floats:
 
 
 def ours(M: Floats, J: Floats, v: Floats, e: float) -> object:
-    """The engine's resolver."""
+    """Call the engine's resolver."""
     return resolve_impact(M, J, v, e)
 
 
 def finite_or_named(case: ImpactCase, subject: Resolver) -> LawResidual:
-    """0 for a finite motion or an IapbError, else 1, against a tolerance of 0."""
+    """0 if the resolver returns a finite velocity or raises an IapbError, else 1; the tolerance is 0."""
     try:
         answer = subject(case.mass_matrix.copy(), case.contact_jacobian.copy(), case.velocity.copy(), case.restitution)
         v_plus = np.asarray(getattr(answer, "velocity", answer))

@@ -1,7 +1,7 @@
-"""Two rooms that share nothing: simulated together or apart, each moves the same, whatever happens in the other.
+"""Law of group splitting: two scenes without common contacts move the same, whether simulated together or separately.
 
-The engine splits the contacts of a step into groups and resolves each by itself; a factor, a budget or a state that
-leaks from one group to another shows here.
+The engine splits the contacts of a step into groups and resolves each group separately. This law detects a factor, a
+budget or a state that one group passes on to another.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from verification.laws.scenes import ROOM, SceneCase, Values, draw_scene
 Simulate = Callable[[SceneCase], Run]
 STEPS = 200
 EPS = float(np.finfo(float).eps)
-APART = 16.0  # [m] between the rooms: a power of two, so that places in them round alike
+APART = 16.0  # [m] between the rooms; a power of two, so that positions in both round alike
 
 
 @dataclass(frozen=True)
 class TwoRooms:
-    """Two scenes far from each other, and both as one."""
+    """Two scenes far from each other, and one scene that contains both."""
 
     one: SceneCase
     other: SceneCase
@@ -31,7 +31,7 @@ class TwoRooms:
 
 
 def draw(rng: np.random.Generator) -> TwoRooms:
-    """Bodies and walls of two random scenes; step, gravity and contact constants are those of the first."""
+    """Draw two random scenes; both use the step, gravity and contact constants of the first."""
     first = draw_scene(rng, STEPS).values
     common = {key: first[key] for key in ("name", "rate", "duration", "contact")} | {"gravity": first.get("gravity")}
     rooms = [_room(first["bodies"], "near", 0.0), _room(draw_scene(rng, STEPS).values["bodies"], "far", APART)]
@@ -41,7 +41,7 @@ def draw(rng: np.random.Generator) -> TwoRooms:
 
 
 def _room(bodies: list[Values], name: str, x: float) -> Values:
-    """The bodies, renamed and moved by x, inside four slabs."""
+    """Return the bodies, renamed and moved by x, and four slabs around them."""
     moved = [_moved(body, name, x) for body in bodies]
     middle = ROOM + 1.0
     upright, flat = [2.0, 6.0], [6.0, 2.0]
@@ -63,15 +63,15 @@ def _moved(body: Values, name: str, x: float) -> Values:
 
 
 def ours(case: SceneCase) -> Run:
-    """The engine."""
+    """Simulate the scene with the engine."""
     return case.simulate()
 
 
 def groups_apart_move_alike(case: TwoRooms, subject: Simulate) -> LawResidual:
-    """Distance of the states, together and apart, at the first instant at which they differ at all.
+    """Distance between the states of the joint and the separate run, at the first instant at which they differ.
 
-    A compiled sum over more entries may take them in another order, so the last bits may differ; later instants follow
-    from states that differ, and bodies that collide drive those apart. They are not judged.
+    A compiled sum over more entries may add them in another order, so the last bits may differ. Later instants are not
+    judged, because collisions amplify such differences.
     """
     together, one, other = subject(case.together), subject(case.one), subject(case.other)
     d = one.v.shape[1]
@@ -80,7 +80,7 @@ def groups_apart_move_alike(case: TwoRooms, subject: Simulate) -> LawResidual:
 
 
 def _first_difference(together: Run, apart: Run, of: slice) -> float:
-    """Largest difference of q and v over their size, at that instant (nq = nv in these scenes)."""
+    """Largest relative difference of q and v at the first instant with a difference (nq = nv in these scenes)."""
     steps = 1 + min(together.steps, apart.steps)
     all_states = np.hstack([together.q[:steps, of], together.v[:steps, of]])
     own_states = np.hstack([apart.q[:steps], apart.v[:steps]])

@@ -1,13 +1,15 @@
 """Passivity observer at the hand's port of a sampled wall (paper section VII, claim C20).
 
-A device with physical damping b is moved along x(t); its position is read every T seconds, and the wall's force
-F = K x_k + B (x_k − x_{k−1})/T (resisting, x > 0 inside, never pulling) is held until the next reading. Of all motions
-through the same readings the straight one loses least in b, b (Δx)²/T per step, so for every motion
+The hand moves a device with physical damping b along x(t). The device's position is read every T seconds, and the
+wall's force F = K x_k + B (x_k − x_{k−1})/T (resisting, x > 0 inside, never pulling) is held until the next reading.
+Among all motions through the same readings, uniform motion between them dissipates least in b, namely b (Δx)²/T per
+step. Every motion therefore satisfies
 
-    E_n ≥ Σ F_k Δx_k + b Δx_k²/T ≥ (b − KT/2 − |B|) Σ Δx_k²/T:
+    E_n ≥ Σ F_k Δx_k + b Δx_k²/T ≥ (b − KT/2 − |B|) Σ Δx_k²/T.
 
-convexity of ½Kx² for the spring, 2|ab| ≤ a² + b² for the damper. Hence b ≥ KT/2 + |B| suffices, and it is Colgate's and
-Schenkel's condition (J. Robotic Systems 14, 1997). The inertia of the device stores energy and never makes any.
+This uses the convexity of ½Kx² for the spring and 2|ab| ≤ a² + b² for the damper. Hence b ≥ KT/2 + |B| is sufficient;
+this is the condition of Colgate and Schenkel (J. Robotic Systems 14, 1997). The inertia of the device stores energy but
+never creates any.
 """
 
 from __future__ import annotations
@@ -37,12 +39,12 @@ class WallInTheHand:
 
     @property
     def bound(self) -> float:
-        """KT/2 + |B|: the least device damping that is sure to be passive."""
+        """KT/2 + |B|: the least device damping that guarantees passivity."""
         return 0.5 * self.stiffness * self.dt + abs(self.damping)
 
 
 def draw(rng: np.random.Generator) -> WallInTheHand:
-    """K, B, T over decades, b at the bound or above it, and motions from slow to as quick as the sampling."""
+    """Draw K and B over decades, T, b at or above the bound, and a motion from slow to half the sampling rate."""
     K, B = 10.0 ** rng.uniform(1.0, 5.0), float(rng.choice([0.0, 1.0])) * 10.0 ** rng.uniform(-1.0, 3.0)
     dt = float(rng.choice([1.0 / 512.0, 1e-3, 1e-4]))
     x = hand_motion(rng, int(rng.integers(50, 800)))
@@ -51,7 +53,7 @@ def draw(rng: np.random.Generator) -> WallInTheHand:
 
 
 def hand_motion(rng: np.random.Generator, n: int) -> Floats:
-    """Readings of a sine up to half the sampling rate, a walk, or both, some millimetres wide."""
+    """Return readings of a sine up to half the sampling rate plus a random walk; both have random amplitudes (mm)."""
     k = np.arange(n + 1)
     sine = np.sin(np.pi * rng.uniform(0.0, 1.0) * k + rng.uniform(0.0, 6.3)) + rng.uniform(-1.0, 1.0)
     walk = np.cumsum(rng.normal(size=n + 1)) / np.sqrt(n)
@@ -59,9 +61,10 @@ def hand_motion(rng: np.random.Generator, n: int) -> Floats:
 
 
 def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, half: float = 5e-4) -> WallInTheHand:
-    """Slowly into the wall, so deep that it always pushes, then forth and back by `half` [m] at half the sampling rate.
+    """Return the motion to which a sampled wall gives most energy.
 
-    That is the motion that a wall feeds most.
+    The device enters the wall slowly, so deep that the wall always pushes. Then it moves back and forth by `half` [m]
+    at half the sampling rate.
     """
     depth = 2.0 * half + 4.0 * B * half / (K * dt)
     entering = np.linspace(0.0, depth, steps // 4)
@@ -69,12 +72,12 @@ def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, 
 
 
 def ours(depth: float, rate: float, K: float, B: float) -> float:
-    """The engine's penalty (5), clamped, at one contact."""
+    """The engine's penalty force (5) [N] at one contact, clamped so that it never pulls."""
     return float(normal_force(-depth, -rate, K, B, True)) if depth > 0.0 else 0.0
 
 
 def observed_energy(case: WallInTheHand, wall: Wall) -> Floats:
-    """Energy (n,) [J] that the hand has put in by the end of each step, on the straightest motion."""
+    """Energy (n,) [J] that the hand has supplied by the end of each step, for uniform motion between the readings."""
     x, change = case.readings, np.diff(case.readings)
     rate = np.concatenate([[0.0], change / case.dt])[:-1]
     force = np.array([wall(float(a), float(r), case.stiffness, case.damping)
@@ -83,12 +86,12 @@ def observed_energy(case: WallInTheHand, wall: Wall) -> Floats:
 
 
 def leak(case: WallInTheHand, wall: Wall) -> float:
-    """Most energy [J] that came out of the port beyond what had gone in."""
+    """Largest net energy [J] that the port has returned to the hand."""
     return max(0.0, -float(np.min(observed_energy(case, wall), initial=0.0)))
 
 
 def hand_port_is_passive(case: WallInTheHand, subject: Wall) -> LawResidual:
-    """Leak over the energy that wall and damper turned over; each of the n sums rounds."""
+    """Leak relative to the energy exchanged with wall and damper; the tolerance covers the rounding of n sums."""
     turnover = (case.device_damping + case.bound) * float(np.sum(np.diff(case.readings) ** 2)) / case.dt
     relative = leak(case, subject) / turnover if turnover > 0.0 else 0.0
     return LawResidual("hand_port", relative, 4.0 * len(case.readings) * EPS)

@@ -1,4 +1,4 @@
-"""Anytime: every truncation of the projector is passive, so a row budget never costs passivity."""
+"""Anytime property: every truncation of the projector is passive, so a row budget never costs passivity."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ LARGEST_CONDITION = 1e12
 
 
 def draw(rng: np.random.Generator) -> ImpactCase:
-    """An impact of any family."""
+    """Draw an impact of any family."""
     return draw_case(rng, LARGEST_CONDITION)
 
 
 def ours(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Any:
-    """The engine's resolver, stopped after `budget` rows."""
+    """Call the engine's resolver; it stops after `budget` rows."""
     return resolve_impact(M, J, v, e, budget=budget)
 
 
@@ -33,7 +33,7 @@ def _in_budget(subject: Budgeted, budget: int, M: Floats, J: Floats, v: Floats, 
 
 
 def every_budget_is_passive(case: ImpactCase, subject: Budgeted) -> LawResidual:
-    """Largest relative gain over all budgets; infinite where a budget of none still gives an impulse."""
+    """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
     worst = -np.inf
     for budget in range(min(case.contacts, case.coordinates) + 1):
         v_plus = outcome(partial(_in_budget, subject, budget), case)
