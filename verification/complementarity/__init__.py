@@ -1,1 +1,1 @@
-"""IAPB beside complementarity: where they agree, by how much they differ, what each costs. Plain records."""
+"""Compare IAPB with complementarity: where the laws agree, how much they differ, and what each costs."""

@@ -1,18 +1,20 @@
 """Where IAPB's factored equality and the Newton LCP agree, by how much they differ, and why.
 
-Three exact statements, each tried on every case here. Let Δ_eq = −(1+e) P u be IAPB's change of velocity in kinetic
-coordinates (u = Lᵀv, A = J L⁻ᵀ, P the projector onto A's rows) and C = {Aᵀp : p >= 0}. For one e and *any* gamma_minus:
+This module tests three exact statements on every case. Let Δ_eq = −(1+e) P u be IAPB's change of velocity in kinetic
+coordinates (u = Lᵀv, A = J L⁻ᵀ, P projects onto the row space of A) and let C = {Aᵀp : p >= 0}. If all contacts have
+the same e, then for *any* gamma_minus:
 
 1. The LCP's change is the projection of Δ_eq on the cone C (its QP is min |Aᵀp + (1+e)u|, and (I − P)u is normal to C).
-   So the laws agree if and only if some p >= 0 gives IAPB's motion, and their distance is the distance of Δ_eq from C.
-2. Both changes are (1+e) times those of the plastic impact: e moves no case from agreement to disagreement.
-3. IAPB never keeps more energy: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e = 1 both keep all of it.
+   So the laws agree if and only if some p >= 0 gives IAPB's velocity; their distance is the distance of Δ_eq from C.
+2. Both changes are (1+e) times those of the plastic impact: whether the laws agree does not depend on e.
+3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e = 1 neither loses
+   energy.
 
-The map: agreement with complementarity by geometry, restitution and redundancy; and two contacts, exactly.
+`agreement_map` sums up the agreement by geometry, restitution and redundancy; `two_contact_map` tests two contacts.
 
-For two contacts whose unit rows have the cosine c in the kinetic metric and close at speeds 1 and r <= 1, both
-impulses of IAPB push if and only if r >= c: W⁻¹ applied to (1, r) is proportional to (1 − c r, r − c). Below that line
-the slower contact pulls. Restitution and all other motion play no part. The map tries this on a grid.
+Let two contacts have unit rows with the cosine c in the kinetic metric and approach at speeds 1 and r <= 1. Both
+impulses of IAPB push if and only if r >= c, because W⁻¹ (1, r) is proportional to (1 − c r, r − c). If r < c, the
+slower contact pulls. Neither the restitution nor any other component of the velocity matters.
 """
 
 from __future__ import annotations
@@ -32,12 +34,13 @@ from verification.complementarity.cases import two_contacts
 from verification.finding import Failure, attempt
 from verification.impacts import ImpactCase
 
-# Two motions are the same below this distance (kinetic metric, of |v⁻|): what C05 asks for. Active-set solutions of
-# well-conditioned cases end near 1e-15; true disagreement starts near 1e-4 in all families.
+# Two velocities count as equal below this distance (kinetic metric, relative to |v⁻|), which is also C05's tolerance.
+# Active-set solutions of well-conditioned cases reach about 1e-15; true differences are above 1e-4 in all families.
 SAME = 1e-12
-# p >= 0 reproduces the motion below this distance: ten times SAME, so that one tie in rounding is no counterexample.
+# Below this distance p >= 0 reproduces the velocity: ten times SAME, so that rounding alone gives no counterexample.
 REPRODUCED = 1e-11
-# A contact approaches below minus this share of the largest contact velocity: rounding of an exact zero stays above.
+# A contact approaches if its velocity is below minus this share of the largest contact velocity. Rounding of an exact
+# zero is smaller than this.
 APPROACHING = 1e-9
 LAWS = ("newton_lcp", "poisson")
 Resolver = Callable[[ImpactCase], tuple[np.ndarray, np.ndarray]]
@@ -45,12 +48,13 @@ Resolver = Callable[[ImpactCase], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Comparison:
-    """IAPB and one complementarity law on one case; lengths in the kinetic metric, relative to |v⁻|.
+    """IAPB and one complementarity law on one case; distances in the kinetic metric, relative to |v⁻|.
 
-    distance : |v⁺ − v⁺_law|; cone_distance : of IAPB's impulse from {Jᵀp : p >= 0}
-    energy_lost, energy_lost_law : share of KE⁻; law_2, law_3 : defects of the statements 1 and 3 above
-    adhesion : "none", "artefact of the minimum norm" or "adhesive"; adhesive_share : of the impulses as given
-    approaching : contacts, given or touching, that IAPB leaves approaching
+    distance : |v⁺ − v⁺_law|; cone_distance : distance of IAPB's impulse from {Jᵀp : p >= 0}
+    energy_lost, energy_lost_law : loss of kinetic energy under IAPB and under the law, as a share of KE⁻
+    adhesion : "none", "artefact of the minimum norm" or "adhesive"
+    adhesive_share : sum of the pulling impulses that IAPB returns, divided by the sum of all |p|
+    approaching, approaching_law : number of contacts, given or touching, that still approach after the impact
     momentum_residual : share of M(v⁺−v⁻) outside range(Jᵀ)
     """
 
@@ -71,28 +75,28 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the two motions are one."""
+        """Whether the two laws give the same velocity."""
         return self.distance <= SAME
 
     @property
     def pushes(self) -> bool:
-        """Whether some p >= 0 gives IAPB's motion."""
+        """Whether some p >= 0 gives IAPB's velocity."""
         return self.cone_distance <= REPRODUCED
 
     @property
     def projection_defect(self) -> float:
-        """|distance − cone_distance|: zero by statement 1 (Newton LCP)."""
+        """|distance − cone_distance|; statement 1 says that it is zero for the Newton LCP."""
         return abs(self.distance - self.cone_distance)
 
     @property
     def energy_defect(self) -> float:
-        """Defect of statement 3 (Newton LCP), as a share of KE⁻."""
+        """Error of the equation in statement 3, as a share of KE⁻; it is zero for the Newton LCP."""
         e = self.restitution
         return abs(self.energy_lost - self.energy_lost_law - (1.0 - e) / (1.0 + e) * self.distance**2)
 
 
 def iapb(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
-    """v⁺ and p of the engine."""
+    """Return v⁺ and p of the engine."""
     impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     return impact.velocity, impact.impulses
 
@@ -103,7 +107,7 @@ def compare_case(case: ImpactCase, law: str = "newton_lcp", resolver: Resolver =
     Raises
     ------
     SolverError
-        Where the law's own solver leaves a residual: then there is nothing to compare with.
+        The law's own solver leaves a residual, so there is no solution to compare with.
     """
     problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
     v, p = resolver(case)
@@ -125,7 +129,7 @@ def compare_case(case: ImpactCase, law: str = "newton_lcp", resolver: Resolver =
 
 
 def _lost(before: np.ndarray, change: np.ndarray) -> float:
-    """KE⁻ − KE⁺ as a share of KE⁻, from the change itself so that nothing cancels."""
+    """Return (KE⁻ − KE⁺) / KE⁻, computed from the change of velocity to avoid cancellation."""
     energy = 0.5 * float(before @ before)
     return -float(before @ change + 0.5 * change @ change) / energy if energy > 0.0 else 0.0
 
@@ -136,7 +140,7 @@ def _approaching(case: ImpactCase, velocity: np.ndarray, scale: float) -> int:
 
 
 def _cone_distance(problem: ImpactProblem, change: np.ndarray) -> float:
-    """Distance of a change of velocity from {Aᵀp : p >= 0}, by non-negative least squares on unit rows."""
+    """Return the distance of a change of velocity from {Aᵀp : p >= 0}, by non-negative least squares on unit rows."""
     from scipy.optimize import nnls
 
     rows = problem.factor
@@ -160,7 +164,7 @@ def compare_cases(
     cases: Iterable[ImpactCase], law: str = "newton_lcp", resolver: Resolver = iapb,
     failures: list[Failure] | None = None,
 ) -> tuple[Comparison, ...]:
-    """Compare on every case; `failures` receives those that raise."""
+    """Compare IAPB with a law on every case; `failures` receives the cases that raise an exception."""
     found = (attempt(f"{case.family}, e = {case.restitution:g}, impact {number}",
                      partial(compare_case, case, law, resolver), failures)
              for number, case in enumerate(cases, 1))  # fmt: skip
@@ -176,13 +180,14 @@ ARTEFACT, ADHESIVE = "artefact of the minimum norm", "adhesive"
 class MapCell:
     """All comparisons with one family, restitution, redundancy and law.
 
-    agree : share whose motions are one; adhesive, artefact : shares whose impulses truly pull, or only as chosen
-    nearest : least distance among those that differ (how sharp the border is), farthest : largest of all
-    typical : median distance among those that differ
-    extra_loss, least_extra_loss : largest and least share of KE⁻ that IAPB loses in addition
-    left_approaching, left_approaching_law : share with a contact (given or touching) left approaching
-    contradictions : cases in which the motions are one without a p >= 0 for it, or the other way round
-    defect : largest defect of statements 1 and 3 (`agreement`), momentum : largest momentum residual
+    agree : share of cases in which both laws give the same velocity
+    adhesive : share of cases in which no p >= 0 gives IAPB's velocity
+    artefact : share of cases in which only the least-norm impulses pull, while some p >= 0 gives the same velocity
+    nearest, typical : least and median distance among the cases that differ; farthest : largest distance of all cases
+    extra_loss, least_extra_loss : largest and least loss of IAPB beyond the law's loss, as a share of KE⁻
+    left_approaching, left_approaching_law : share of cases after which a contact (given or touching) approaches
+    contradictions : cases that agree although no p >= 0 gives the velocity, or differ although some p >= 0 does
+    defect : largest error in statements 1 and 3 of this module; momentum : largest momentum residual
     """
 
     family: str
@@ -208,7 +213,7 @@ class MapCell:
 
 @dataclass(frozen=True)
 class TwoContactCell:
-    """Cosine of the rows and speed ratio: predicted agreement (r >= c), found agreement, distance of the motions."""
+    """One grid point of two contacts: whether agreement is predicted (r >= c) and found, and the laws' distance."""
 
     cosine: float
     speed_ratio: float
@@ -248,7 +253,7 @@ def _cell(key: tuple[str, str, float, int], members: Sequence[Comparison]) -> Ma
 
 
 def contradicts(found: Comparison) -> bool:
-    """Whether a case speaks against "equal motions if and only if some p >= 0 gives IAPB's motion"."""
+    """Whether a case contradicts "the laws agree if and only if some p >= 0 gives IAPB's velocity"."""
     return (found.distance <= SAME and found.cone_distance > REPRODUCED) or (
         found.cone_distance <= SAME and found.distance > REPRODUCED
     )
@@ -262,7 +267,7 @@ def two_contact_map(
     cosines: Sequence[float] = COSINES, speed_ratios: Sequence[float] = SPEED_RATIOS, seed: int = 2,
     failures: list[Failure] | None = None,
 ) -> tuple[TwoContactCell, ...]:
-    """Try the border r = c on a grid of two-contact impacts; grid points on the border itself are left out."""
+    """Test the condition r >= c on a grid of two-contact impacts; grid points with r = c are left out."""
     rng = np.random.default_rng(seed)
     cells = []
     for cosine in cosines:

@@ -1,9 +1,9 @@
-"""Impacts to compare laws on: random families, each with the geometry that it is about.
+"""Random impacts on which the laws are compared, in families of known geometry.
 
-The rows of a case are those that approach (gamma_minus < 0), as the engine's caller gives them; contacts that touch
-and do not approach are kept apart, to see whether the impact makes them. Geometry is controlled in the kinetic
-metric, where it decides: with M = L Lᵀ, rows A = J L⁻ᵀ and u = Lᵀv, two contacts pull on one another when the
-cosine of their rows is positive.
+The rows of a case are the contacts that approach (gamma_minus < 0), as in the engine. Contacts that touch without
+approaching are stored separately, to see whether they approach after the impact. The geometry is set in the kinetic
+metric, because agreement depends on it there: with M = L Lᵀ, rows A = J L⁻ᵀ and u = Lᵀv, the impulse at one of two
+contacts can pull only if the cosine of their rows is positive.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Geometry:
-    """A geometry: draw(rng, redundancy) -> (M, J, v), and the redundancies that it can have."""
+    """A geometry: draw(rng, redundancy) -> (M, J, v), and the possible numbers of redundant rows."""
 
     name: str
     says: str
@@ -37,7 +37,7 @@ def random_cases(
     families: tuple[str, ...] | None = None,
     seed: int = 4,
 ) -> Iterator[ImpactCase]:
-    """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same ones."""
+    """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same impacts."""
     unknown = set(families or ()) - set(FAMILIES)
     if unknown:
         raise ArgumentError("families", sorted(unknown), one_of(min(unknown), FAMILIES, "some of "))
@@ -54,9 +54,10 @@ def random_cases(
 def two_contacts(
     cosine: float, speed_ratio: float, rng: np.random.Generator, coordinates: int = 4
 ) -> ImpactCase:
-    """Two contacts whose unit rows have this cosine in the kinetic metric, closing at 1 and `speed_ratio`.
+    """Return an impact at two contacts whose unit rows have this cosine in the kinetic metric.
 
-    Lengths of the rows, the mass matrix and all motion along neither contact are random.
+    The contacts approach at speeds 1 and `speed_ratio`. The lengths of the rows, the mass matrix and the velocity
+    components orthogonal to both rows are random.
     """
     frame = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
     rows = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine**2)]]) @ frame[:2]
@@ -69,13 +70,13 @@ def two_contacts(
 
 
 def random_mass_matrix(rng: np.random.Generator, coordinates: int) -> Floats:
-    """A symmetric positive definite matrix (d, d) with eigenvalues over two decades."""
+    """Return a symmetric positive definite matrix (d, d) with eigenvalues between 0.1 and 10."""
     axes = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
     return np.asarray((axes * 10.0 ** rng.uniform(-1.0, 1.0, coordinates)) @ axes.T, np.float64)
 
 
 def _approaching(rows: Floats, velocity: Floats) -> Floats:
-    """Rows turned so that every contact closes."""
+    """Return the rows with signs chosen so that every contact approaches."""
     return np.where(rows @ velocity > 0.0, -1.0, 1.0)[:, None] * rows
 
 
@@ -88,14 +89,14 @@ def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Flo
 
 
 def _cradle(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """Balls in a row, velocities falling from left to right: all neighbours close."""
+    """Balls in a row whose velocities decrease from left to right, so that all neighbours approach each other."""
     n = int(rng.integers(3, 9))
     rows = np.diff(np.eye(n), axis=0)
     return np.diag(np.exp(rng.normal(size=n))), rows, -np.cumsum(rng.uniform(0.1, 1.0, n))
 
 
 def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """Rows with cosines <= 0 in the kinetic metric, like the normals of a wedge that opens."""
+    """Rows with cosines <= 0 in the kinetic metric, so that none of IAPB's impulses pulls."""
     d, c = int(rng.integers(3, 9)), int(rng.integers(2, 4))
     gram = np.eye(c) - rng.uniform(0.0, 0.9 / (c - 1), size=(c, c)) * (1.0 - np.eye(c))
     frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
@@ -107,7 +108,7 @@ def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
 
 
 def _face_on_floor(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """A planar box lands on 2 + redundancy points of its lower face, turning as it falls."""
+    """A planar box lands with some rotation on 2 + redundancy points of its lower face."""
     m, half = np.exp(rng.normal()), rng.uniform(0.2, 2.0)
     inertia = m * (half**2 + rng.uniform(0.1, 1.0) ** 2) / 3.0
     points = np.sort(rng.uniform(-half, half, 2 + redundancy))
@@ -117,7 +118,7 @@ def _face_on_floor(rng: np.random.Generator, redundancy: int) -> tuple[Floats, F
 
 
 def _corner(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """A planar box strikes floor and wall at once: two points of the floor or more, the rest at the wall."""
+    """A planar box strikes the floor at two points and a wall at 1 + redundancy points at once."""
     mass, floor, velocity = _face_on_floor(rng, 0)
     height = rng.uniform(-1.0, 1.0, 1 + redundancy) * np.abs(floor[:, 2]).max()
     wall = np.column_stack([-np.ones_like(height), np.zeros_like(height), height])
@@ -126,7 +127,7 @@ def _corner(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
 
 
 def _hole(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """A peg in a hole with a draft (1:100): its end and both sides close at once."""
+    """A peg in a hole with a taper of 1:100: its end and both sides approach the hole at once."""
     length, width, slope = rng.uniform(0.5, 3.0), 1.0, 0.01
     n = np.array([slope, 1.0]) / np.hypot(slope, 1.0)
     points = [((x, -length), (0.0, 1.0)) for x in (-width, width)]
@@ -139,7 +140,7 @@ def _hole(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Fl
 
 
 def _random_rows(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """Normals in all directions on a random mass matrix; redundant rows are combinations with weights > 0."""
+    """Random rows and a random mass matrix; the redundant rows are sums of the others with positive weights."""
     d = int(rng.integers(3, 13))
     independent, velocity = rng.normal(size=(int(rng.integers(2, d)), d)), rng.normal(size=d)
     independent = _approaching(independent, velocity)
@@ -148,7 +149,7 @@ def _random_rows(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Flo
 
 
 def _rows_that_touch(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """As `_random_rows`, with one contact more that touches and slowly opens."""
+    """Like `_random_rows`, with one more contact that touches and slowly separates."""
     mass, rows, velocity = _random_rows(rng, redundancy)
     row = rng.normal(size=len(velocity))
     row -= velocity * ((row @ velocity - rng.uniform(0.0, 0.1)) / (velocity @ velocity))

@@ -1,4 +1,4 @@
-"""What the three assumptions of IAPB buy against complementarity, and what they cost."""
+"""Compare IAPB and its three assumptions with complementarity, in outcome and in cost."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ LEAD = (
     "problems that solvers find hard. A solution counts only if its residuals, recomputed from the problem, are small. "
     "Velocities after the impact are compared in the kinetic metric, relative to |v⁻|."
 )
-# Contact problems that others wrote, beside the project where somebody has put them; a clone has none and needs none.
+# Optional folder of contact problems by others, next to the project. A clone does not need it.
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
 FOLDER_NAME = "problems of others"
 
 
 def complementarity(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Compare, judge each sentence from the records, and keep what is behind it; `run` makes a run of a world."""
+    """Compare the laws and return the finding with its tables; `run` simulates a scene in a world."""
     stages: list[str] = []
 
     def say(stage: str, done: int, total: int) -> None:
@@ -44,24 +44,24 @@ def complementarity(run: Callable[..., Run], depth: str, progress: Callable[[int
 def finding_of_study(
     study: ComparisonStudy, more: Mapping[str, Table] | None = None, failures: Sequence[Failure] = ()
 ) -> Finding:
-    """Return what a comparison says: each sentence judged from the records, and all its tables; `more` joins them."""
+    """Return the finding of a comparison: its judged sentences and all its tables, to which `more` is added."""
     failed = [*study.failures, *failures]
     parts = tuple(parts_of(study, failed))
     made = tables.all_tables(study, failed) | dict(more or {})
     return finding_of(ID, TITLE, LEAD, answer(study, parts), parts, made, failed)
 
 
-STAGES = 9  # of `compare`, with a folder of problems
+STAGES = 9  # number of stages of `compare` with a folder of problems
 
 
 def _renamed(study: ComparisonStudy) -> ComparisonStudy:
-    """Folders by name, not by where they are on this machine."""
+    """Return the study with the folder named FOLDER_NAME instead of by its path on this machine."""
     own, *others = study.problems
     return replace(study, problems=(own, *(replace(each, folder=FOLDER_NAME) for each in others)))
 
 
 def answer(study: ComparisonStudy, parts: Sequence[Part]) -> str:
-    """The sentence of the first page."""
+    """Return the answer for the first page of the report."""
     cells = study.cells + study.scenes
     cases = sum(cell.cases for cell in cells) or 1
     agree = sum(cell.agree * cell.cases for cell in cells) / cases

@@ -1,10 +1,11 @@
-"""The "ideal" world against event-driven truth: errors in proportion to the step, on every scene that has a truth.
+"""Compare the "ideal" world with the event-driven solution (the "truth") on every scene that has such a solution.
 
-Errors are measured before impacts accumulate: positions in the sup norm, velocities in L¹ over time (at an impact any
-two motions that are not simultaneous differ by the whole jump). Several step lengths on each level, since where an
-impact falls within a step is an accident; the order follows from the largest errors of two levels.
+The errors should be proportional to the step. They are measured before impacts accumulate: positions in the sup norm,
+velocities in L¹ over time, because a small shift of an impact in time changes the velocity by the whole jump. Each of
+two levels has several step lengths, because the position of an impact within a step is arbitrary. The order of
+convergence follows from the largest errors of the two levels.
 
-TRUTH_SCENES are small scenes in space that have a truth and show nothing but convergence.
+TRUTH_SCENES are small scenes in space that have an event-driven solution; only this study uses them.
 """
 
 from __future__ import annotations
@@ -24,17 +25,18 @@ from reference.worlds import find_world
 
 COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
 _LEVELS = 4.0
-# Errors per step on the fine level up to this multiple of the coarse one's count as first order: the accident of
-# where impacts fall changes them by less than two on all scenes; errors that do not shrink at all would give four.
+# The convergence counts as first order if the errors per step on the fine level are at most this multiple of those on
+# the coarse level. The positions of impacts within steps change the errors by a factor below two on all scenes; errors
+# that do not shrink at all would give a factor of four.
 BOUNDED = 2.5
-# Share of the errors on the fine level that the truth's own error may have: it then moves no order by more than 0.1.
+# The truth's own error may be at most this share of the errors on the fine level: it changes an order by at most 0.1.
 WORTH = 0.1
-_ROUNDING = 1e-9  # per second of step: an error of rounding alone is as good as none
+_ROUNDING = 1e-9  # per second of step: smaller errors are rounding and count as zero
 
 
 @dataclass(frozen=True)
 class TruthCase:
-    """A scene, the time before its impacts accumulate, and whether device and coupling take part."""
+    """A scene, a duration before its impacts accumulate [s], and whether the run includes device and coupling."""
 
     scene: str
     duration: float
@@ -76,11 +78,11 @@ WITHOUT_TRUTH = {
 
 @dataclass(frozen=True)
 class ConvergenceRow:
-    """One scene and scheme: errors divided by the step, largest on each level, and the order between the levels.
+    """One scene and scheme: the largest error per step on each level, and the order between the two levels.
 
-    position : sup norm over time and coordinates, per second of step [m/s, rad/s]
-    velocity : L¹ over time, largest coordinate, per second of step
-    truth_error : bound of the truth's own errors of positions [m, rad] and velocities [m, rad]
+    position_coarse, position_fine : sup norm over time and coordinates, per second of step [m/s, rad/s]
+    velocity_coarse, velocity_fine : L¹ norm over time, largest over the coordinates, per second of step
+    truth_error : bounds of the truth's own errors, for positions [m, rad] and for velocities [m, rad]
     """
 
     scene: str
@@ -96,12 +98,12 @@ class ConvergenceRow:
 
     @property
     def position_order(self) -> float:
-        """log₄ of the ratio of the largest position errors; infinite where they are rounding alone."""
+        """log₄ of the ratio of the largest position errors; infinite if these are rounding alone."""
         return _order(self.position_coarse, self.position_fine)
 
     @property
     def velocity_order(self) -> float:
-        """log₄ of the ratio of the largest velocity errors; infinite where they are rounding alone."""
+        """log₄ of the ratio of the largest velocity errors; infinite if these are rounding alone."""
         return _order(self.velocity_coarse, self.velocity_fine)
 
     @property
@@ -132,7 +134,7 @@ def convergence(
 
 
 def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> ConvergenceRow:
-    """Measure one case; `law` replaces the rigid world's."""
+    """Measure the convergence on one case; `law` replaces the contact law of the rigid world."""
     scene = scene_of(case.scene)
     truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints(scheme=scheme)
     levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
@@ -145,10 +147,10 @@ def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> Con
 
 
 def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> tuple[float, float]:
-    """Bounds of the truth's errors, as the steps' are measured; refused where they could be taken for the steps'."""
+    """Return bounds of the truth's errors in the same norms; raise SolverError if they are too large to compare."""
     bound, last = truth.bound, min(1.0 / rate for rate in FINE)
     _, v = truth.state(np.linspace(0.0, truth.end, 101))
-    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ of velocities that jump too late
+    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ error of late or early jumps
     worth = bound.position, bound.velocity * case.duration + jumps
     for error, measured in zip(worth, (position, velocity), strict=True):
         if error > max(WORTH * measured, _ROUNDING) * last:
@@ -157,12 +159,12 @@ def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float)
 
 
 def scene_of(name: str) -> Scene:
-    """A scene of TRUTH_SCENES, or one of the project's."""
+    """Return a scene of TRUTH_SCENES or of the project by name."""
     return scene_from_text(TRUTH_SCENES[name]) if name in TRUTH_SCENES else load_scene(find_scene(name))
 
 
 def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float) -> tuple[float, float]:
-    """Errors of positions (sup) and velocities (L¹), both divided by the step."""
+    """Return the errors of positions (sup norm) and velocities (L¹ norm), both divided by the step."""
     steps = int(np.floor(case.duration * rate))
     stepped = scene.with_values({"rate": rate, "duration": case.duration})
     coupling = find_world("ideal").coupling_in(stepped) if case.coupled else None

@@ -1,9 +1,12 @@
-"""IAPB's extensions beside their complementarity counterparts: friction in the impact, unequal restitution.
+"""Compare IAPB's extensions with complementarity: friction in the impact, and unequal restitution.
 
-Friction: the engine's law (`iapb.contact.impact_laws`) and Coulomb's NCP, its convex relaxation CCP. Where the engine's
-contacts push and its share is 1, the two motions are one; the NCP with e > 0 can gain energy, the engine cannot.
-Unequal restitution: Poisson's law by two LCPs, by two independent solvers; beside it the Newton LCP (sound where all
-contacts approach) and plain equalities (not sound).
+Friction: the engine's law (`iapb.contact.impact_laws`) is compared with Coulomb's law as a nonlinear complementarity
+problem (NCP) and with the convex relaxation of this problem (CCP). If all contacts push and the engine did not reduce
+friction, the engine and the NCP give the same velocity. With e > 0 the NCP can gain energy; the engine cannot.
+
+Unequal restitution: the engine and the reference solve the two LCPs of Poisson's law with independent solvers. Two
+other laws are compared: the Newton LCP, which can gain energy if some contacts separate, and plain equalities, which
+can gain energy even if all contacts approach.
 """
 
 from __future__ import annotations
@@ -33,20 +36,21 @@ from verification.finding import Failure, attempt
 
 Floats = NDArray[np.float64]
 
-# First-order sweeps (NSGS) end near 1e-10 of the velocities; two outcomes of different laws lie far above.
+# The sweeps of NSGS reach about 1e-10 of the velocities; outcomes of two different laws differ by far more.
 SAME_WITH_FRICTION = 1e-7
-GAIN = 1e-12  # a relative gain of kinetic energy above this is a gain, not rounding
+GAIN = 1e-12  # a relative gain of kinetic energy below this is rounding
 RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
 class FrictionCell:
-    """All impacts with one e and one μ; counts of impacts, energies as shares of KE⁻.
+    """All impacts with one e and one μ; numbers of impacts, and energies as shares of KE⁻.
 
-    pushing : every contact pushes (with and without friction), nothing was reduced
-    same : of these, the motion is the NCP's
-    reduced : friction reduced so that no energy is gained; ncp_gains, ccp_gains : impacts in which that law gains
-    unsolved : impacts that NSGS or the engine's limits left unconverged, compared by energy only
+    pushing : impacts in which every contact pushes, with and without friction, and friction is not reduced
+    same : number of those in which the velocity equals that of the NCP
+    reduced : impacts in which the engine reduces friction to avoid a gain of energy
+    ncp_gains, ccp_gains : impacts in which that law gains energy
+    unsolved : impacts in which NSGS or the engine does not converge; only their energies are compared
     """
 
     restitution: float
@@ -66,10 +70,11 @@ class FrictionCell:
 
 @dataclass(frozen=True)
 class UnequalCell:
-    """Unequal restitution on one family of signs: the engine's Poisson law beside three references.
+    """Impacts with unequal restitution: the engine's Poisson law compared with three reference laws.
 
-    distance : largest distance of v⁺ from the reference's Poisson law, kinetic metric, relative
-    gain, gain_newton_lcp, gain_equality : largest relative gains of energy
+    signs : "all approach" or "mixed signs", the signs of the contact velocities before the impact
+    distance : largest distance of v⁺ from the reference's Poisson law, in the kinetic metric, relative to |v⁻|
+    gain, gain_newton_lcp, gain_equality : largest relative gain of energy of each law
     """
 
     signs: str
@@ -91,17 +96,17 @@ class _Impact(NamedTuple):
         return 0.5 * float(self.velocity @ self.mass @ self.velocity)
 
     def gain(self, v_plus: Floats) -> float:
-        """(KE⁺ − KE⁻)/KE⁻."""
+        """Return (KE⁺ − KE⁻)/KE⁻."""
         return (0.5 * float(v_plus @ self.mass @ v_plus) - self.energy) / self.energy
 
     def distance(self, first: Floats, second: Floats) -> float:
-        """Distance of two velocities in the kinetic metric, of |v⁻|."""
+        """Return the distance of two velocities in the kinetic metric, relative to |v⁻|."""
         change = first - second
         return float(np.sqrt(change @ self.mass @ change / (2.0 * self.energy)))
 
 
 def _draw(rng: np.random.Generator, approaching: bool) -> _Impact:
-    """Up to three contacts with one or two tangents on three to eight coordinates."""
+    """Draw an impact with one to three contacts, one or two tangents each, and three to eight coordinates."""
     d, c, m = int(rng.integers(3, 9)), int(rng.integers(1, 4)), int(rng.integers(1, 3))
     velocity, rows = rng.normal(size=d), rng.normal(size=(c, d))
     if approaching:
@@ -154,13 +159,13 @@ def _friction_cell(impacts: list[_Impact], e: float, mu: float) -> FrictionCell:
 
 
 def _pushes(impact: _Impact, e: float, ours: FrictionalImpact) -> bool:
-    """Every contact pushes, with friction and without it, and friction was not reduced."""
+    """Return whether every contact pushes, with friction and without it, and friction is not reduced."""
     without = resolve_impact(impact.mass, impact.rows, impact.velocity, e).impulses
     return bool(ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0)
 
 
 def _counterparts(impact: _Impact, e: float, mu: float) -> tuple[Floats | None, Floats | None]:
-    """v⁺ of the NCP and of the CCP; None where NSGS does not solve it."""
+    """Return v⁺ of the NCP and of the CCP; None for a problem that NSGS does not solve."""
     blocks = np.concatenate([impact.rows[:, None, :], impact.tangents], axis=1)
     rows, size = blocks.reshape(-1, blocks.shape[2]), blocks.shape[1]
     problem = ImpactProblem.from_impact(impact.mass, rows, impact.velocity, e, mu, contact_size=size)
@@ -198,7 +203,7 @@ def _unequal_cell(signs: str, count: int, seed: int) -> UnequalCell:
 
 
 def struck_bar() -> dict[str, float]:
-    """The bar of docs/theory.md, struck at 0.5 and 0.4 with e = (1, 0): kinetic energies [J] by law."""
+    """Return the kinetic energies [J] by law of the bar of docs/theory.md, struck at 0.5 and 0.4 with e = (1, 0)."""
     mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
     velocity, e = np.array([-1.0, 0.0]), (1.0, 0.0)
     problem = ImpactProblem.from_impact(mass, rows, velocity, e)

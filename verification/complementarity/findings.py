@@ -1,4 +1,4 @@
-"""What a comparison found, in parts: each a sentence with its numbers and its verdict, from the record alone."""
+"""The parts of the finding: each is a text with numbers and a verdict, computed from the record alone."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ from verification.finding import (
 )
 
 C05_TOLERANCE = 1e-12
-# Jᵀp lies in range(Jᵀ) to the rounding of two solves with M: condition numbers reach 1e4 in the families.
+# M(v⁺−v⁻) lies in range(Jᵀ) up to the rounding of two solves with M; condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9
-# Engine and references: sums of some dozens of products, of entries of size one.
+# Largest difference of engine and references: the rounding of some dozens of products of entries of size one.
 SAME_MECHANICS = 1e-12
-# Two solvers' outcomes of one law: ten times the residual that `reference.complementarity.laws` accepts.
+# Largest difference of two solvers of one law: ten times the residual that `reference.complementarity.laws` accepts.
 SAME_LAW = 1e-8
 
 
 def parts_of(study: ComparisonStudy, failures: list[Failure] | None = None) -> tuple[Part, ...]:
-    """Return every part, most important first; those about nothing are left out.
+    """Return every part, most important first; parts without any case are left out.
 
-    failures : receives the parts that cannot be made, as where every case that they are about failed
+    failures : receives the parts that raise an exception, for example because all their cases failed
     """
     found = [attempt(f"sentence on {name.replace('_', ' ')}", partial(make, study), failures)
              for name, make in PARTS.items()]  # fmt: skip
@@ -58,7 +58,7 @@ def parts_of(study: ComparisonStudy, failures: list[Failure] | None = None) -> t
 
 
 def single_contact(study: ComparisonStudy) -> Part | None:
-    """C05."""
+    """Claim C05: at a single contact the two laws agree."""
     worst = max(c.distance for c in study.single)
     verdict = "reproduced" if worst <= C05_TOLERANCE else "refuted"
     return Part(
@@ -69,7 +69,7 @@ def single_contact(study: ComparisonStudy) -> Part | None:
 
 
 def wider_class(study: ComparisonStudy) -> Part | None:
-    """Equality = LCP if and only if some p >= 0 gives its motion."""
+    """The laws agree if and only if some p >= 0 gives IAPB's velocity."""
     cells = study.cells + study.scenes
     cases, against = sum(c.cases for c in cells), sum(c.contradictions for c in cells)
     whole = sorted({c.family for c in study.cells if _always(study.cells, c.family)})
@@ -85,7 +85,7 @@ def _always(cells: Sequence[MapCell], family: str) -> bool:
 
 
 def two_contacts(study: ComparisonStudy) -> Part | None:
-    """The border r = c."""
+    """At two contacts the laws agree if and only if r >= c."""
     right = sum(c.predicted == c.found for c in study.two_contacts)
     return Part(
         "Two contacts with approach speeds 1 and r, whose rows have the cosine c in the kinetic metric: the laws agree "
@@ -94,7 +94,7 @@ def two_contacts(study: ComparisonStudy) -> Part | None:
 
 
 def difference(study: ComparisonStudy) -> Part | None:
-    """By how much, and against what."""
+    """The distance of the laws, compared with the distance of IAPB's impulse from the cone of pushing impulses."""
     cells = [c for c in study.cells if c.agree < 1.0]
     if not cells:
         return None
@@ -110,7 +110,7 @@ def difference(study: ComparisonStudy) -> Part | None:
 
 
 def energy(study: ComparisonStudy) -> Part | None:
-    """Extra loss."""
+    """The energy that IAPB loses beyond the LCP's loss, and the momentum residual."""
     cells = study.cells + study.scenes
     extra, momentum = 100 * max(c.extra_loss for c in cells), max(c.momentum for c in cells)
     return Part(
@@ -120,7 +120,7 @@ def energy(study: ComparisonStudy) -> Part | None:
 
 
 def scenes(study: ComparisonStudy) -> Part | None:
-    """The project's scenes."""
+    """Agreement of the laws on the impacts of the project's scenes."""
     cases = sum(c.cases for c in study.scenes)
     if not cases:
         return None
@@ -136,7 +136,7 @@ def scenes(study: ComparisonStudy) -> Part | None:
 
 
 def touching(study: ComparisonStudy) -> Part | None:
-    """Erratum 4: contacts that did not approach."""
+    """Erratum 4: contacts that touch without approaching may approach after the impact."""
     cells = [c for c in study.cells if c.family == "with a neighbour"]
     if not cells:
         return None
@@ -149,7 +149,7 @@ def touching(study: ComparisonStudy) -> Part | None:
 
 
 def piles(study: ComparisonStudy) -> Part | None:
-    """Where assumption (i) fails."""
+    """Dense piles, in which assumption (i) fails."""
     if not study.piles:
         return None
     agree = [row for row in study.piles if row.agrees]
@@ -172,7 +172,7 @@ def piles(study: ComparisonStudy) -> Part | None:
 
 
 def references(study: ComparisonStudy) -> Part | None:
-    """The references on their own feet."""
+    """Differences of the engine from the independent reference implementations."""
     rows = study.differences
     if not rows:
         return None
@@ -189,7 +189,7 @@ def references(study: ComparisonStudy) -> Part | None:
 
 
 def friction(study: ComparisonStudy) -> Part | None:
-    """The extension by dry friction."""
+    """Impacts with dry friction, compared with Coulomb's NCP and its relaxation CCP."""
     cells = study.friction
     pushing, same = sum(c.pushing for c in cells), sum(c.same for c in cells)
     ours, ncp, ccp = (max(getattr(c, f"largest_gain{law}") for c in cells) for law in ("", "_ncp", "_ccp"))
@@ -205,7 +205,7 @@ def friction(study: ComparisonStudy) -> Part | None:
 
 
 def unequal(study: ComparisonStudy) -> Part | None:
-    """The extension by unequal restitution."""
+    """Impacts with unequal restitution: energy gains, and agreement with the reference's Poisson law."""
     distance = max(c.distance for c in study.unequal)
     ours, newton, equality = (
         max(getattr(c, name) for c in study.unequal) for name in ("gain", "gain_newton_lcp", "gain_equality")
@@ -220,7 +220,7 @@ def unequal(study: ComparisonStudy) -> Part | None:
 
 
 def ideal_world(study: ComparisonStudy) -> Part | None:
-    """Convergence of the rigid world to event-driven truth."""
+    """Convergence of the rigid world to the event-driven solution."""
     rows = study.convergence
     if not rows:
         return None
@@ -236,7 +236,7 @@ def ideal_world(study: ComparisonStudy) -> Part | None:
 
 
 def cost(study: ComparisonStudy) -> Part | None:
-    """C22, per impact."""
+    """Claim C22: time per impact."""
     found = []
     for called in ("compiled", "from Python"):
         pairs = [pair for pair in rivals(study.impact_costs) if pair.called == called]
@@ -270,7 +270,7 @@ def _cost_part(costs: Table, family: str, contacts: int) -> str:
 
 
 def steps(study: ComparisonStudy) -> Part | None:
-    """C22, per step."""
+    """Claim C22: time per step."""
     parts = []
     for scene in dict.fromkeys(study.step_costs.column("scene")):
         here = study.step_costs.where(scene=scene).records()
@@ -284,7 +284,7 @@ def steps(study: ComparisonStudy) -> Part | None:
 
 
 def problems(study: ProblemStudy) -> tuple[Part, ...]:
-    """One folder of problem files: each solved by somebody, and solved alike."""
+    """One folder of problem files: which problems are solved, by which solvers, and whether their solutions agree."""
     counts = ", ".join(
         f"{name} {study.count(name, 'solved')}/{study.count(name, 'refused')}/{study.count(name, 'failed')}"
         for name in study.solvers
@@ -307,7 +307,7 @@ def problems(study: ProblemStudy) -> tuple[Part, ...]:
         found.append(f"Files not readable: {'; '.join(file.reason for file in study.unread)}.")
     if skew:
         found.append(f"Problems with an asymmetric W (asymmetry relative to the largest entry): {', '.join(skew)}.")
-    # who is asked at all depends on how long he took before
+    # timed, because a solver that was too slow on a smaller problem is left out
     verdict = MIXED if unsolved or study.unread else REPRODUCED
     return tuple(Part(sentence, verdict, "problems", timed=True) for sentence in found)
 
@@ -319,7 +319,7 @@ def _spread(study: ProblemStudy, friction: int) -> float:
 
 
 def _left_out(study: ProblemStudy) -> str:
-    """What a limit of time kept from being tried."""
+    """Return a sentence on the pairs of solver and problem that the time limit left out."""
     count = sum(row.verdict == "left out" for row in study.rows)
     said = f" {count} pairs of solver and problem were left out: the solver was too slow on a smaller problem."
     return said if count else ""
@@ -333,7 +333,7 @@ def _seconds(value: float) -> str:
 
 
 def _all(outcomes: Iterable[bool]) -> str:
-    """A statement that claims to be exact has no exceptions."""
+    """Return the verdict of an exact statement: a single exception refutes it."""
     found = list(outcomes)
     return NOT_TESTABLE if not found else REPRODUCED if all(found) else REFUTED
 

@@ -1,10 +1,11 @@
-"""Where assumption (i) fails: dense piles, in which (19)/(21) takes every colliding row as an equality.
+"""Dense piles, in which assumption (i) fails: (19)/(21) treats every colliding row as an equality.
 
-Spheres lie on the closest lattice and touch; a share of the contacts is kept (diameters that differ by a hair leave the
-others open), so that redundancy varies. The pile falls on the floor at 1 m/s, each sphere a little otherwise. Beside
-(21) stand impulses that only push: the engine's `method="poisson"`, with one e Newton's LCP. By statement 1 of
-`agreement` some p >= 0 gives the motion of (21) exactly where the two motions are one; for small piles non-negative
-least squares is asked too. e is 0 throughout: it moves no impact across that border (statement 2).
+The spheres touch on a close-packed lattice. Only a share of the contacts is kept, so that redundancy varies; in reality
+slightly different diameters leave some contacts open. The pile falls on the floor at 1 m/s with a small random velocity
+of each sphere. The velocity of (21) is compared with that of impulses that only push: the engine's `method="poisson"`,
+which for equal e is Newton's LCP. By statement 1 of `agreement` the two velocities are equal if and only if some p >= 0
+gives the velocity of (21); for small piles non-negative least squares tests this too. All impacts have e = 0, because
+whether the laws agree does not depend on e (statement 2).
 """
 
 from __future__ import annotations
@@ -29,24 +30,25 @@ from verification.impacts import Floats, ImpactCase
 
 SPHERES = {"quick": (4, 8, 16, 32, 64), "full": (4, 8, 16, 32, 64, 128, 256)}
 KEPT = (0.5, 0.75, 1.0)  # shares of the lattice's contacts
-DRAWN = {"quick": 64, "full": 512}  # spheres of one size and share together: fewer piles where they are large
-ASKED = 64  # spheres, or contacts of recorded piles, up to which non-negative least squares is asked too
-LARGEST = {"quick": 200, "full": 600}  # contacts of recorded piles
-LEAST_RECORDED = 20  # contacts: fewer are no pile
-PULLS = 1e-12  # share of the largest impulse below which a negative one is rounding
+DRAWN = {"quick": 64, "full": 512}  # number of spheres of all piles of one size and share: large piles are fewer
+ASKED = 64  # number of spheres up to which non-negative least squares is used too
+LARGEST = {"quick": 200, "full": 600}  # largest number of contacts of a recorded pile
+LEAST_RECORDED = 20  # least number of contacts of a recorded pile
+PULLS = 1e-12  # share of the largest impulse below which a negative impulse is rounding
 _LATTICE = np.array([[1.0, 0.0, 0.0], [0.5, np.sqrt(3.0) / 2.0, 0.0], [0.5, np.sqrt(3.0) / 6.0, np.sqrt(2.0 / 3.0)]])
 
 
 @dataclass(frozen=True)
 class PileRow:
-    """One pile: (21) beside impulses that only push; lengths in the kinetic metric, relative to |v⁻|.
+    """One pile, resolved by (21) and by impulses that only push; distances in the kinetic metric, relative to |v⁻|.
 
-    name : of the group in the table; rows : "approaching" or "touching": which contacts are given
-    redundant : contacts less their rank; distance : between the two motions
-    pulling, pulling_share : share of the impulses of least norm that pull, and of their sum by size
-    asked : whether non-negative least squares finds a p >= 0 for (21)'s motion; None where it was not asked
-    lcp : distance of the pushing motion from the reference's Newton LCP; gain : its change of energy over KE⁻
-    equality, pushing : seconds of one impact
+    name : name of the pile's group in the table; rows : "approaching" or "touching", the contacts that have a row
+    redundant : number of contacts minus their rank; distance : distance of the two velocities
+    pulling : share of the least-norm impulses that pull; pulling_share : their sum divided by the sum of all |p|
+    asked : whether non-negative least squares finds a p >= 0 for the velocity of (21); None if it was not used
+    lcp : distance of the velocity with pushing impulses from the reference's Newton LCP
+    gain : change of energy with pushing impulses, divided by KE⁻
+    equality, pushing : time of one impact [s], by (21) and with pushing impulses
     """
 
     name: str
@@ -64,12 +66,12 @@ class PileRow:
 
     @property
     def agrees(self) -> bool:
-        """Whether some p >= 0 gives the motion of (21)."""
+        """Whether some p >= 0 gives the velocity of (21)."""
         return self.distance <= REPRODUCED
 
 
 def sphere_pile(spheres: int, kept: float, rng: np.random.Generator) -> ImpactCase:
-    """A pile of that many spheres of diameter 1 with their touching contacts, falling on the floor."""
+    """Return a falling pile of spheres of diameter 1; `kept` is the share of touching pairs that have a contact."""
     side = int(np.ceil(spheres ** (1.0 / 3.0)))
     cells = np.array([(i, j, k) for k in range(side) for j in range(side) for i in range(side)])[:spheres]
     places, rows = cells @ _LATTICE, []
@@ -90,9 +92,9 @@ def sphere_pile(spheres: int, kept: float, rng: np.random.Generator) -> ImpactCa
 
 
 def recorded_piles(folder: Path | str, largest: int) -> Iterator[ImpactCase]:
-    """Piles that others recorded: the normal part of symmetric problems with that many contacts at most.
+    """Yield recorded piles of others: the normal part of symmetric problems with at most `largest` contacts.
 
-    The velocity is the one of least norm that leaves the least of the file's offset unexplained.
+    The velocity is the least-squares solution of least norm for the offset in the file.
     """
     for path in problem_files(folder):
         try:
@@ -102,7 +104,7 @@ def recorded_piles(folder: Path | str, largest: int) -> Iterator[ImpactCase]:
             if LEAST_RECORDED <= problem.size <= largest and not stored.two_sided.any():
                 velocity = np.linalg.lstsq(problem.factor, problem.offset)[0]
                 yield ImpactCase(np.eye(problem.size), problem.factor, velocity, 0.0, f"recorded: {path.name}")
-        except (DatasetError, SolverError):  # the study of problem files says which are not read, or not convex
+        except (DatasetError, SolverError):  # the study of problem files lists these files
             continue
 
 
@@ -110,7 +112,7 @@ def compare_piles(
     depth: str = "quick", folders: Iterable[Path | str] = (), spheres: Sequence[int] | None = None, seed: int = 19,
     failures: list[Failure] | None = None,
 ) -> tuple[PileRow, ...]:
-    """Resolve piles of our own, and recorded ones of some folders, as equalities and by pushing only."""
+    """Resolve our own piles and the recorded piles of some folders, by (21) and by impulses that only push."""
     cases = [sphere_pile(n, kept, np.random.default_rng([seed, n, round(100 * kept), k]))
              for n in spheres or SPHERES[depth] for kept in KEPT for k in range(max(1, DRAWN[depth] // n))]  # fmt: skip
     cases += [case for folder in folders for case in recorded_piles(folder, LARGEST[depth])]
@@ -122,7 +124,7 @@ def compare_piles(
 
 
 def compare_pile(case: ImpactCase, rows: str = "approaching") -> PileRow:
-    """Resolve one pile both ways."""
+    """Resolve one pile by (21) and by impulses that only push."""
     mass, v = case.mass_matrix, case.velocity
     given = case.contact_jacobian[case.contact_jacobian @ v < 0.0] if rows == "approaching" else case.contact_jacobian
     equal, equality = timed(partial(resolve_impact, mass, given, v, 0.0))

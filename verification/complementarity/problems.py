@@ -1,10 +1,10 @@
-"""Every solver on every problem of a folder: solved, refused or failed by recomputed residuals, and their profile.
+"""Run every solver on every problem of a folder; recomputed residuals decide: solved, refused or failed.
 
-A file that cannot be read, an asymmetric W and a solver that is not installed are lines of the record, never left
-out in silence. Solutions are compared by velocities: the impulses of hyperstatic problems are not unique.
+The record also lists files that cannot be read, asymmetric matrices W and solvers that are not installed. Solutions
+are compared by velocities, because the impulses of hyperstatic problems are not unique.
 
-Contact problems of our own, so that solvers have problems where no folder of them is: the hard cases, impacts of the
-project's scenes, hyperstatic families, and patches with friction. The same ones every time.
+`own_problems` makes problems for users without such a folder: the hard cases, impacts of the project's scenes,
+hyperstatic families, and patches with friction. They are the same in every call.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from verification.impacts import ImpactCase
 Floats = NDArray[np.float64]
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
-FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # of the fastest solver's time
+FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # multiples of the fastest solver's time
 
 
 @dataclass(frozen=True)
 class UnreadFile:
-    """A file that is not a problem, or a damaged one."""
+    """A file that is damaged or contains no problem."""
 
     file: str
     reason: str
@@ -48,10 +48,10 @@ class UnreadFile:
 
 @dataclass(frozen=True)
 class ProblemLine:
-    """One problem: format, friction, unknowns, rank of W, asymmetry of W (0 where symmetric), verdicts by solver.
+    """One problem: format, friction, unknowns, rank and asymmetry of W (0 if symmetric), (solver, verdict) pairs.
 
-    stored : worst recomputed residual of the multipliers that the file itself carries; NaN where it carries none
-    spread : largest difference of contact velocities among the solvers that solved it, relative
+    stored : largest recomputed residual of the multipliers stored in the file; NaN if the file has none
+    spread : largest relative difference of contact velocities among the solvers that solved the problem
     """
 
     problem: str
@@ -67,10 +67,10 @@ class ProblemLine:
 
 @dataclass(frozen=True)
 class ProblemStudy:
-    """The record: problems, rows (one per solver and problem), the profile, files that could not be read.
+    """The record of a folder: its problems, one row per solver and problem, the profile, and the unread files.
 
-    profile : per kind of problem ("frictionless", "friction") and solver, the share of problems solved within each
-        of FACTORS times the fastest solver's time (Dolan and Moré)
+    profile : (kind, solver, shares): the shares of the problems of a kind ("frictionless", "friction") that the solver
+        solves within each of FACTORS times the fastest solver's time (Dolan and Moré)
     """
 
     folder: str
@@ -80,12 +80,12 @@ class ProblemStudy:
     profile: tuple[tuple[str, str, Floats], ...]
 
     def count(self, solver: str, verdict: str) -> int:
-        """Problems with that verdict by that solver."""
+        """Return the number of problems on which the solver has this verdict."""
         return sum(row.solver == solver and row.verdict == verdict for row in self.rows)
 
     @property
     def solvers(self) -> tuple[str, ...]:
-        """Solvers in the order of their first use."""
+        """Names of the solvers in the order of their first use."""
         return tuple(dict.fromkeys(row.solver for row in self.rows))
 
 
@@ -96,13 +96,13 @@ def study_problems(
     folder: Path | str, repeats: int = 1, longest: float = np.inf, progress: Progress | None = None,
     failures: list[Failure] | None = None,
 ) -> ProblemStudy:
-    """Read every problem file below `folder` and solve it by every solver that takes its kind.
+    """Read every problem file below `folder` and solve it with every solver for its kind of problem.
 
     Parameters
     ----------
-    repeats : solves of each pair, of which the fastest counts
-    longest : a solver that needs more seconds than this for a problem is not asked for one with more unknowns
-    failures : receives the problems that raise; without it the exception passes through
+    repeats : number of solves of each pair of solver and problem; the fastest solve counts
+    longest : if a solver needs more time than this [s], it skips all problems with more unknowns
+    failures : receives the problems that raise an exception; if it is None, the exception propagates
 
     Raises
     ------
@@ -125,7 +125,7 @@ def study_read(
     name: str, problems: Sequence[StoredProblem], unread: Sequence[UnreadFile] = (), repeats: int = 1,
     longest: float = np.inf, progress: Progress | None = None, failures: list[Failure] | None = None,
 ) -> ProblemStudy:
-    """Solve every problem of a collection called `name` by every solver that takes its kind."""
+    """Solve every problem of a collection called `name` with every solver for its kind of problem."""
     pairs, say = sum(len(solver_names(stored.problem)) for stored in problems), progress or (lambda *_: None)
     stage, begun = f"problems of {name}, by every solver", itertools.count()
     say(stage, 0, pairs)
@@ -150,7 +150,7 @@ def study_read(
 
 
 def _warm(problems: Sequence[StoredProblem]) -> None:
-    """Import and compile every solver on a problem of one contact, so that none of that counts as its time."""
+    """Import and compile every solver on a problem of one contact; this time is not measured."""
     for friction in {stored.problem.friction is not None for stored in problems}:
         size = 3 if friction else 1
         w, b = np.eye(size), -np.eye(size)[0]
@@ -173,7 +173,7 @@ def _line(stored: StoredProblem, rows: list[SolverRow]) -> ProblemLine:
 
 
 def _stored_residual(stored: StoredProblem) -> float:
-    """Worst recomputed residual of the multipliers that the file itself carries."""
+    """Largest recomputed residual of the multipliers stored in the file; NaN if the file has none."""
     if stored.stored_impulse is None or stored.problem.size == 0:
         return np.nan
     return Solution(stored.problem, stored.stored_impulse, "stored in the file").residuals.worst
@@ -186,9 +186,9 @@ def _profiles(kinds: dict[str, list[SolverRow]]) -> tuple[tuple[str, str, Floats
     return tuple(found)
 
 
-Maker = Callable[[str], "ImpactProblem"]  # from its name
+Maker = Callable[[str], "ImpactProblem"]  # name -> problem
 
-# Of the catalogue, those with few contacts; a thousand copies of one row take the slowest solvers minutes.
+# Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers minutes.
 HARD = ("nearly_parallel_normals", "printed_formula_gains", "hilbert_rows", "kahan_rows", "mass_ratio",
         "tiny_lever_arm", "face_at_three_points", "grazing", "subnormal_speeds", "light_direction",
         "bar_with_unequal_restitution")
@@ -201,7 +201,7 @@ _SEED = 9
 
 
 def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
-    """All of them, frictionless ones first; `failures` receives those that cannot be made."""
+    """Return all problems of our own, frictionless ones first; `failures` receives those that cannot be made."""
     makers: dict[str, Maker] = {f"hard case {name}": partial(_hard_case, name) for name in HARD}
     makers |= {f"impact of {name}": partial(_scene_impact, name) for name in SCENES}
     makers |= dict(_hyperstatic()) | dict(_with_friction())
@@ -219,7 +219,7 @@ def _hard_case(hard: str, name: str) -> ImpactProblem:
 
 
 def _scene_impact(scene: str, name: str) -> ImpactProblem:
-    """The impact with the most contacts."""
+    """Return the impact of a scene with the most contacts."""
     return _posed(max(scene_impacts(scene).cases, key=lambda case: case.contacts), name)
 
 
@@ -240,7 +240,7 @@ def _posed(case: ImpactCase, name: str) -> ImpactProblem:
 
 
 def _with_friction() -> Iterator[tuple[str, Maker]]:
-    """The box that lands on a patch, sliding, with dry friction; and a rod wedged between two walls."""
+    """Yield a box that lands on a patch and slides with dry friction, and a rod wedged between two walls."""
     for contacts in FRICTIONAL_CONTACTS:
         for mu in FRICTIONS:
             yield f"patch of {contacts}, μ = {mu:g}", partial(_rough_patch, contacts, mu)
@@ -255,7 +255,7 @@ def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
 
 
 def _with_tangents(normals: np.ndarray) -> Floats:
-    """Rows n, t, s of every contact at the patch's points: rows (k, 6) -> (3k, 6)."""
+    """Return a normal and two tangent rows for every contact of the patch: (k, 6) -> (3k, 6)."""
     rows = []
     for normal in normals:
         point = np.array([-normal[4], normal[3], -0.5])  # a point r has r × z = (y, −x, 0)
@@ -264,7 +264,7 @@ def _with_tangents(normals: np.ndarray) -> Floats:
 
 
 def _wedged_rod(mu: float, name: str) -> ImpactProblem:
-    """A rod whose ends press on two facing walls as it turns: normals opposed, friction may hold it by itself."""
+    """A turning rod whose ends press on two facing walls: the normals are opposite, so friction alone can hold it."""
     points, normals = ((-0.6, -0.8), (0.6, 0.8)), ((1.0, 0.0), (-1.0, 0.0))
     rows = [_row(np.array(point), np.array(direction)) for point, (x, y) in zip(points, normals, strict=True)
             for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip
@@ -274,5 +274,5 @@ def _wedged_rod(mu: float, name: str) -> ImpactProblem:
 
 
 def _row(point: Floats, direction: Floats) -> Floats:
-    """Velocity of a point (x, y) along a direction, as a row on (v, ω)."""
+    """Return the row that maps (v, ω) to the velocity of the point (x, y) along a direction."""
     return np.concatenate([direction, np.cross([*point, 0.0], direction)])

@@ -1,7 +1,7 @@
-"""The impacts of recorded runs as cases: which rows collided, rebuilt from the run alone.
+"""Rebuild the impacts of recorded runs as cases, with the contact rows that collided.
 
-The run keeps v before and after and Jᵀp of every impact, and the contacts of its step: the rows (11)-(12) follow from
-the mechanism at the configuration of that step. Every rebuilt case is checked against what the run recorded.
+A run stores v before and after every impact, its Jᵀp, and the contacts of its step. The mechanism at the configuration
+of that step gives the rows (11)-(12). Every rebuilt case must reproduce the velocity that the run recorded.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from verification.impacts import ImpactCase
 
 Floats = NDArray[np.float64]
 
-# The rebuilt v⁺ against the recorded one, relative to |v⁻|: both are roundings of the same numbers.
+# Largest difference of the rebuilt and the recorded v⁺, relative to the largest |v⁻|: only rounding differs.
 _REBUILT = 1e-9
 
 
 class SceneImpacts(NamedTuple):
-    """The cases of one run, one for each step and contact group that collides in it.
+    """The cases of one run: one case for each step and each contact group that collides in the step.
 
-    `left_out` counts those under other rows (per body) or another law (unequal restitution, friction in the impact),
-    or cut by a device limit.
+    `left_out` counts the impacts that have no case: impacts with per-body rows, unequal restitution or friction, and
+    impacts scaled by a device limit.
     """
 
     cases: tuple[ImpactCase, ...]
@@ -45,7 +45,7 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
     Raises
     ------
     IapbError
-        A rebuilt impact does not give the velocity that the run recorded: the run and the scene do not belong together.
+        A rebuilt impact does not give the velocity that the run recorded, so the run is not a run of this scene.
     """
     mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
@@ -68,10 +68,10 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
 
 
 def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProblem, ...], int]:
-    """Return impacts of an IAPB run as problems, and how many `impacts_of_run` leaves out.
+    """Return impacts of an IAPB run as problems, and the number of impacts that `impacts_of_run` leaves out.
 
-    At most `most` impacts: the one with the most contacts, and others spread over the motion. A scene with friction
-    gives each impact twice, without friction and with it, although IAPB's own impacts have none.
+    It chooses at most `most` impacts: the one with the most contacts, and others spread over the motion. If the scene
+    has friction, each impact gives two problems, without and with friction. IAPB's own impacts have no friction.
     """
     mechanism, mu = mechanism_of(scene), scene.contact.friction
     found = impacts_of_run(run, scene)
@@ -94,7 +94,7 @@ def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProb
 
 
 def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
-    """Rows (k, s, d) of the contacts that approach: the normal, then one tangent in the plane or two in space."""
+    """Return rows (k, s, d) of the approaching contacts: the normal, then one tangent in 2D or two in 3D."""
     normals = run.contacts.normal[_contacts_of(run, mechanism, blow)]
     tangents = unit_tangents(normals, getattr(scene, "dimensions", 2) == 3)
     directions = np.concatenate([normals[:, None], tangents], axis=1)
@@ -103,17 +103,17 @@ def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImp
 
 
 class _GroupImpact(NamedTuple):
-    """All that one contact group underwent in one step: the engine resolves its islands one by one."""
+    """The impact of one contact group in one step; the engine resolves the group's islands one after another."""
 
     step: int
     trees: frozenset[int]
     v_minus: Floats
-    v_plus: Floats  # (d,) of the group's coordinates; the others as in v_minus
+    v_plus: Floats  # (d,); outside the group's coordinates it equals v_minus
     scaled: bool
 
 
 def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
-    """Put the islands of a group together again: rows that touch and do not approach are its too."""
+    """Join the islands of each contact group; contacts that touch without approaching also belong to the group."""
     found, table = [], run.impacts
     for step in np.unique(table.step):
         of_step = np.flatnonzero(table.step == step)
@@ -129,7 +129,7 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
 
 
 def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
-    """Simulate a scene that comes with the project and return its impacts."""
+    """Simulate a scene of the project and return its impacts as cases."""
     scene = load_scene(find_scene(name))
     if restitution is not None:
         scene = scene.with_values({"contact.restitution": restitution})
@@ -137,14 +137,14 @@ def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = No
 
 
 def _contacts_of(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> list[int]:
-    """The step's contacts that belong to the impact's contact group."""
+    """Return the indices of the step's contacts that belong to the impact's contact group."""
     table = run.contacts
     return [m for m in range(int(table.offsets[blow.step]), int(table.offsets[blow.step + 1]))
             if mechanism.tree_of_body[table.body_a[m]] in blow.trees]  # fmt: skip
 
 
 def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact, directions: Floats | None = None) -> Floats:
-    """nᵀ(J_a − J_b) (k, d) of the contacts of the impact's group; or along other directions (k, 3)."""
+    """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other directions (k, 3)."""
     table, q = run.contacts, run.q[blow.step]
     chosen = _contacts_of(run, mechanism, blow)
     directions = table.normal[chosen] if directions is None else directions
@@ -157,7 +157,7 @@ def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact, directions
 
 
 def _trees_of_group(run: Run, mechanism: Mechanism, step: int, group: int) -> frozenset[int]:
-    """Trees that a chain of contacts between moving bodies links to tree `group` (paper, section III)."""
+    """Return the trees that contacts between moving bodies link to the tree `group` (paper, section III)."""
     table, trees = run.contacts, {group}
     links = [
         {int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}

@@ -1,4 +1,4 @@
-"""The whole comparison as one record: `compare()`; what it means in sentences is in `sentences`."""
+"""`compare` makes the whole comparison as one record; `findings` turns the record into sentences."""
 
 from __future__ import annotations
 
@@ -37,16 +37,17 @@ from verification.mechanics.engine_differences import SceneDifference, scene_dif
 
 Progress = Callable[[str, int, int], None]
 
-SCENE_RESTITUTIONS = (None, 0.5)  # as the scene says, and half elastic: more impacts, and some that differ
+SCENE_RESTITUTIONS = (None, 0.5)  # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
 
 
 @dataclass(frozen=True)
 class Depth:
-    """How much is computed.
+    """The amount of computation.
 
-    cases, frictional, unequal : impacts per cell of the map, with friction, with unequal restitution
-    contacts, repeats : of the timings; longest : a solver slower than this [s] is not asked for larger problems
-    truths : scenes of the convergence study, None for all
+    cases : impacts per cell of the map; frictional : impacts per e and μ; unequal : impacts with unequal restitution
+    contacts, repeats : sizes and number of repetitions of the timings
+    longest : if a solver needs more time than this [s], it skips all larger problems
+    truths : names of the scenes of the convergence study, None for all
     """
 
     cases: int
@@ -64,22 +65,23 @@ DEPTHS = {
     "quick": Depth(25, 40, 100, CONTACTS, 3, 0.4, QUICK_TRUTHS),
     "full": Depth(250, 300, 1000, CONTACTS, 7, 60.0, None),
 }
-CONFIGURATIONS = 20  # of each scene, at which the engine and the references are compared
-OWN = "own problems"  # name of the collection that is always there
+CONFIGURATIONS = 20  # number of configurations of each scene in which engine and references are compared
+OWN = "own problems"  # name of the collection that `own_problems` makes
 
 
 @dataclass(frozen=True)
 class ComparisonStudy:
-    """Everything that `iapb compare` found.
+    """All results of `compare`.
 
-    single : C05, the family "one contact" without redundancy
-    cells : the map over random families; two_contacts : the exact border of two contacts
-    scenes : the map over impacts of the project's scenes; left_out : scene impacts that cannot be compared
-    friction, unequal, bar : the engine's extensions beside their complementarity counterparts
-    convergence : of the rigid world to event-driven truth, scene by scene
-    impact_costs, step_costs : C22; problems : our own collection, and folders of problem files
-    piles : dense piles, (21) beside impulses that only push; differences : the engine beside the references
-    failures : the cases that raised, which are in nothing else
+    single : comparisons of claim C05: the family "one contact" without redundancy
+    cells : the map over random families; two_contacts : agreement of the laws at two contacts, on a grid
+    scenes : the map over impacts of the project's scenes; left_out : number of scene impacts that cannot be compared
+    friction, unequal, bar : the engine's extensions compared with complementarity
+    convergence : convergence of the rigid world to the event-driven solution, one row per scene
+    impact_costs, step_costs : times for claim C22; problems : our own collection, then the folders of problem files
+    piles : dense piles, resolved by (21) and by impulses that only push
+    differences : differences of the engine from the references, one per scene
+    failures : the cases that raised an exception; no other field contains them
     """
 
     depth: str
@@ -115,7 +117,7 @@ def compare(
     scenes : names of the project's scenes; default all
     progress : called as progress(stage, done, total)
 
-    A case that raises is among the failures of what is returned.
+    If a case raises an exception, it is in `failures` of the result.
 
     Raises
     ------
@@ -173,7 +175,7 @@ def _random_comparisons(count: int, say: Progress, failures: list[Failure]) -> t
 def compare_scenes(
     scenes: Iterable[str] | None = None, progress: Progress | None = None, failures: list[Failure] | None = None
 ) -> tuple[tuple[MapCell, ...], int]:
-    """Compare on the impacts of the project's scenes; return the map and the impacts left out."""
+    """Compare IAPB with the LCP on the impacts of scenes; return the map and the number of impacts left out."""
     names, left_out = list(scene_names() if scenes is None else scenes), 0
     found: list[Comparison] = []
     for done, name in enumerate(names):
@@ -189,5 +191,5 @@ def compare_scenes(
 
 
 def compare_run(run: Run, scene: Scene) -> tuple[Comparison, ...]:
-    """Compare on the impacts of one recorded run."""
+    """Compare IAPB with the Newton LCP on the impacts of one recorded run."""
     return compare_cases(impacts_of_run(run, scene).cases)

@@ -1,4 +1,4 @@
-"""The tables of the comparison with complementarity, as the report prints and draws them."""
+"""The tables of the comparison with complementarity, which the report prints and plots."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WORLD_SCENE = "peg_corner"
 
 
 def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) -> dict[str, Table]:
-    """Every table of the topic but the worlds, by name; `failures` receives those that cannot be made."""
+    """Return all tables except that of the worlds, by name; `failures` receives the tables that cannot be made."""
     makers: dict[str, Callable[[], Table]] = {
         "map": partial(agreement, study), "two contacts": partial(two_contacts, study),
         "time per impact": lambda: study.impact_costs, "time per step": lambda: study.step_costs,
@@ -40,7 +40,7 @@ def all_tables(study: ComparisonStudy, failures: list[Failure] | None = None) ->
 
 
 def agreement(study: ComparisonStudy) -> Table:
-    """The map, random families and then scenes."""
+    """Return the agreement of IAPB and the LCP, first for random families, then for scenes."""
     rows = tuple(
         (c.family, c.restitution, c.redundancy, c.cases, c.agree, c.adhesive, c.artefact, c.adhesive_share,
          _known(c.typical) if c.agree < 1.0 else None, c.farthest, max(c.extra_loss, 0.0), c.left_approaching,
@@ -57,14 +57,14 @@ def agreement(study: ComparisonStudy) -> Table:
 
 
 def two_contacts(study: ComparisonStudy) -> Table:
-    """The exact border of two contacts."""
+    """Return predicted and found agreement at two contacts, over the cosine and the speed ratio."""
     rows = tuple((c.cosine, c.speed_ratio, c.predicted, c.found, c.distance) for c in study.two_contacts)
     return titled(("cosine", "speed ratio", "agreement predicted", "agreement found", "distance"), rows, 3,
                    "Two contacts with approach speeds 1 and r, whose rows have this cosine in the kinetic metric.")
 
 
 def profile(studies: Iterable[ProblemStudy]) -> Table:
-    """Dolan and Moré's profile, in long form."""
+    """Return the performance profiles of Dolan and Moré, one row per solver and factor."""
     rows = tuple(
         (each.folder, kind, solver, float(factor), float(share))
         for each in studies for kind, solver, shares in each.profile
@@ -74,7 +74,7 @@ def profile(studies: Iterable[ProblemStudy]) -> Table:
 
 
 def problems(study: ProblemStudy) -> Table:
-    """A row per problem, a column per solver."""
+    """Return the verdicts, one row per problem and one column per solver."""
     names = study.solvers
     rows: list[tuple[Any, ...]] = []
     for line in study.lines:
@@ -92,7 +92,7 @@ def problems(study: ProblemStudy) -> Table:
 
 
 def convergence(study: ComparisonStudy) -> Table:
-    """Errors of the rigid world, a row per scene and step."""
+    """Return the errors of the rigid world, one row per scene and step."""
     rows = []
     for r in study.convergence:
         for rates, position, velocity in ((COARSE, r.position_coarse, r.velocity_coarse),
@@ -108,7 +108,7 @@ def convergence(study: ComparisonStudy) -> Table:
 
 
 def friction(study: ComparisonStudy) -> Table:
-    """The extension by dry friction."""
+    """Return the comparison with Coulomb friction, one row per e and μ."""
     rows = tuple(
         (c.restitution, c.friction, c.cases, c.pushing, c.same, c.reduced, c.unsolved, c.ncp_gains, c.ccp_gains,
          c.largest_gain, c.largest_gain_ncp, c.largest_gain_ccp, _known(c.typical_distance))
@@ -121,20 +121,20 @@ def friction(study: ComparisonStudy) -> Table:
 
 
 def unequal(study: ComparisonStudy) -> Table:
-    """The extension by unequal restitution."""
+    """Return the comparison with unequal restitution."""
     rows = tuple((c.signs, c.cases, c.distance, c.gain, c.gain_newton_lcp, c.gain_equality) for c in study.unequal)
     return titled(("contacts", "cases", "distance from Poisson's law", "largest change of KE, IAPB", "Newton LCP",
                     "equalities"), rows, 2)  # fmt: skip
 
 
 def bar(study: ComparisonStudy) -> Table:
-    """The struck bar."""
+    """Return the kinetic energy of the struck bar by law."""
     return titled(("law", "kinetic energy [J]"), tuple(study.bar.items()), 5,
                    "A bar struck at 0.5 and 0.4 of its length with e = 1 and e = 0.")  # fmt: skip
 
 
 def piles(study: ComparisonStudy) -> Table:
-    """Dense piles, a row per kind and choice of rows."""
+    """Return the results on dense piles, one row per kind of pile and choice of rows."""
     groups: dict[tuple[str, str], list[PileRow]] = {}
     for row in study.piles:
         groups.setdefault((row.name, row.rows), []).append(row)
@@ -160,7 +160,7 @@ def piles(study: ComparisonStudy) -> Table:
 
 
 def references(study: ComparisonStudy) -> Table:
-    """The engine's mechanics and contacts beside the references'."""
+    """Return the differences of the engine from the references in mechanics and contacts, one row per scene."""
     rows = tuple((d.scene, d.configurations, d.apart, d.mass_matrix, d.inner_forces, d.frame_jacobian, d.contacts,
                   d.gap, d.normal, d.row) for d in study.differences)  # fmt: skip
     return titled(("scene", "configurations", "with other contacts", "M", "B + G", "frame Jacobians", "contacts",
@@ -169,13 +169,13 @@ def references(study: ComparisonStudy) -> Table:
 
 
 def laws() -> Table:
-    """Impact laws by name."""
+    """Return the impact laws with statement, source and hypotheses."""
     rows = tuple((law.name, law.statement, law.source, law.hypotheses, law.never_gains_energy) for law in LAWS.values())
     return titled(("law", "statement", "source", "hypotheses", "never gains energy under them"), rows)
 
 
 def solvers() -> Table:
-    """Solvers by name."""
+    """Return the solvers with method, package and kind of problem."""
     takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
     rows = tuple((name, entry.method, entry.package, takes[entry.takes]) for name, entry in SOLVERS.items())
     note = ("Siconos is a system package and is called through the system's Python. Its time is that of its compiled "
@@ -186,7 +186,7 @@ def solvers() -> Table:
 def worlds(
     run: Callable[..., Run], values: dict[str, Any] | None = None, failures: list[Failure] | None = None
 ) -> Table:
-    """A run of every world, as its own file states its contact law and coupling; `values` change the scene."""
+    """Return the contact law and coupling of every world, read from one run each; `values` change the scene."""
     scene = load_scene(find_scene(WORLD_SCENE)).with_values(values or {})
     rows = []
     for world in WORLDS:
