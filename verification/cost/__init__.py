@@ -1,1 +1,1 @@
-"""What accuracy costs in time: impacts, steps, whole motions, effects. Every number is measured in turn."""
+"""Computing time and accuracy of impacts, steps, whole motions and effects; timed calls run in turns."""

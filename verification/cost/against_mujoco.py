@@ -1,9 +1,9 @@
-"""One recorded step of ours against MuJoCo's, each in its own compiled loop, on scenes in resting contact.
+"""Compare the time of our step with that of MuJoCo's, each in its own compiled loop, on scenes in resting contact.
 
-Ours is `Simulation.advance_chunk`, as `simulate` runs it, record included; MuJoCo's is `mj_step(model, data, nstep)`,
-which records nothing. Both are called for the same number of steps in turn; each round gives one ratio. Every
-solver of MuJoCo is tried, and the fastest one of a form is what counts.
-Where the time of our step goes: every part of it by itself, in turn.
+Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
+`mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
+ratio. All solvers of MuJoCo are timed, and the fastest solver of each form counts. `profile_step` times each part of
+our step by itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from verification.clock import TIME_COLUMNS, take_turns, time_cells, timed
 from verification.cost.resting_scenes import RestingScene, resting_scenes
 from verification.finding import Column, Failure, Row, Table, attempt, table_of
 
-STEPS, ROUNDS = 512, 15  # steps of one sample, as many as a chunk of `simulate`; samples of each
+STEPS, ROUNDS = 512, 15  # steps of one sample, as in a chunk of `simulate`; number of samples of each loop
 SOLVERS = ("Newton", "CG", "PGS")
 TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
@@ -74,7 +74,7 @@ def race_mujoco(
 
 
 def fastest_of_theirs(races: Table) -> list[Row]:
-    """Of each scene and form, the race against MuJoCo's fastest solver."""
+    """Return the row with MuJoCo's fastest solver for each scene and form."""
     by: dict[tuple[str, str], Row] = {}
     for race in sorted(races.records(), key=lambda race: float(race["its step"])):
         by.setdefault((race["scene"], race["MuJoCo's form"]), race)
@@ -98,7 +98,7 @@ def _race(scene: RestingScene, rounds: int, steps: int) -> list[Row]:
 
 
 class OwnLoop:
-    """The scene in our loop, made anew for each sample and settled before the clock runs."""
+    """The scene in our loop; every sample starts again and settles before the timed steps."""
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
         self.simulation = Simulation(scene_from_text(scene.text, scene.file))
@@ -106,7 +106,7 @@ class OwnLoop:
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
-        """Seconds per step."""
+        """Return the time per step [s]."""
         self.settle()
         simulation, record = self.simulation, self.record(self.steps)
         before = simulation.state.q.copy()
@@ -116,7 +116,7 @@ class OwnLoop:
         return seconds / self.steps
 
     def settle(self) -> None:
-        """Start anew and come to rest."""
+        """Start from the first state and simulate until the scene is at rest."""
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.port = system.make_state(), system.make_port(simulation.coupling)
         simulation.advance_chunk(self.record(self.settling), self.settling)
@@ -138,7 +138,7 @@ class _Theirs:
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
-        """Seconds per step."""
+        """Return the time per step [s]."""
         data = self.mujoco.MjData(self.model)
         data.xfrc_applied[-1] = self.push
         if self.pose:
@@ -168,7 +168,7 @@ PART_COLUMNS = (Column("scene", condition=True), Column("part", condition=True),
 
 
 def profile_step(scene: RestingScene, rounds: int = ROUNDS, steps: int = STEPS) -> list[Row]:
-    """Time of each part, and of the whole step, on a scene at rest: rows of PART_COLUMNS."""
+    """Return the times of the whole step and of each of its parts on a scene at rest, as rows of PART_COLUMNS."""
     loop = OwnLoop(scene, steps)
 
     def part(number: int) -> float:
@@ -183,7 +183,7 @@ def profile_step(scene: RestingScene, rounds: int = ROUNDS, steps: int = STEPS) 
 
 @kernel
 def repeat_part(world: Any, state: Any, port: Any, record: Any, part: Any, times: Any) -> None:
-    """Do one part of the step `times` times; on a scene at rest each time is like the one before."""
+    """Repeat one part of the step `times` times; on a scene at rest all repetitions do the same work."""
     for k in range(times):
         if part == 0:
             couple(world, state, port)

@@ -1,4 +1,4 @@
-"""One impact, from M, J, v to v⁺, by each way that is timed; kernels repeat themselves in compiled code."""
+"""The timed calls that resolve one impact from M, J, v to v⁺; kernels are repeated in compiled code."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ Call = Callable[[], Floats]
 
 
 def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
-    """Return an impact on c rows that span two thirds of the d coordinates."""
+    """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less)."""
     rank = max(1, (2 * d) // 3)
     root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
     return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
 
 
 def engine_call(case: ImpactCase, method: str, budget: int | None = None) -> Call:
-    """`resolve_impact` by a method, checks and all."""
+    """Return a call of `resolve_impact` with a method; it includes the checks of the arguments."""
     return lambda: resolve_impact(*case.arrays, case.restitution, method=method, budget=budget).velocity
 
 
 def printed_call(case: ImpactCase) -> Call:
-    """(21) to the letter, in numpy."""
+    """Return a call of formula (21) as printed, in numpy."""
     mass, rows, v = case.arrays
 
     def call() -> Floats:
@@ -49,7 +49,7 @@ def printed_call(case: ImpactCase) -> Call:
 def repeat_impact(  # type: ignore[no-untyped-def]
     mass_matrix, lower, v, restitution, columns, budget, work, v_plus, momentum, times
 ):
-    """Factor M, copy the rows and resolve the impact with at most `budget` rows, `times` times."""
+    """Repeat `times` times: factor M, copy the rows and resolve the impact with at most `budget` rows."""
     d, count = columns.shape
     for _ in range(times):
         cholesky(mass_matrix, lower)
@@ -61,7 +61,7 @@ def repeat_impact(  # type: ignore[no-untyped-def]
 
 
 class KernelCall:
-    """The kernel on arrays that are allocated once; M is factored and the rows are copied within the call."""
+    """The engine's kernel on arrays that are allocated once; each call factors M and copies the rows."""
 
     def __init__(self, case: ImpactCase, budget: int | None = None) -> None:
         self.mass, self.v = np.ascontiguousarray(case.mass_matrix), case.velocity.copy()
@@ -77,7 +77,7 @@ class KernelCall:
                       self.v_plus, self.momentum, times)
 
     def __call__(self) -> Floats:
-        """v⁺ (d,)."""
+        """Return v⁺ (d,)."""
         self.repeated(1)
         return self.v_plus
 
@@ -86,9 +86,10 @@ class KernelCall:
 def repeat_sweeps(  # type: ignore[no-untyped-def]
     mass_matrix, lower, v, restitution, rows, sweeps, whitened, share, impulses, v_plus, times
 ):
-    """Newton's LCP by sweeps of projected Gauss-Seidel over the contacts, as physics engines do it, `times` times.
+    """Solve Newton's LCP `times` times by sweeps of projected Gauss-Seidel over the contacts, as physics engines do.
 
-    No Delassus matrix: each contact reads u and corrects it; `whitened` is A (c, d), `share` its squared lengths.
+    It forms no Delassus matrix: each contact reads u and corrects it. `whitened` is A (c, d); `share` holds the squared
+    lengths of its rows.
     """
     c, d = rows.shape
     for _ in range(times):
@@ -102,7 +103,7 @@ def repeat_sweeps(  # type: ignore[no-untyped-def]
                     rest -= lower[k, m] * whitened[i, m]
                 whitened[i, k] = rest / lower[k, k]
                 share[i] += whitened[i, k] * whitened[i, k]
-        for i in range(c):  # what each contact is to leave with
+        for i in range(c):  # the velocity that each contact should have afterwards
             impulses[c + i] = 0.0
             for k in range(d):
                 impulses[c + i] -= restitution * rows[i, k] * v[k]
@@ -122,7 +123,7 @@ def repeat_sweeps(  # type: ignore[no-untyped-def]
 
 
 class SweepsCall:
-    """Projected Gauss-Seidel on arrays that are allocated once."""
+    """The kernel of projected Gauss-Seidel on arrays that are allocated once."""
 
     def __init__(self, case: ImpactCase, sweeps: int) -> None:
         mass, rows, v = (np.ascontiguousarray(array) for array in case.arrays)
@@ -136,13 +137,13 @@ class SweepsCall:
         repeat_sweeps(*self.given, times)
 
     def __call__(self) -> Floats:
-        """v⁺ (d,)."""
+        """Return v⁺ (d,)."""
         self.repeated(1)
         return self.v_plus
 
 
 class LemkeCall:
-    """Lemke's kernel on the same arrays."""
+    """The kernel of Lemke's method on the arrays of a case."""
 
     def __init__(self, case: ImpactCase) -> None:
         try:
@@ -152,21 +153,21 @@ class LemkeCall:
         self.case = case
 
     def repeated(self, times: int) -> Floats:
-        """Resolve the impact `times` times; v⁺ of the last."""
+        """Resolve the impact `times` times; return v⁺ (d,) of the last time."""
         from verification.cost.lemke_kernel import repeat_lemke  # brings quantecon
 
         found: Floats = repeat_lemke(*self.case.arrays, self.case.restitution, times)
         return found
 
     def __call__(self) -> Floats:
-        """v⁺ (d,)."""
+        """Return v⁺ (d,)."""
         return self.repeated(1)
 
 
 def solver_call(case: ImpactCase, name: str, needs_answer: bool = False) -> Call:
-    """A solver by name: the impact as a complementarity problem in p ≥ 0, made and solved anew at each call.
+    """Return a call that poses the impact as a complementarity problem in p ≥ 0 and solves it with a solver by name.
 
-    Without an impulse v⁺ is NaN, or SolverError is raised where an answer is needed.
+    If the solver returns no impulse, v⁺ is NaN; with `needs_answer` the call raises SolverError instead.
     """
 
     def call() -> Floats:

@@ -1,10 +1,11 @@
-"""Which effects a scene calls for, what a step takes with them, what each costs of it, and what changes without it.
+"""The effects that a scene needs, the time of a step, the share of each effect in it, and the motion without it.
 
-This is where the time of a scene's step is measured; what else speaks of it gives ratios of its own run.
+Only this module measures the time of a scene's step in seconds; other modules give ratios of times.
 
-The scene with its effects, the scene with every switch on, and the scene without one effect after the other take turns.
-An effect is left out by the scene's own values, by another law or coupling, by a switch of the compiled step, or by the
-pairs of shapes that may touch; `LEFT_OUT` says which. Times are compared round by round, positions over the whole run.
+The variants run in turns: the scene with its effects, the scene with every switch on, and the scene without one of its
+effects. `LEFT_OUT` defines how an effect is left out: by other values of the scene, another law or coupling, a switch
+of the compiled step, or fewer pairs of shapes that may touch. Times are compared in each round, positions over the
+whole run.
 """
 
 from __future__ import annotations
@@ -33,20 +34,20 @@ from verification.finding import Column, Failure, Row, Table, attempt, table_of
 
 Floats = NDArray[np.float64]
 
-ROUNDS = 9  # in which each loop runs once
-SAMPLES = 400  # instants at which positions are compared
+ROUNDS = 9  # number of rounds; each loop runs once per round
+SAMPLES = 400  # number of instants at which positions are compared
 _TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A way to run a scene: values changed, impulses and coupling or not, switches set, kinds of pairs left out."""
+    """A variant of a scene: changed values and switches, without impulses or coupling, or without a kind of pairs."""
 
     values: tuple[tuple[str, Any], ...] = ()
     impulses: bool = True
     coupled: bool = True
     switches: tuple[str, ...] = ()
-    on: bool = False  # the switches
+    on: bool = False  # the new value of the switches
     untouched: str = ""
 
 
@@ -74,14 +75,14 @@ LEFT_OUT: dict[str, Variant] = {
     "device_limits": Variant((("device.force_limit", None),)),
     "waveform": Variant((("device.waveform", "step"),)),
 }
-# Effects that a switch of the step turns on where the scene does not call for them, and that then find nothing to do.
-# Friction in impacts is none: its law brings arrays of its own.
+# Effects that a switch of the step can turn on in a scene that does not need them; they then change nothing. Friction
+# in impacts is not among them, because its law needs arrays of its own.
 SWITCHED = tuple(name for name in Switches._fields if name in EFFECT_NAMES and name != "impact_friction")
 _WHOLE, _ALL_ON = "with its effects", "all switched on"
-SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # whose effects are shown one by one
+SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # scenes whose effects are shown one by one
 _BELOW = "below the noise"
-NOTHING = "nothing in this run"  # how the words begin on an effect that is on and changes nothing
-# What acts through contacts alone, and what it asks of the run: pairs of the first kind, or any contact at all.
+NOTHING = "nothing in this run"  # first words for an effect that is on and changes nothing
+# Effects that act only through contacts: the kind of contact that they need ("": any), and the words if there is none.
 _THROUGH_CONTACTS = {
     "wall_contacts": ("wall", "no body touches a wall"),
     "body_contacts": ("body", "no two separate bodies touch"),
@@ -92,20 +93,21 @@ _THROUGH_CONTACTS = {
 )
 
 
-# One effect: on or off, why, and what leaving it out would change in any scene; then as measured in this one. What is
-# off, cannot be left out, or has no run without it has no numbers, and `change` says why there is no run.
+# One effect: whether it is on, the reason, and the general consequence of leaving it out; then the measurements in this
+# scene. An effect has no numbers if it is off, cannot be left out, or if the scene cannot run without it; in the last
+# case `change` gives the reason.
 COLUMNS = (
     Column("effect", condition=True),
     Column("active"),
     Column("reason", prose=True),
     Column("left out", prose=True),
-    Column("step", "µs", timed=True),  # of the scene with its effects: measured once, the same in each row
-    Column("all on", "µs", timed=True),  # of the scene with all of SWITCHED on
+    Column("step", "µs", timed=True),  # time of the scene with its effects, the same in each row
+    Column("all on", "µs", timed=True),  # time of the scene with all of SWITCHED on
     Column("faster than real time", "times", timed=True),
-    Column("time saved", "%", timed=True),  # of the step, by leaving it out; none in the noise
-    Column("position", "mm"),  # largest distance of the tool (of any body, without a hand) from where it is with it
-    Column("device", "mm"),  # the same of the device
-    Column("energy", "%"),  # largest change of the kinetic energy, in its largest value with the effect
+    Column("time saved", "%", timed=True),  # share of the step's time that leaving the effect out saves
+    Column("position", "mm"),  # largest distance of the tool (without a hand: of any body) from that with the effect
+    Column("device", "mm"),  # the same distance of the device
+    Column("energy", "%"),  # largest change of kinetic energy, relative to its largest value with the effect
     Column("cost", prose=True, timed=True),
     Column("change", prose=True),
 )
@@ -114,7 +116,7 @@ COLUMNS = (
 def effects_of_scenes(
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
 ) -> dict[str, Table]:
-    """The effects of each shipped scene in the IAPB world, measured."""
+    """Return the measured effects of each shipped scene in the IAPB world."""
     found, names = {}, scene_names()
     for done, name in enumerate(names, start=1):
         found[name] = attempt(name, lambda name=name: effects_of(_scene(name), failures=failures), failures)  # type: ignore[misc]
@@ -131,9 +133,9 @@ def effects_of(
     scene: Scene, world: str = "IAPB", progress: Callable[[int, int], None] | None = None,
     failures: list[Failure] | None = None, rounds: int = ROUNDS,
 ) -> Table:
-    """Every effect of a scene in a world of the compiled engine, measured where it is on and can be left out.
+    """Return every effect of a scene; effects that are on and can be left out are measured.
 
-    `failures` receives the effects that raise anything but an `IapbError`; without it that passes through.
+    `failures` receives effects that raise an exception other than `IapbError`; if it is None, the exception propagates.
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
@@ -158,7 +160,7 @@ def effects_of(
 
 
 def _loop(scene: Scene, world: World, variant: Variant) -> Loop | IapbError:
-    """The loop after its first run; the error where there is no run."""
+    """Return the loop after its first run, or the error that stopped this run."""
     try:
         loop = Loop(scene, world, variant)
         loop.sample()
@@ -168,10 +170,11 @@ def _loop(scene: Scene, world: World, variant: Variant) -> Loop | IapbError:
 
 
 def saved(ratio: Times) -> float | None:
-    """Share of the step [%] that a loop saves, by its time over that with the effect; None where it is in the noise.
+    """Return the share of the step [%] that a loop saves; None if the difference is within the noise.
 
-    It is in the noise where the rounds, but for the smallest and the largest, do not agree on the sign: of nine rounds
-    by chance they do so in one case of 26.
+    `ratio` is the loop's time divided by the time with the effect, per round. The smallest and the largest ratio are
+    ignored. The difference is noise unless all other ratios are on the same side of 1. With nine rounds, pure noise
+    passes this test in one of 26 cases.
     """
     rounds = sorted(ratio.samples)
     inner = rounds[1:-1] if len(rounds) > 2 else rounds
@@ -179,7 +182,7 @@ def saved(ratio: Times) -> float | None:
 
 
 def summary(effects: Mapping[str, Table]) -> Table:
-    """The table behind the figure of time and error: a row per scene and measured effect."""
+    """Return the data of the figure of time and error, one row per scene and measured effect."""
     columns = (Column("scene", condition=True), Column("effect", condition=True), Column("time saved", "%", timed=True),
                Column("error", "mm"), Column("best of its error", timed=True))  # fmt: skip
     rows = []
@@ -195,7 +198,7 @@ def summary(effects: Mapping[str, Table]) -> Table:
 
 
 def steps(effects: Mapping[str, Table]) -> Table:
-    """The table behind the figure of steps: a row per scene."""
+    """Return the data of the figure of step times, one row per scene."""
     columns = (Column("scene", condition=True), Column("effects on"), Column("step", "µs", timed=True),
                Column("all on", "µs", timed=True), Column("faster than real time", "times", timed=True),
                Column("shares of the step", prose=True, timed=True))
@@ -213,13 +216,13 @@ def steps(effects: Mapping[str, Table]) -> Table:
 
 
 def _beats(other: Row, row: Row) -> bool:
-    """Whether leaving out another effect saves no less time at no larger error, and is better in one of them."""
+    """Whether leaving out `other` saves at least as much time with at most the same error, and is better in one."""
     one, two = ((each["time saved"], -each["position"]) for each in (other, row))
     return one[0] >= two[0] and one[1] >= two[1] and one != two
 
 
 def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> dict[str, Any]:
-    """The measured cells of one effect, by the loops with it and without it."""
+    """Return the measured cells of one effect from the loops with it (`whole`) and without it (`other`)."""
     kinetic = whole.kinetic()
     found = {
         "time saved": saved(ratio),
@@ -234,7 +237,7 @@ def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> dict[str, A
 
 
 def _why_nothing(name: str, touching: frozenset[str]) -> str:
-    """Why leaving the effect out changed nothing, as far as the contacts of the run tell."""
+    """Return the reason why the run does not change without the effect, judged by the contacts of the run."""
     kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
     if absent and not (touching if not kind else touching & {kind}):
         return absent
@@ -242,7 +245,7 @@ def _why_nothing(name: str, touching: frozenset[str]) -> str:
 
 
 def in_words(found: Row) -> dict[str, str]:
-    """Cost per step, and what changes without the effect."""
+    """Return in words the effect's cost per step and the change of the motion without it."""
     moved = f"up to {_length(found['position'])} elsewhere"
     if found["device"] is not None:
         moved += f", the device {_length(found['device'])}"
@@ -255,12 +258,12 @@ def _length(millimetres: float) -> str:
 
 
 def _farthest(one: Floats, other: Floats) -> float | None:
-    """[mm]; None where there is nothing to compare."""
+    """Return the largest distance of two arrays of points [mm]; None if they are empty or differ in shape."""
     return 1e3 * float(np.linalg.norm(one - other, axis=-1).max()) if one.shape == other.shape and one.size else None
 
 
 class Loop(RecordedLoop):
-    """A variant of a scene in its loop; keeps the states of the last sample."""
+    """The simulation loop of a variant of a scene; it keeps the states of the last sample."""
 
     def __init__(self, scene: Scene, world: World, variant: Variant) -> None:
         changed = scene.with_values(_values(scene, variant)) if variant.values else scene
@@ -274,12 +277,12 @@ class Loop(RecordedLoop):
         self.q = self.v = self.device_q = np.zeros((0, 0))
 
     def same_motion(self, other: Loop) -> bool:
-        """Whether tool and device were at the same places with the same velocities, to the last bit, in all steps."""
+        """Whether positions and velocities of tool and device are equal to the last bit in all steps."""
         ours, theirs = (each.recording.joined("steps") for each in (self, other))
         return all(np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v"))
 
     def touching(self) -> frozenset[str]:
-        """Kinds of the contacts of the last sample: "wall", "body" (of two trees) and "tree" (of one)."""
+        """Return the kinds of contacts in the last sample: "wall", "body" (two trees) and "tree" (within one tree)."""
         contacts = self.recording.joined("contacts")
         a, b = contacts["body_a"], contacts["body_b"]
         tree = self.simulation.system.mechanism.tree_of_body
@@ -287,7 +290,7 @@ class Loop(RecordedLoop):
         return frozenset(np.unique(kinds).tolist())
 
     def sample(self) -> float:
-        """Seconds per step of one whole run."""
+        """Return the time per step of one whole run [s]."""
         seconds, every = super().sample(), slice(None, None, max(1, self.steps // SAMPLES))
         self.q, self.v, self.device_q = (
             np.concatenate([getattr(record.steps, name) for record in self.recording.records])[every]
@@ -309,15 +312,15 @@ class Loop(RecordedLoop):
         return np.array([device.placements(q)[1] for q in self.device_q])
 
     def kinetic(self) -> Floats:
-        """(n,) [J]."""
+        """Return the kinetic energy at the compared instants (n,) [J]."""
         mechanism = self.simulation.system.mechanism
         return np.array([mechanism.kinetic_energy(q, v) for q, v in zip(self.q, self.v, strict=True)])
 
 
 def _points(mechanism: Any, q: Floats, bodies: slice) -> Floats:
-    """Four points of each body [m]: its centre of mass, and a radius of gyration from there along each of its axes.
+    """Return four points of each body [m]: its centre of mass, and points one radius of gyration away along its axes.
 
-    The origin alone would not do: that of a hinged body lies in the hinge and never moves.
+    The body's origin is not enough, because the origin of a hinged body lies in the hinge and never moves.
     """
     found = []
     rotation, position = mechanism.placements(q)
@@ -329,19 +332,19 @@ def _points(mechanism: Any, q: Floats, bodies: slice) -> Floats:
 
 
 def _values(scene: Scene, variant: Variant) -> dict[str, Any]:
-    """The values of a variant; a hand's force keeps its length."""
+    """Return the changed values of a variant; a hand force becomes zeros of the same length."""
     force = [0.0] * len(scene.hand.force) if scene.hand is not None else None
     return {name: force if name == "hand.force" else value for name, value in variant.values}
 
 
 def _switched(world: Any, names: tuple[str, ...], on: bool) -> Any:
-    """The same world with switches of the compiled step on or off."""
+    """Return the world with these switches of the compiled step on or off."""
     switches = world.switches._content._replace(**dict.fromkeys(names, on))
     return block(world._content._replace(switches=switches))
 
 
 def _leave_out_pairs(simulation: Any, kind: str) -> None:
-    """Let pairs with a wall, or pairs of two trees, pass through each other."""
+    """Remove the pairs of shapes with a wall (`kind` "wall"), or the pairs of two trees ("body")."""
     system = simulation.system
     bodies, tree = system.shapes.body, system.mechanism.tree_of_body
     a, b = bodies[system.pairs[:, 0]], bodies[system.pairs[:, 1]]

@@ -1,4 +1,4 @@
-"""How one impact's time grows with contacts and coordinates, and how many contacts a millisecond holds (claim C19)."""
+"""Growth of one impact's time with contacts and coordinates; largest number of contacts within 1 ms (claim C19)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SIZES = (
     *((12, c) for c in (50, 60, 100, 200, 300, 500, 1000, 2000, 5000)),
     *((d, 60) for d in (3, 6, 24, 48, 96)),
 )  # (d, c)
-PRINTED_UP_TO = 500  # contacts: beyond, one pseudo-inverse takes seconds
+PRINTED_UP_TO = 500  # largest number of contacts for the printed formula: with more, one pseudo-inverse takes seconds
 _ROUNDS = 15
 
 SIZE_COLUMNS = (Column("coordinates", condition=True), Column("contacts", condition=True))
@@ -32,9 +32,10 @@ def scaling(
     rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
     sizes: tuple[tuple[int, int], ...] = SIZES,
 ) -> Table:
-    """Time the factored impact, and the printed formula where that ends, over contacts and over coordinates.
+    """Time the factored impact and the printed formula, over contacts and over coordinates.
 
-    All sizes take their turns in every round, so that a slow minute of the machine bends no curve.
+    The printed formula is timed up to PRINTED_UP_TO contacts. Every round times all sizes, so that a temporary slowdown
+    of the machine affects all sizes alike.
     """
     wanted = [(method, d, c) for d, c in sizes for method in (FACTORED, PRINTED)
               if method == FACTORED or c <= PRINTED_UP_TO]  # fmt: skip
@@ -60,12 +61,12 @@ def _sampler(method: str, d: int, c: int) -> Callable[[], float]:
 def _call(method: str, d: int, c: int) -> Call:
     case = random_impact(d, c, np.random.default_rng([d, c]))
     call = KernelCall(case) if method == FACTORED else printed_call(case)
-    call()  # compiled, and its arrays touched
+    call()  # compiles the kernel and touches its arrays
     return call
 
 
 def exponent(table: Table, method: str, axis: str) -> float:
-    """Slope of log(time) over log(axis), axis "contacts" at d = 12 or "coordinates" with 60 contacts."""
+    """Return the slope of log(time) over log(axis); axis is "contacts" at d = 12, or "coordinates" at 60 contacts."""
     return power_law(*_along(table, method, axis))
 
 
@@ -81,7 +82,7 @@ def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
 
 
 def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the neighbouring sizes between which log(value) climbs fastest over log(size), and the slope there."""
+    """Return the two neighbouring sizes between which log(value) over log(size) is steepest, and the slope there."""
     pairs = sorted(zip(sizes, values, strict=True))
     slopes = [(power_law([low[0], high[0]], [low[1], high[1]]), low[0], high[0])
               for low, high in pairwise(pairs)]  # fmt: skip
@@ -90,7 +91,7 @@ def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, fl
 
 
 def fitted(table: Table) -> Table:
-    """A row per method and axis."""
+    """Return the fitted exponents, one row per method and axis."""
     columns = (Column("method", condition=True), Column("axis", condition=True), Column("exponent", timed=True),
                Column("steepest from", timed=True), Column("to", timed=True), Column("there", timed=True))
     rows = tuple((method, axis, exponent(table, method, axis), *steepest(*_along(table, method, axis)))
@@ -99,9 +100,9 @@ def fitted(table: Table) -> Table:
                                                "the two neighbouring sizes where it is largest.")
 
 
-DEADLINE = 1e-3  # [s] the haptic rate of 1 kHz
-CALLS, ALLOWED = 1000, 1  # calls of one trial, and how many of them may be late: 99.9 % are in time
-_ATTEMPTS = 3  # caches that others emptied only add time: so many trials are made until one is in time
+DEADLINE = 1e-3  # [s] one step at the haptic rate of 1 kHz
+CALLS, ALLOWED = 1000, 1  # calls of one trial, and the number of late calls allowed: 99.9 % are in time
+_ATTEMPTS = 3  # largest number of attempts of a trial, because other processes can only make calls slower
 COORDINATES = (3, 6, 12, 30)
 CONTACTS = (6, 12, 30, 60, 120, 300, 600, 1200, 3000, 6000, 12000, 30000)
 TITLES = {FACTORED: "factored", PRINTED: "the printed formula"}
@@ -117,15 +118,15 @@ def haptic_rate(
     coordinates: tuple[int, ...] = COORDINATES, contacts: tuple[int, ...] = CONTACTS, calls: int = CALLS,
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> Table:
-    """Try both methods at each number of coordinates, with more and more contacts until one is late.
+    """Test both methods at each number of coordinates and increase the contacts until more than ALLOWED calls are late.
 
-    A row per trial: how many calls were beyond the deadline in the best of some attempts (one ends as soon as more
-    are late than ALLOWED), and the median of its calls.
+    The table has one row per trial: the number of calls beyond the deadline and the median time of a call, in the first
+    attempt in time or else in the last attempt. An attempt ends when more than ALLOWED calls are late.
 
     Parameters
     ----------
-    coordinates, contacts : sizes d and c; the rows span two thirds of the motion
-    calls : in each trial
+    coordinates, contacts : sizes d and c; the rank of the rows is two thirds of d
+    calls : number of calls in each attempt
     """
     records: list[dict[str, Any]] = []
     with one_thread():
@@ -147,7 +148,7 @@ def haptic_rate(
 
 
 def most_contacts(trials: Table) -> dict[str, dict[int, int]]:
-    """Largest number of contacts in time by method and coordinates; 0 where none is."""
+    """Return the largest number of contacts in time, by method and coordinates; 0 if no size is in time."""
     most: dict[str, dict[int, int]] = {}
     for row in trials.records():
         best = most.setdefault(row["method"], {})
@@ -166,7 +167,7 @@ def _trial(method: str, d: int, c: int, calls: int) -> tuple[int, float]:
 
 
 def _late_calls(call: Call, calls: int) -> tuple[int, float]:
-    """Number of late calls and the median time; stops when there are too many."""
+    """Return the number of late calls and the median time [s]; stop when more than ALLOWED calls are late."""
     late, times = 0, []
     for _ in range(calls):
         times.append(seconds(call))

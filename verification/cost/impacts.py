@@ -1,7 +1,7 @@
-"""What a microsecond buys at one impact: error, energy and restitution against time, and which method to take.
+"""Error, energy gain and restitution residual of one impact against computing time, and the best method for a budget.
 
-Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`), compiled or from Python,
-with more and more work where it can be stopped early. `choose` reads the table: which method for a budget of time.
+Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`), compiled or from Python.
+Methods that can be stopped early run with several amounts of work. `choose` finds the method for a budget of time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ CALLED, QP = "IAPB from Python", "DAQP from Python"
 
 @dataclass(frozen=True)
 class Way:
-    """A method with an amount of work: how an impact is resolved by it; `rows`: a budget below the coordinates."""
+    """A method with an amount of work; `make` returns the timed call; `rows` is a row budget, 0 for none."""
 
     method: str
     work: str
@@ -53,7 +53,7 @@ class Way:
 
 
 ROWS, REPEATED = (1, 2, 4, 8, 16), (1, 4, 16, 64, 256, 1024)
-# To add a method: a line here.
+# To add a method, add a line here.
 WAYS: tuple[Way, ...] = (
     *(Way(IAPB, f"{rows} row{'s' * (rows > 1)}", COMPILED, partial(KernelCall, budget=rows), rows)
       for rows in ROWS),
@@ -68,7 +68,7 @@ WAYS: tuple[Way, ...] = (
 METHODS = tuple(dict.fromkeys(way.method for way in WAYS))
 SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
 ROUNDS = 5
-LONGEST = 1e-2  # [s] the largest budget: a method that needs more is timed once, and not on the other impacts of a size
+LONGEST = 1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts
 _ENOUGH = 0.02  # [s] spent on one method of one impact; slow methods get fewer rounds
 NO_GAIN = 1e-12  # a relative gain of energy below this is rounding
 
@@ -90,20 +90,20 @@ def work_precision(
     Parameters
     ----------
     sizes : (contacts, coordinates) of each size
-    rounds : how often each is timed, in random order, a warm call before it
+    rounds : number of times that each method is timed, in random order, each time after a warm-up call
     ways : methods, each with an amount of work
-    progress : called with (impacts done, impacts) after each
-    failures : receives what raises anything but an `IapbError`, which is a row; without it that passes through
+    progress : called as progress(impacts done, number of impacts) after each impact
+    failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they propagate
 
     Returns
     -------
     Table
-        one row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric; (KE⁺ − KE⁻)/KE⁻
-        exactly, 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", "too slow" (more than LONGEST),
-        or "failed" with its reason, and then the time until the method gave up is all there is.
+        One row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric; the exact
+        (KE⁺ − KE⁻)/KE⁻, or 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", "too slow" (more than
+        LONGEST), or "failed" with its reason. A failed row has only the time until the method gave up.
     """
     chosen, records = tuple(sizes), list[dict[str, Any]]()
-    slow: set[tuple[str, str]] = set()  # ways that were too slow before
+    slow: set[tuple[str, str]] = set()  # ways that were too slow on an earlier impact
     for number, (contacts, coordinates) in enumerate(chosen):
         problems = timed_problems(contacts, coordinates)
         for done, problem in enumerate(problems, start=1 + number * len(problems)):
@@ -163,7 +163,7 @@ def _measure(
 
 
 def _try(call: Call) -> Floats | str:
-    """v⁺, or the reason why there is none."""
+    """Return v⁺, or the reason why the call gives no v⁺."""
     try:
         v_plus = call()
     except IapbError as error:
@@ -182,7 +182,7 @@ def _quality(problem: ImpactCase, v_plus: Floats) -> dict[str, float | None]:
     gain = relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus)
     found = {
         "relative error": float(np.linalg.norm(lower.T @ error)) / speed,
-        "relative energy gain": max(gain, 0.0),  # what e < 1 takes by right is no error
+        "relative energy gain": max(gain, 0.0),  # a loss with e < 1 is correct, so it is no error
         "restitution residual": _residual(problem, v_plus),
     }
     return {name: value if math.isfinite(value) else None for name, value in found.items()}
@@ -198,15 +198,16 @@ def _residual(case: ImpactCase, v_plus: Floats) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """The method for a budget of time at one size, and what it gives there.
+    """The best method for a budget of time at one size of impact, and its results at that size.
 
     Attributes
     ----------
-    budget : [s].  contacts, coordinates : the size.  method, work, called : what to take.
-    time : its median [s].
+    budget : time for one impact [s].  contacts, coordinates : the size.  method, work, called : the way to choose.
+    time : its median time [s].
     error : median relative error of v⁺ over the impacts that end in time without a gain of energy.
     largest : the largest of these errors.
-    share : of the impacts: end in time without a gain of energy; solved : those with an error below SOLVED besides.
+    share : share of the impacts that end in time without a gain of energy.
+    solved : share of the impacts that also have an error of at most SOLVED.
     """
 
     budget: float
@@ -223,12 +224,12 @@ class Choice:
 
     @property
     def enough(self) -> bool:
-        """Whether it solves at least half of the impacts."""
+        """Whether the method solves at least half of the impacts."""
         return self.solved >= 0.5
 
     @property
     def how(self) -> str:
-        """The method, and after how much work it is stopped."""
+        """The method in words, with the amount of work after which it stops."""
         return f"{self.method}, stopped after {self.work}" if self.work.split()[0].isdigit() else self.method
 
     def __str__(self) -> str:
@@ -242,15 +243,16 @@ class Choice:
 
 BUDGETS = (5e-7, 5e-6, 5e-5, 5e-4, 5e-3)  # [s]
 _EQUAL = 1e-9  # errors below this count as equal: the faster method is taken
-_MOST = 0.99  # share of the cases that a method must solve in time, where any does
+_MOST = 0.99  # a larger share of solved impacts than this counts as no better
 SOLVED = 1e-3  # relative error below which an impact counts as solved
 
 
 def choose(measured: Table, budget: float, contacts: int, coordinates: int, called: str = COMPILED) -> Choice | None:
-    """Return the way for a budget [s] at a measured size; None where none answers in time without a gain of energy.
+    """Return the best way for a budget [s] at a measured size; None if no way answers in time without an energy gain.
 
-    It solves all of the nine impacts in time, or else most of them, with the least of the largest errors; of those
-    below 1e-9, the fastest. Where nothing solves half of them, it is the nearest, and not `enough`.
+    The best way solves the most of the nine impacts in time. Among equals it answers the most impacts in time; then it
+    has the least largest error, where errors below 1e-9 count as equal; then it is the fastest. Ways that solve less
+    than half of the impacts count as equal in the first criterion, and their `enough` is False.
     """
     found: list[Choice] = []
     for rows in by_way(measured.where(contacts=contacts, coordinates=coordinates, called=called)).values():
@@ -267,7 +269,7 @@ def choose(measured: Table, budget: float, contacts: int, coordinates: int, call
 
 
 def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
-    """The rows of each method and amount of work."""
+    """Return the rows of each method and amount of work."""
     ways: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in measured.records():
         ways.setdefault((row["method"], row["work"]), []).append(row)
@@ -281,12 +283,12 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     ----------
     budget : time for one impact [s].
     contacts, coordinates : the size of the impact.
-    rounds : times that each way is timed, in random order; the median counts.
+    rounds : number of times that each way is timed, in random order; the median counts.
 
     Returns
     -------
     tuple of Choice
-        The best compiled method and the best one called from Python, as far as one is fast enough.
+        The best compiled method and the best method called from Python; without those that have no way in time.
 
     Raises
     ------
@@ -302,7 +304,7 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
 
 
 def short_time(seconds_: float) -> str:
-    """A time in words: 0.5 µs, 50 µs, 5 ms."""
+    """Return a time as text, for example 0.5 µs, 50 µs or 5 ms."""
     return f"{1e3 * seconds_:.2g} ms" if seconds_ >= 1e-3 else f"{1e6 * seconds_:.3g} µs"
 
 
@@ -315,7 +317,7 @@ CHOICE_COLUMNS = (
 
 
 def choices(measured: Table) -> Table:
-    """What `choose` says for every size that was measured and every budget."""
+    """Return the result of `choose` for every measured size and every budget."""
     records: list[dict[str, Any]] = []
     for contacts, coordinates in dict.fromkeys(measured.select(("contacts", "coordinates")).rows):
         for budget in BUDGETS:
@@ -338,7 +340,7 @@ def _told(best: Choice) -> dict[str, Any]:
 
 
 def lost_to_rivals(measured: Table) -> Table:
-    """Where a complementarity solver, compiled like IAPB, gets as far (or within 1e-6) in less time."""
+    """Return the impacts on which a compiled complementarity solver is faster than IAPB at the same error or 1e-6."""
     records: list[dict[str, Any]] = []
     rows = measured.where(called=COMPILED, outcome="ok").records()
     ours = {(row["contacts"], row["problem"]): row for row in rows if row["work"] == "all rows"}
@@ -355,7 +357,7 @@ def lost_to_rivals(measured: Table) -> Table:
 
 
 def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 25) -> Table:
-    """Time each method right after each other one: a fair clock gives the same times whatever ran before."""
+    """Time each method right after each other method; with a fair clock the times do not depend on the order."""
     problem = timed_problems(contacts, coordinates)[4]
     calls: dict[str, Call] = {}
     for way in WAYS:
@@ -372,7 +374,7 @@ def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 25) -> Tab
     records = []
     for method in calls:
         samples = np.array([times[before, method].samples for before in calls if before != method])
-        middles = np.median(samples / np.median(samples, axis=0), axis=1)  # a slow minute is one for all of a round
+        middles = np.median(samples / np.median(samples, axis=0), axis=1)  # a slowdown affects a whole round
         medians = dict(zip((before for before in calls if before != method),
                            (1e6 * float(np.median(samples)) * middles).tolist(), strict=True))
         slowest, fastest = max(medians, key=lambda name: medians[name]), min(medians, key=lambda name: medians[name])
@@ -401,7 +403,7 @@ BUDGET_COLUMNS = (
 def anytime(
     impacts: int = 40, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
 ) -> Table:
-    """Resolve random plastic impacts with every budget from 0 rows to the rank."""
+    """Resolve random plastic impacts with every row budget from 0 to the rank."""
     records: list[dict[str, Any]] = []
     for done, (d, c) in enumerate(TRUNCATED, start=1):
         cases = [random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0) for k in range(impacts)]

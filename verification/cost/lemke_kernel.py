@@ -1,6 +1,7 @@
-"""The Newton LCP by Lemke's pivots, compiled from M, J, v to v⁺: the fair rival of the engine's compiled kernel.
+"""The Newton LCP solved by Lemke's method, compiled from M, J, v to v⁺, for a comparison with the engine's kernel.
 
-Plain loops, as in the engine's kernels: numba takes ten times as long to compile numpy's linear algebra.
+The code has plain loops, as the engine's kernels have, because numba takes ten times as long to compile numpy's linear
+algebra.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ lcp_lemke = import_lcp_lemke()
 
 @njit(cache=True)
 def repeat_lemke(mass_matrix, rows, v, restitution, times):  # type: ignore[no-untyped-def]
-    """Resolve the impact of v on rows (c, d) `times` times; v⁺ (d,), NaN where it was not solved."""
+    """Resolve the impact of v on rows (c, d) `times` times; return v⁺ (d,), NaN if Lemke's method fails."""
     c, d = rows.shape
     lower, whitened, v_plus = np.zeros((d, d)), np.zeros((c, d)), np.zeros(d)
     delassus, offset = np.zeros((c, c)), np.zeros(c)

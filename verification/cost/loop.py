@@ -1,4 +1,4 @@
-"""A scene in its loop, as `simulate` runs it, the record included: what the time of a step is measured on."""
+"""The loop in which the time of a step is measured: the loop of `simulate`, with its record."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from verification.clock import timed
 
 
 class RecordedLoop:
-    """A simulation that is started anew for every sample.
+    """A simulation that starts again from its first state for every sample.
 
     Parameters
     ----------
     simulation : an `iapb.simulation.Simulation`
-    steps : of one sample
+    steps : number of steps of one sample
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class RecordedLoop:
         self.recording: Recorder
 
     def sample(self) -> float:
-        """Seconds per step of one whole run; what stops it before its end is raised."""
+        """Return the time per step of one whole run [s]; raise the error that stops the run before its end."""
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.steps_done = system.make_state(), 0
         simulation.port = system.make_port(simulation.coupling)
@@ -35,7 +35,7 @@ class RecordedLoop:
         while self.recording.steps < self.steps:
             record, size = self.recording.blank(self.steps)
             if self.recording.steps == 0:
-                simulation.prepare(record)  # what is timed is steps alone
+                simulation.prepare(record)  # the timed call contains steps only
             (done, stop), spent = timed(partial(simulation.advance_chunk, record, size))
             self.recording.keep(record, done, spent)
             total += spent

@@ -1,6 +1,6 @@
-"""Cost of a step against the number of free bodies: linear, with the broad phase.
+"""Time of a step against the number of free bodies; with the broad phase it is linear.
 
-The time belongs to the machine. What the broad phase does about it is counted: the pairs that it leaves to be tested.
+The time depends on the machine. The number of pairs that the broad phase leaves for the narrow phase does not.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from verification.finding import Column, Failure, Table, of_each, table_of
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 LEAST_BODIES = 20  # with fewer, overhead hides the growth
 RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
-CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # chunks are short, so that some repeat of each is undisturbed
+CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # short chunks, so that each chunk has an undisturbed repeat
 
 
-# contacts : mean per step; pairs of shapes : that could touch; pairs tested : those that the broad phase leaves, mean
+# contacts : mean number per step; pairs of shapes : pairs that may touch; pairs tested : mean number that the broad
+# phase leaves
 COLUMNS = (
     Column("bodies", condition=True), Column("step", "µs", timed=True), Column("contacts"), Column("pairs of shapes"),
     Column("pairs tested"),
@@ -33,7 +34,7 @@ COLUMNS = (
 
 
 def field_of_discs(n: int) -> str:
-    """YAML text of n discs with random velocities over a wall."""
+    """Return the YAML text of a scene of n discs with random velocities over a wall."""
     rng, columns = np.random.default_rng(0), math.ceil(math.sqrt(n))
     bodies = [
         f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 2e-5, "
@@ -50,13 +51,13 @@ def field_of_discs(n: int) -> str:
 
 
 def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | None = None) -> Table:
-    """Return the cost of a step for each number of bodies."""
+    """Return the time of a step for each number of bodies."""
     rows = of_each(counts, lambda n: [_cost(n)], failures, lambda n: f"{n} bodies")
     return table_of(COLUMNS, rows, digits=3)
 
 
 def _cost(n: int) -> dict[str, Any]:
-    """Do the same steps again and again: the quickest time of each chunk is the one that nothing else disturbed."""
+    """Repeat the same steps and add the least time of each chunk: other processes can only make a chunk slower."""
     simulation = Simulation(scene_from_text(field_of_discs(n)))
     sizes = (simulation.system.mechanism.nq, simulation.system.mechanism.nv, 0, 0)
     simulation.advance_chunk(make_record(1, sizes, simulation.system.capacity, n), 1)  # compiles
@@ -76,7 +77,7 @@ def _cost(n: int) -> dict[str, Any]:
 
 
 def _tested(simulation: Simulation) -> int:
-    """How many pairs the narrow phase gets where the bodies are now."""
+    """Return the number of pairs that the narrow phase tests at the current positions of the bodies."""
     world, body = simulation.world, simulation.state.body
     if not world.switches.broad_phase:
         return len(world.pairs)

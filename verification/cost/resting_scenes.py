@@ -1,7 +1,7 @@
 """Three scenes in contact, for us (YAML) and for MuJoCo (MJCF): same masses, shapes, forces and step, no friction.
 
-Resting contact only: no impulse, no event, so that a step of either engine does the same work again and again. The
-hand's force acts at the centre of mass of the body that it holds.
+All contacts rest, without impulses or events, so that all steps of an engine do the same work. The hand's force acts at
+the centre of mass of the body that it holds.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _PEG_STEP, _SPATIAL_STEP = 1.0 / 512.0, 1e-3  # [s]
 class RestingScene:
     """One scene for both engines.
 
-    text : for us; file : under which its robots are looked up
-    settling : steps before those that count
+    text : our scene in YAML; file : path of the scene file, relative to which its robot files are found
+    settling : number of steps before the timed steps
     models : name of a form of the scene for MuJoCo -> function (solver) -> compiled model
-    pose : what MuJoCo starts from, by coordinate; empty where that is its model's own
-    push : (6,) force [N] and torque [N m] on the last body of MuJoCo's model, world axes
+    pose : start of MuJoCo by coordinate; empty for the start in its model
+    push : (6,) force [N] and torque [N m] on the last body of MuJoCo's model, in world axes
     """
 
     name: str
@@ -42,7 +42,7 @@ class RestingScene:
 
 
 def resting_scenes() -> tuple[RestingScene, ...]:
-    """The peg in the corner, a free box on a plane, an arm that touches a block."""
+    """Return the three scenes: the peg in the corner, a free box on a plane, an arm that touches a block."""
     return (_peg(), _box(), _arm())
 
 
@@ -75,7 +75,7 @@ hand: {body: peg, force: [-0.32, 0.4, 0]}
                       for x in (-0.0104, 0.0104) for y in (-0.00515, 0.00515))  # fmt: skip
 
     def model(shapes: str) -> Callable[[str], Any]:
-        # contacts between peg and walls only: spheres of one body never collide anyway
+        # only peg and walls may touch; spheres of one body never collide
         return lambda solver: _model(
             _option(_PEG_STEP, solver) + "<worldbody>"
             '<geom type="plane" size="1 1 1" zaxis="1 0 0"/><geom type="plane" size="1 1 1" zaxis="0 -1 0"/>'
@@ -133,11 +133,11 @@ hand: {{body: arm_link_7, point: {list(TOOL_CENTER)}, force: [{', '.join(map(str
         spec = mujoco.MjSpec.from_file(str(ARM_FILE))
         spec.option.timestep, spec.option.gravity = _SPATIAL_STEP, (0.0, 0.0, 0.0)
         spec.option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{solver.upper()}")
-        for geom in spec.geoms:  # links touch the block, not each other: so it is in our scene
+        for geom in spec.geoms:  # links touch the block but not each other, as in our scene
             geom.condim, geom.contype, geom.conaffinity = 1, 1, 0
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5 * x for x in size], pos=list(center),
                                 condim=1, contype=0, conaffinity=1)  # fmt: skip
-        for joint in spec.joints:  # ours have no limits: they would be constraints of MuJoCo's only
+        for joint in spec.joints:  # our scene has no joint limits, so MuJoCo's model has none
             joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
         return spec.compile()
 
@@ -146,7 +146,7 @@ hand: {{body: arm_link_7, point: {list(TOOL_CENTER)}, force: [{', '.join(map(str
 
 
 def _block_below_the_fingers() -> tuple[tuple[float, ...], tuple[float, float, float]]:
-    """Centre and size of a block whose upper face the lower fingertip just touches."""
+    """Return centre and size of a block whose upper face just touches the lower fingertip."""
     import numpy as np
 
     arm = Mechanism.from_urdf(ARM_FILE)

@@ -1,4 +1,4 @@
-"""What a person waits for before the first step: `iapb --help`, and compiling where nothing is cached yet."""
+"""Waiting time before the first step: `iapb --help`, and the compilation without cached kernels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from verification.finding import Column, Failure, Table, attempt
 HELP_LIMIT, COMPILE_LIMIT = 0.5, 30.0  # [s]
 _HELPS = 5
 _PROJECT = Path(__file__).parents[2]
-# a step in the plane and one in space: the second finds the first one's kernels
+# one step in the plane and one in space; the second uses kernels that the first compiled
 _FIRST_STEPS = (
     "from iapb import find_scene, load_scene, simulate\n"
     "for name in ('peg_corner', 'arm_obstacles'):\n"
@@ -57,7 +57,7 @@ def _first_steps() -> tuple[tuple[Any, ...], ...]:
 
 
 def _timed(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Wall and CPU seconds of a Python process in the project's folder."""
+    """Return wall and CPU time [s] of a Python process in the project's folder."""
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run([sys.executable, *arguments], cwd=_PROJECT, env={**os.environ, **environment}, check=True,
                    stdout=subprocess.DEVNULL)  # fmt: skip

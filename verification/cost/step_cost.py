@@ -1,9 +1,10 @@
-"""C22: what one impact costs by each solver, and one step in each world, beside IAPB, in one run.
+"""C22: time of one impact with each solver and of one step in each world, compared with IAPB in the same run.
 
-Timed is the whole way from M, J, v to v⁺: for the references that includes forming W or its factor, for IAPB the
-checks of `resolve_impact`. The kernels, IAPB's and Lemke's, are called from compiled code as in the engine's step:
-`rivals` sets like against like. The rigid worlds run a QP per step from Python, the engine's worlds are compiled; so
-IAPB's step is timed in both ways, as the loop runs it and one step at a time from Python.
+The time of an impact is the whole time from M, J, v to v⁺. It includes forming W or its factor for the references, and
+the checks of `resolve_impact` for IAPB. The kernels of IAPB and of Lemke's method are called from compiled code, as in
+the engine's step. `rivals` compares only methods that are called in the same way. The rigid worlds solve a QP per step
+from Python, while the engine's worlds are compiled. Therefore IAPB's step is timed in both ways: in the compiled loop,
+and one step at a time from Python.
 """
 
 from __future__ import annotations
@@ -38,27 +39,27 @@ CONTACTS = (1, 2, 4, 8, 16, 32, 64, 128, 300)
 SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabel")
 IAPB, KERNEL, LEMKE_KERNEL = "IAPB", "IAPB kernel", "Lemke kernel"
 REPEATS = 5
-LONGEST = 2.0  # seconds: a solver that needs more for one impact is not asked for a larger one; the row says so
-# |v⁺ − v⁺_reference| in the kinetic metric below which an impact counts as solved; first-order solvers reach 1e-6.
+LONGEST = 2.0  # [s] a solver that needs more time for an impact skips larger impacts, and their rows say so
+# An impact counts as solved if |v⁺ − v⁺_reference| in the kinetic metric is below this; first-order solvers reach 1e-6.
 _SOLVED = 1e-5
 
 
 _STATISTICS = ("median", "least", "largest")
 _SPREAD = tuple(Column(name, "µs", timed=True) for name in _STATISTICS)
-# outcome : "solved", "failed", "missing" or "left out" (slower than LONGEST before)
-# distance : of v⁺ from daqp's (from IAPB's for IAPB's own methods), kinetic metric, relative
+# outcome : "solved", "failed", "missing" or "left out" (slower than LONGEST on a smaller impact)
+# distance : relative distance of v⁺ from daqp's (for IAPB's own methods from IAPB's), in the kinetic metric
 COST_COLUMNS = (
     Column("impacts", condition=True), Column("contacts", condition=True), Column("coordinates"),
     Column("solver", condition=True), Column("outcome"), *_SPREAD, Column("samples"), Column("distance"),
     Column("note", timed=True),
 )
-# median, least, largest : of the rounds, each over IAPB's compiled loop in the same round
+# median, least, largest : over the rounds, of the time divided by that of IAPB's compiled loop in the same round
 STEP_COLUMNS = (Column("scene", condition=True), Column("world", condition=True),
                 *(Column(name, timed=True) for name in _STATISTICS), Column("samples"))
 
 
 class Rivals(NamedTuple):
-    """Two ways to resolve one impact, called alike: compiled, or from Python."""
+    """The rows of a solver and of IAPB on the same impact, called in the same way: compiled, or from Python."""
 
     called: str
     solver: Row
@@ -66,12 +67,12 @@ class Rivals(NamedTuple):
 
     @property
     def costs_more(self) -> bool | None:
-        """Whether the solver costs more; None where it solved nothing, or where the samples of the two overlap."""
+        """Whether the solver takes longer; None if it failed, or if the ranges of the two samples overlap."""
         return costs_more(self.solver, self.ours) if self.solver["outcome"] == "solved" else None
 
 
 def rivals(costs: Table) -> tuple[Rivals, ...]:
-    """Every complementarity solver with IAPB at the same impact: kernel with kernel, the others from Python."""
+    """Return every complementarity solver paired with IAPB on the same impact: kernels, or calls from Python."""
     rows = costs.records()
     ours = {(row["impacts"], row["contacts"], row["solver"]): row for row in rows}
     found = []
@@ -84,7 +85,7 @@ def rivals(costs: Table) -> tuple[Rivals, ...]:
 
 
 def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
-    """A box in space lands on `contacts` points of its lower face, slightly turning: d = 6, rank at most 3."""
+    """Return an impact of a slightly rotating box on `contacts` points of its lower face: d = 6, rank at most 3."""
     points = np.column_stack([rng.uniform(-1.0, 1.0, (contacts, 2)), -0.5 * np.ones(contacts)])
     up = np.array([0.0, 0.0, 1.0])
     rows = np.column_stack([np.tile(up, (contacts, 1)), np.cross(points, up)])
@@ -93,7 +94,7 @@ def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
 
 
 def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
-    """Planar boxes in a stack, two contacts at each joint, every joint closing: three coordinates per two contacts."""
+    """Return an impact of a stack of planar boxes with two contacts between neighbours, all approaching."""
     boxes = (contacts + 1) // 2
     rows = np.zeros((contacts, 3 * boxes))
     for i in range(contacts):
@@ -116,7 +117,7 @@ def impact_cost(
     progress: Callable[[str, int, int], None] | None = None,
     failures: list[Failure] | None = None,
 ) -> Table:
-    """Time every solver and IAPB on a patch and on a pile of each size; at least LEAST_ROUNDS samples each."""
+    """Time every solver and IAPB on a patch and a pile of each size, with at least LEAST_ROUNDS samples each."""
     rows: list[Row] = []
     too_slow: dict[tuple[str, str], float] = {}
     for done, count in enumerate(contacts):
@@ -144,7 +145,7 @@ def _time_case(
 def _warm(
     case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float], failures: list[Failure] | None
 ) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
-    """The calls that work, their v⁺, and for the others why not."""
+    """Return the calls that work, their v⁺, and the reasons why the other calls fail."""
     calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case, "factored"),
                               PRINTED: printed_call(case)}  # fmt: skip
     answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()
@@ -190,18 +191,18 @@ def _spread(times: Times) -> dict[str, Any]:
 SCENES = ("peg_corner", "peg_hole")
 COMPILED, STEPPED, IDEAL = "IAPB, compiled loop", "IAPB, step by step", "ideal (QP per step)"
 WAYS = (COMPILED, STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP per step)")
-STEPS = 256  # half a second of the peg: free, colliding and resting steps
+STEPS = 256  # number of steps: half a second of the peg, with free, colliding and resting steps
 
 
 def step_rivals(costs: Table) -> tuple[tuple[Row, Row], ...]:
-    """(the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
+    """Return (the rigid world's row, IAPB's row) of each scene, both stepped from Python."""
     by = {(row["scene"], row["world"]): row for row in costs.records()}
     return tuple((by[scene, IDEAL], by[scene, STEPPED]) for scene in dict.fromkeys(costs.column("scene"))
                  if (scene, IDEAL) in by and (scene, STEPPED) in by)  # fmt: skip
 
 
 def costs_more(theirs: Row, ours: Row) -> bool | None:
-    """Whether theirs costs more; None where the samples of the two overlap."""
+    """Return whether `theirs` takes longer; None if the ranges of the two samples overlap."""
     if theirs["least"] <= ours["largest"] and ours["least"] <= theirs["largest"]:
         return None
     return bool(theirs["median"] > ours["median"])
@@ -211,9 +212,9 @@ def world_cost(
     scenes: Sequence[str] = SCENES, repeats: int = 5, steps: int = STEPS, ways: Sequence[str] = WAYS,
     progress: Callable[[str, int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> Table:
-    """Time every world on every scene, beside IAPB's compiled loop; at least LEAST_ROUNDS samples each.
+    """Time every world on every scene, with at least LEAST_ROUNDS samples each.
 
-    Seconds are for `verification.cost.effects` to say; here a step is a multiple of IAPB's compiled one.
+    Times are multiples of a step of IAPB's compiled loop; `verification.cost.effects` measures times in seconds.
     """
     rows: list[Row] = []
     for done, name in enumerate(scenes):
@@ -227,7 +228,7 @@ def world_cost(
 
 
 def _over(times: dict[str, Times], unit: str) -> list[tuple[str, Times]]:
-    """Every way's time over that of the unit, round by round; nothing where the unit failed."""
+    """Return the times of all ways divided by those of `unit` in the same rounds; [] if the unit has no times."""
     return [(way, each.over(times[unit])) for way, each in times.items()] if unit in times else []
 
 

@@ -1,7 +1,7 @@
-"""Study "haptic-rate": what a step costs beside others' engines and solvers, how that grows, what a millisecond holds.
+"""Study "haptic-rate": times of steps and impacts compared with other engines and solvers, and their growth with size.
 
-Everything that `iapb bench` measures beside the impact methods is timed in one run, one question after the other. A
-report has two of these tables from other findings, so that nothing is measured twice (`quoting`).
+One run times everything that `iapb bench` measures except the impact methods, one question after another. A report
+takes two of these tables from other findings, so that nothing is measured twice (`quoting`).
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ QUESTION = (
     "run, because ratios depend less on the machine than seconds. Where the engine misses a target, the parts of its "
     "step show where the time is spent."
 )
-FACTORS = {60: 10.0, 300: 100.0}  # contacts, with 12 coordinates -> how many times slower the printed formula is to be
+FACTORS = {60: 10.0, 300: 100.0}  # contacts at 12 coordinates -> target factor by which the printed formula is slower
 LARGEST_EXPONENT = {"contacts": 1.1, "bodies": 1.2}
 RATE, SOLVERS = "contacts at 1 kHz", "solvers"  # tables that a report quotes from other findings
 SOLVER_CONTACTS = {"quick": (1, 4, 16, 64), "full": (1, 4, 16, 64, 128, 300)}
@@ -74,16 +74,16 @@ Tables = Mapping[str, Table]
 
 
 def compute(runner: Any, depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Measure and say what came out, as a topic of the report; nothing is simulated for keeping.
+    """Measure and return the finding of this topic of the report; no run is stored.
 
-    What other findings of a report measure is left to them: see `quoting`.
+    Quantities that other findings of a report measure are not measured here: see `quoting`.
     """
     failures: list[Failure] = []
     return finding(dict(measured(depth, lambda stage, done, total: progress(done, total), failures)), failures)
 
 
 def haptic_study(depth: str = "quick", progress: Progress | None = None) -> Finding:
-    """Measure all of it, one after the other: nothing else of ours runs meanwhile."""
+    """Measure everything one after another, without any other computation of ours at the same time."""
     failures: list[Failure] = []
     say = progress or (lambda stage, done, total: None)
     found = dict(measured(depth, say, failures))
@@ -93,9 +93,9 @@ def haptic_study(depth: str = "quick", progress: Progress | None = None) -> Find
 
 
 def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
-    """Return the finding of `compute` with what others measured: contacts in a millisecond (C19), solvers' times.
+    """Return the finding of `compute` with tables of other findings: contacts at 1 kHz (C19), and times of solvers.
 
-    Each of these is measured once in a report. Without the other finding the sentence says that it is missing.
+    A report measures each of these once. If the other finding is absent, the sentence says that it is missing.
     """
     if not found.tables:
         return found
@@ -109,7 +109,7 @@ def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
 
 
 def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tuple[str, Table]]:
-    """Yield the tables by name; a case that raises costs its own row."""
+    """Yield the tables by name; a case that raises an exception has no row."""
     full = depth == "full"
 
     def within(stage: str) -> Callable[[int, int], None]:
@@ -135,7 +135,7 @@ def measured(depth: str, say: Progress, failures: list[Failure]) -> Iterator[tup
 
 
 def _races(rounds: int, progress: Callable[[int, int], None], failures: list[Failure]) -> Table:
-    """The races; without MuJoCo none, and the note says so."""
+    """Return the table of steps against MuJoCo; without MuJoCo the table is empty, and its note says why."""
     try:
         return race_mujoco(rounds=rounds, progress=progress, failures=failures)
     except MissingDependencyError as error:
@@ -143,7 +143,7 @@ def _races(rounds: int, progress: Callable[[int, int], None], failures: list[Fai
 
 
 def _rate(trials: Table) -> Table:
-    """C19: a row per number of coordinates."""
+    """Return the largest number of contacts at 1 kHz (claim C19), one row per number of coordinates."""
     most = most_contacts(trials)
     found = {f"most contacts, {title.removeprefix('the ')}": most.get(title, {}) for title in TITLES.values()}
     sizes = dict.fromkeys(trials.column("coordinates"))
@@ -155,7 +155,7 @@ def _rate(trials: Table) -> Table:
 
 
 def _robots(depth: str) -> Table:
-    """The robots of others where they are, else the project's own."""
+    """Return the times of the mechanics on robots of others if their files exist, else on the project's own robots."""
     files, _ = robot_files()
     found = time_robots(None if files else SHIPPED / "robots", depth)
     keys = ("robot", "velocities", "quantity", "form", "time", "Pinocchio", "ratio", "lower quartile", "upper quartile")
@@ -166,7 +166,7 @@ def _robots(depth: str) -> Table:
 
 
 def finding(tables: Tables, failures: list[Failure]) -> Finding:
-    """Say what the tables show."""
+    """Return the finding of the tables, one or more parts per question."""
     failures, parts = list(failures), list[Part]()
     for say in (_say_races, _say_printed, _say_solvers, _say_growth, _say_rate, _say_bodies, _say_robots, _say_start,
                 _say_motions, _say_worth, _say_budgets, _say_order):  # fmt: skip
@@ -181,7 +181,7 @@ def finding(tables: Tables, failures: list[Failure]) -> Finding:
 
 
 def _part(sentence: str, met: bool, timed: bool = True, miss: str = "", quantities: Quantities = ()) -> Part:
-    """A part; `miss` says on the first page what is missed, where it is."""
+    """Return a part with its verdict; `miss` is the text for the first page if the target is missed."""
     return Part(sentence, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss, quantities=quantities)
 
 
@@ -212,7 +212,7 @@ def _say_races(tables: Tables) -> Iterator[Part]:
 
 
 def _largest_parts(parts: Table, scene: str) -> str:
-    """Where a step's time goes, and what the ratio would be without its largest part."""
+    """Return in words the largest parts of a step's time, and the step's time without the largest part."""
     here = parts.where(scene=scene)
     times = dict(zip(here.column("part"), here.column("time"), strict=True))
     whole = times.pop(WHOLE)
@@ -222,7 +222,7 @@ def _largest_parts(parts: Table, scene: str) -> str:
 
 
 def _printed_over_factored(tables: Tables) -> Iterator[tuple[int, float, float, float]]:
-    """Contacts, both times [µs] and their ratio, at d = 12 and the contacts of FACTORS."""
+    """Yield (contacts, factored time [µs], printed time [µs], ratio) at d = 12, for the contacts of FACTORS."""
     for contacts in FACTORS:
         here = tables["scaling"].where(coordinates=12, contacts=contacts)
         times = dict(zip(here.column("method"), here.column("time"), strict=True))
@@ -241,7 +241,7 @@ def _say_printed(tables: Tables) -> Iterator[Part]:
 
 
 def _say_solvers(tables: Tables) -> Iterator[Part]:
-    """One sentence per way of calling: faster everywhere, or where not."""
+    """Yield one part per way of calling; it says where IAPB is faster than the solvers, and where it is slower."""
     if SOLVERS not in tables:
         yield _missing("Times of complementarity solvers: the page Against complementarity was not computed.")
         return
@@ -263,7 +263,7 @@ def _say_solvers(tables: Tables) -> Iterator[Part]:
 
 
 def _slower(pairs: list[Rivals]) -> str:
-    """Where IAPB is slower."""
+    """Return in words the solvers and sizes at which IAPB is slower."""
     at: dict[tuple[str, str], list[int]] = {}
     for pair in pairs:
         at.setdefault((pair.solver["solver"], pair.solver["impacts"]), []).append(pair.solver["contacts"])
@@ -273,7 +273,7 @@ def _slower(pairs: list[Rivals]) -> str:
 
 
 def _checks(solvers: Table) -> str:
-    """What of a call from Python is the impact itself."""
+    """Return a sentence on the share of the impact itself in the time of a call from Python."""
     kernel, whole = (
         {(row["impacts"], row["contacts"]): row["median"] for row in solvers.where(solver=name).records()}
         for name in (KERNEL, IAPB)
@@ -328,7 +328,7 @@ def _say_bodies(tables: Tables) -> Iterator[Part]:
 
 
 def _steepest(rows: Sequence[Row]) -> str:
-    """Where the time grows fastest with the number of bodies, and by how much more they touch there."""
+    """Return in words where the time grows fastest with the number of bodies, and the number of contacts there."""
     if len(rows) < 3:
         return ""
     low, high, slope = steepest([row["bodies"] for row in rows], [row["step"] for row in rows])
@@ -374,7 +374,7 @@ def _say_budgets(tables: Tables) -> Iterator[Part]:
 
 
 def _say_motions(tables: Tables) -> Iterator[Part]:
-    """Per scene: at the accuracy that MuJoCo reaches at best, the time of our fastest run that is no worse."""
+    """Yield one part per scene with the best errors, and our fastest time at MuJoCo's best accuracy."""
     motions = tables["motions"]
     for scene in dict.fromkeys(motions.where(outcome="ok").column("scene")):
         here = motions.where(scene=scene, outcome="ok").records()

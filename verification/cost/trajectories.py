@@ -1,14 +1,16 @@
-"""Whole motions: error against event-driven truth, and the time they take, over methods and steps.
+"""Error and computing time of whole motions, over methods and steps; the truth is the event-driven solution.
 
-Our compiled worlds are timed in their loop, the record included. The others are called from Python with set-up and
-record: their time is that of the run less that of a run of one step. The least of REPEATS short runs counts. What
-raises, or ends in numbers that are none, is a failure; what would take longer than LONGEST by the time of the coarser
-steps is a time-out. Both stay among the rows. An error below what the truth is worth is no measurement: the row has
-the truth's bound in its place, and its note says so. No scene has an impact at a multiple of a step: there a run
-would be exact by chance.
+Our compiled worlds are timed in their loop, with the record. The other methods are called from Python with set-up and
+record; their time is the time of the run minus that of a run of one step. Short runs are repeated REPEATS times, and
+the least time counts.
 
-`curves` says what ten times the accuracy costs along the runs of one method on one scene, and the figures draw the same
-curves; `worth` sums them up per method.
+A run that raises an exception or gives values that are not finite is a failure. A run that, judged by the coarser
+steps, would take longer than LONGEST is a time-out and is not made. Both have rows in the table. If an error is below
+the error bound of the truth, the row has this bound instead, and its note says so. No scene has an impact at a multiple
+of a step, because there a run would be exact by chance.
+
+`curves` computes the cost of ten times the accuracy for each method and scene, and the figures show the same curves.
+`worth` summarizes the curves of each method.
 """
 
 from __future__ import annotations
@@ -37,17 +39,17 @@ from verification.cost.step_cost import IDEAL
 from verification.finding import Column, Failure, Table, attempt, table_of
 
 _BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
-_PEG = (0.021, 0.0105, 0.0105)  # [m] the paper's peg, a third side added
+_PEG = (0.021, 0.0105, 0.0105)  # [m] the sides of the paper's peg, and a third side
 _TILT, _PUSH = 0.05, (-0.8, 0.0, -1.0)  # [rad] about y, [m/s2] towards wall and floor
 
 
 def cradle() -> FixedScene:
-    """The fixed set's, until all four collisions are over."""
+    """The elastic cradle of the fixed scenes, until all four collisions are over."""
     return replace(fixed_scene("elastic_cradle"), title="cradle, e = 1")
 
 
 def bouncing_ball() -> FixedScene:
-    """A ball falls, and is caught in flight after its fifth bounce."""
+    """A falling ball; the motion ends in flight after the fifth bounce."""
     ball = RigidBody("ball", 1.0, (0.4 * RADIUS**2,) * 3, (Sphere(RADIUS),), (0.0, 0.0, RADIUS + _FALL),
                      velocity=(0.0, 0.0, -_SPEED))  # fmt: skip
     duration, gravity = 0.75, -WEIGHT[2]
@@ -61,7 +63,7 @@ def bouncing_ball() -> FixedScene:
 
 
 def peg_landing() -> FixedScene:
-    """A tilted peg is driven into a corner without bounce: edge after edge comes to lie on the floor and the wall."""
+    """A tilted peg is pushed into a corner without bounce; its edges touch the floor and the wall one after another."""
     wall = Obstacle("wall", (0.5, 2.0, 2.0), (-0.25, 0.0, 0.75))
     half = 0.5 * _PEG[0]
     peg = RigidBody("peg", 2.0, (0.005,) * 3, (Cuboid(_PEG),), (half + 0.0131, 0.0, 0.5 * _PEG[2] + 0.0087),
@@ -71,9 +73,9 @@ def peg_landing() -> FixedScene:
 
 
 def later(name: str) -> FixedScene:
-    """A scene of the fixed set whose impacts come `_LATER` later: its bodies start that much further back in flight.
+    """Return a fixed scene whose impacts are later by `_LATER`, because its bodies start earlier in their flight.
 
-    In the set itself an impact falls on a multiple of the step, and a run with that step is exact by chance.
+    In the fixed scene itself an impact is at a multiple of the step, and a run with that step is exact by chance.
     """
     scene = fixed_scene(name)
     gravity = np.array(scene.gravity)
@@ -99,11 +101,11 @@ STEPS = {
     "quick": (8e-3, 2e-3, 5e-4, 1e-4, 2e-5),
     "full": (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
 }  # [s]
-ENGINES = ("mujoco", "bullet", "drake")  # those of the adapters that take any step
-REPEATS = 5  # below ONCE seconds
-_SET_UPS = 3  # of which the quickest is taken off: a disturbed one would make the run seem quicker than it is
+ENGINES = ("mujoco", "bullet", "drake")  # adapters of engines that accept any step
+REPEATS = 5  # number of repetitions of runs below ONCE seconds
+_SET_UPS = 3  # number of timed set-ups; the least time is subtracted, since a disturbed one would be too long
 ONCE = 0.05
-LONGEST = {"quick": 0.2, "full": 20.0}  # [s] for one run
+LONGEST = {"quick": 0.2, "full": 20.0}  # [s] largest time of one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene, step, duration -> motion, seconds
@@ -140,11 +142,11 @@ def trajectory_precision(
     -------
     Table
         position : largest distance of a body's centre, or of a point half a length beside it, from the truth
-        velocity : mean over the samples of the largest error of a body's velocity (at an impact any two motions that
-            are not simultaneous differ by the whole jump)
+        velocity : mean over time of the largest error of a body's velocity (a maximum would measure only the jump at an
+            impact that is slightly early or late)
         signed energy : error of the energy at the end; positive is a gain
-        energy made : most by which kinetic and potential energy exceeded that at the start; elastic energy not counted
-        time : of the run per simulated second; until it failed, or expected where it was not tried
+        energy made : largest rise of kinetic plus potential energy above its start value, without elastic energy
+        time : computing time per simulated second; of a failed run until it failed, of a time-out the expected time
     """
     names, ways = tuple(scenes or TRAJECTORY_SCENES), methods()
     records: list[Record] = []
@@ -163,8 +165,8 @@ def trajectory_precision(
     return table_of(COLUMNS, records, digits=3, note=NOTE)
 
 
-GAINED = 1.5  # a run belongs to a fit if its error is so many times smaller than that of the run before it in the fit
-_LEAST_FALL = 3.0  # over all runs of a fit: with less, a cost of ten times the accuracy would be a guess
+GAINED = 1.5  # a run belongs to a fit if its error is at least this many times smaller than that of the run before it
+_LEAST_FALL = 3.0  # least ratio of the errors over a fit: with less, the cost of ten times the accuracy is a guess
 
 
 @dataclass(frozen=True)
@@ -173,11 +175,11 @@ class Curve:
 
     Attributes
     ----------
-    fitted : runs along which the error falls; the cost is fitted to exactly these. () without a cost.
-    left_out : the others: before the error falls, after it stops falling, or exact by chance (`by_chance`).
-    cost : times the computing time that a tenth of the error costs; None where the error does not fall threefold.
-    front : runs that no other run of the scene beats in both time and error.
-    too_few : whether there is no cost because finer steps took too long.
+    fitted : runs along which the error falls, to which the cost is fitted; () if there is no cost.
+    left_out : the other runs: before the error falls, after it stops falling, or exact by chance (`by_chance`).
+    cost : factor in computing time for a tenth of the error; None if the error falls less than threefold.
+    front : runs such that no other run of the scene is better in both time and error.
+    too_few : whether there is no cost because finer steps would take too long.
     """
 
     scene: str
@@ -195,25 +197,25 @@ class Curve:
 
     @property
     def least(self) -> float:
-        """The smallest error of position that is no chance."""
+        """The smallest error of position, without runs that are exact by chance."""
         return float(min(run["position"] for run in self.runs if not by_chance(run)))
 
     @property
     def level(self) -> bool:
-        """Whether runs finer than those of the fit no longer improve."""
+        """Whether the error no longer falls at steps finer than those of the fit."""
         return bool(self.fitted) and any(run["step"] < self.fitted[-1]["step"] and not by_chance(run)
                                          for run in self.left_out)
 
     @property
     def words(self) -> str:
-        """What ten times the accuracy costs on this scene, for a name at the curve."""
+        """The cost of ten times the accuracy on this scene, as a label of the curve."""
         if self.cost is None:
             return "too few runs" if self.too_few else f"stays at {self.least:.2g}"
         return f"10× costs {times(self.cost)}{', then level' * self.level}"
 
 
 def times(factor: float) -> str:
-    """A factor in a few characters: 3.4×, 49×."""
+    """Return a factor as short text, for example 3.4× or 49×."""
     return f"{factor:.2g}×" if factor < 10.0 else f"{factor:.0f}×"
 
 
@@ -222,12 +224,12 @@ def _by_step(runs: Iterable[Record]) -> list[Record]:
 
 
 def by_chance(run: Record) -> bool:
-    """Whether the error of position is below what the truth is known to: the step met the instants of impact."""
+    """Whether the error of position is below the truth's own bound, because the step meets the instants of impact."""
     return "position" in run["note"] and str(run["note"]).endswith(BELOW)
 
 
 def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
-    """Return a curve for each scene and each of some methods with a run; the front is among these methods."""
+    """Return a curve for each scene and each of these methods that has a run; fronts compare only these methods."""
     found: list[Curve] = []
     for scene in dict.fromkeys(motions.column("scene")):
         here = [run for run in motions.where(scene=scene, outcome="ok").records()
@@ -249,7 +251,9 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
 
 
 def falling(runs: Sequence[Record]) -> list[Record]:
-    """Return the runs, coarse to fine, along which the error falls by GAINED each; the first: the last before it does.
+    """Return the runs, coarse to fine, along which the error falls by a factor of at least GAINED each.
+
+    The first of them is the last run before the error falls.
     """
     kept = [runs[0]]
     for run in runs[1:]:
@@ -261,7 +265,9 @@ def falling(runs: Sequence[Record]) -> list[Record]:
 
 
 def tenfold_cost(runs: Sequence[Record]) -> float | None:
-    """10^(−1/slope) of error over time, by least squares in logarithms; None where the error falls less than threefold.
+    """Return the factor in time for a tenth of the error; None if the error falls less than threefold.
+
+    The factor is 10^(−1/slope), with the slope of log(error) over log(time) by least squares.
     """
     if runs[0]["position"] < _LEAST_FALL * runs[-1]["position"]:
         return None
@@ -279,10 +285,10 @@ WORTH_COLUMNS = (
 
 
 def worth(motions: Table, methods: Sequence[str]) -> Table:
-    """Per method, over all scenes: its errors, what ten times the accuracy costs, and where no other is better.
+    """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
-    The cost is the median over the scenes on which it can be fitted; "error stays": on so many the error does not fall;
-    "best for its time": scenes on whose front it is, with the errors that it has there.
+    The cost is the median over the scenes on which it can be fitted. "Error stays" is the number of scenes on which the
+    error does not fall. "Best for its time" is the number of scenes on whose front the method is.
     """
     found = curves(motions, methods)
     records: list[dict[str, Any]] = []
@@ -309,18 +315,18 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
 
 
 def on_front(row: Record, others: Sequence[Record]) -> bool:
-    """Whether no other run of the scene is both faster and more exact."""
+    """Whether no other run of the scene is both faster and more accurate."""
     return not any(one["time"] < row["time"] and one["position"] < row["position"] for one in others)
 
 
 IMPULSES, PENALTIES = "IAPB, semi-implicit Euler", "PB, semi-implicit Euler"
-# Two comparisons of at most six curves, each with a front of its own: worlds and engines, and integrators.
+# Two comparisons of at most six curves each: worlds and engines, and integrators. Each has its own front.
 WORLDS = (IMPULSES, PENALTIES, IDEAL, "MuJoCo", "Drake", "Bullet")
 INTEGRATORS = (IMPULSES, "IAPB, midpoint", "IAPB, Runge-Kutta 4", PENALTIES, "PB, Runge-Kutta 4")
 
 
 def methods() -> dict[str, Motion]:
-    """Name -> way to run a scene: our worlds with each integrator, the ideal world, installed engines."""
+    """Return the motion functions by name: our worlds with several integrators, the ideal world, installed engines."""
     ways: dict[str, Motion] = {
         IMPULSES: _compiled("ImpulseAugmented", "semi_implicit_euler"),
         "IAPB, midpoint": _compiled("ImpulseAugmented", "midpoint"),
@@ -339,7 +345,7 @@ def methods() -> dict[str, Motion]:
 
 
 def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:
-    """Run one method with every step; what fails or would take longer than `longest` [s] is a row, too."""
+    """Run one method with every step; failures and runs that would take longer than `longest` [s] also give rows."""
     records: list[Record] = []
     per_step = 0.0
 
@@ -367,18 +373,18 @@ def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[flo
 
 
 def _tried(way: Motion, scene: FixedScene, step: float) -> tuple[Trajectory, float] | Exception:
-    """The motion and the least time of its runs, or what was raised."""
+    """Return the motion and the least time of its runs, or the exception of a run."""
     try:
         found = [way(scene, step, scene.duration)]
         while len(found) < REPEATS and found[0][1] < ONCE:
             found.append(way(scene, step, scene.duration))
-    except Exception as error:  # an engine's own errors are of every kind, and each is a result
+    except Exception as error:  # engines raise exceptions of any type, and each is a result
         return error
     return found[-1][0], min(spent for _, spent in found)
 
 
 class Judge:
-    """The truth of a scene, how far a motion is from it, and how far the truth may be off itself."""
+    """The truth of a scene, the errors of a motion, and bounds of the truth's own errors."""
 
     def __init__(self, scene: FixedScene) -> None:
         self.scene = scene
@@ -388,17 +394,17 @@ class Judge:
         self.kinetic = float(grid.kinetic_energy(scene).max())
         self.start = float(grid.kinetic_energy(scene)[0] + grid.potential_energy(scene)[0])
         bound, mass = self.truth.bound, sum(body.mass for body in scene.bodies)
-        # an event that comes late by `instant` leaves a body for so long with a velocity off by the whole jump
+        # if an event is late by `instant`, a velocity is wrong by the whole jump during this time
         late = 2.0 * self.speed * bound.instant * len(self.truth.events) / scene.duration
         energy = mass * (self.speed * bound.velocity + float(np.linalg.norm(scene.gravity)) * bound.position)
         self.bounds = {
-            "position": bound.position * (1.0 + 0.5 * scene.length) / scene.length,  # the point beside turns as well
+            "position": bound.position * (1.0 + 0.5 * scene.length) / scene.length,  # the second point turns too
             "velocity": (bound.velocity + late) / self.speed,
             "energy": energy / self.kinetic,
         }
 
     def errors(self, motion: Trajectory) -> tuple[dict[str, float], str]:
-        """Errors as the table has them, none below the truth's bound, and a note on those that would be."""
+        """Return the errors for the table, at least the truth's bounds, and a note on errors below their bound."""
         truth = self._at(np.minimum(motion.time, self.truth.end))
         off = np.linalg.norm(motion.velocity - truth.velocity, axis=-1).max(axis=1)
         energy = [one.kinetic_energy(self.scene)[-1] + one.potential_energy(self.scene)[-1] for one in (motion, truth)]
@@ -426,7 +432,7 @@ class Judge:
 
 
 def _compiled(law_name: str, integrator: str) -> Motion:
-    """One of the engine's laws, in the compiled loop."""
+    """Return the motion function of one of the engine's laws in the compiled loop."""
 
     def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float]:
         contact: dict[str, Any] = dict(find_simulator("iapb").settings(scene, step).options)
@@ -442,7 +448,7 @@ def _compiled(law_name: str, integrator: str) -> Motion:
 
 
 def _adapter(name: str) -> Motion:
-    """An engine behind the adapters' protocol, less its set-up."""
+    """Return the motion function of an engine with an adapter; its time is without the set-up."""
 
     def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float]:
         engine = find_simulator(name)
