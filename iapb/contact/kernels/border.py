@@ -1,8 +1,8 @@
-"""A whole impact in one call: check the numbers, scale by powers of two, resolve, scale back, judge the energy.
+"""A whole impact in one call: check the input, scale by powers of two, resolve, scale back, bound the energy.
 
 Scaling every coordinate to a unit diagonal of M, every row to a largest entry near one and the velocity to a largest
-entry near one is exact in binary arithmetic. So no intermediate over- or underflows, and a change of units or of
-row scale by a power of two changes no bit of the result.
+entry near one is exact in binary arithmetic. So no intermediate result over- or underflows, and a change of units or
+of row scale by a power of two changes no bit of the result.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from iapb.contact.kernels.projector import minimum_norm_impulses
 from iapb.double_double import kinetic_energies
 from iapb.mechanics.kernels.cholesky import cholesky
 
-# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) is rounding of whoever computed M: energies are those of M as given, in
-# which the skew part cancels; the factor is that of the symmetric part.
+# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
+# part cancels; the Cholesky factor is that of the symmetric part.
 _SYMMETRY_TOLERANCE = 1e-9
-_LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
-_EXACT = 1000  # binary exponents that an entry may lie below the largest and still be scaled exactly
+_LOWEST_EXPONENT = -100_000  # exponent of zeros, so that they are never the maximum
+_EXACT = 1000  # largest difference of binary exponents from the largest entry that still scales exactly
 
-# What is wrong with an impact, and where: (reason, i, j).
+# Reasons to refuse an impact, returned with their place: (reason, i, j).
 FINE, MASS_NOT_FINITE, VELOCITY_NOT_FINITE, ROWS_NOT_FINITE, DIAGONAL, ENTRY, ASYMMETRIC, NOT_DEFINITE = range(8)
 VELOCITY_RANGE, MOMENTUM_RANGE, IMPULSE_RANGE, ENERGY_RANGE = range(8, 12)
 # How an impact ends.
@@ -37,7 +37,7 @@ class BorderWork(NamedTuple):
 
     mass: np.ndarray  # (d, d) scaled, symmetric to rounding
     symmetric: np.ndarray  # (d, d) its symmetric part
-    lower: np.ndarray  # (d, d) the Cholesky factor of that
+    lower: np.ndarray  # (d, d) the Cholesky factor of `symmetric`
     rows: np.ndarray  # (d, c) scaled rows as columns
     velocity: np.ndarray  # (d,) scaled
     coordinate_exponent: np.ndarray  # s (d,)
@@ -47,7 +47,7 @@ class BorderWork(NamedTuple):
     v_plus: np.ndarray  # (d,) scaled
     momentum: np.ndarray  # (d,) scaled
     candidate: np.ndarray  # (d,)
-    size: np.ndarray  # (c,) the caller's rows are these multiples of the scaled ones, up to one common factor
+    size: np.ndarray  # (c,) ratio of the caller's rows to the scaled rows, up to one common factor
     length: np.ndarray  # (c,)
     impulses: np.ndarray  # (c,)
     triangle: np.ndarray  # (d, d)
@@ -108,7 +108,7 @@ def scale_impact(mass_matrix, jacobian, velocity, work):
 
 @kernel
 def _not_finite(mass_matrix, jacobian, velocity):
-    """The first entry that is not finite: (reason, i, j)."""
+    """Return the first entry that is not finite: (reason, i, j)."""
     d, c = velocity.shape[0], jacobian.shape[0]
     for i in range(d):
         for j in range(d):
@@ -126,13 +126,13 @@ def _not_finite(mass_matrix, jacobian, velocity):
 
 @kernel
 def _exponent(value):
-    """Binary exponent; zero gets one that never is a maximum."""
+    """Return the binary exponent; for zero, one that is never the maximum."""
     return math.frexp(value)[1] if value != 0.0 else _LOWEST_EXPONENT
 
 
 @kernel
 def _scale_mass(mass_matrix, work):
-    """The scaled M, its symmetric part and the Cholesky factor of that; (reason, i, j)."""
+    """Write the scaled M, its symmetric part and the Cholesky factor of this part; return (reason, i, j)."""
     s, d = work.coordinate_exponent, work.mass.shape[0]
     row, column, largest = 0, 0, -1.0
     for i in range(d):
@@ -161,7 +161,7 @@ def whole_impact(mass_matrix, jacobian, velocity, restitution, tolerance, budget
                  impulses):
     """Resolve an impact in the caller's units by (21) in factored form.
 
-    tolerance : of the rows; 0 takes the default.  v_plus, momentum (d,), impulses (c,) : output.
+    tolerance : rank tolerance of the rows; 0 selects the default.  v_plus, momentum (d,), impulses (c,) : output.
     Returns (reason, i, j), (rank, status), clamp, (energy change, its lower and upper bound).
     """
     wrong = scale_impact(mass_matrix, jacobian, velocity, work)
@@ -189,10 +189,10 @@ def whole_impact(mass_matrix, jacobian, velocity, restitution, tolerance, budget
 
 @kernel
 def least_norm_impulses(work, rank):
-    """The p of least norm along the *caller's* rows with Aᵀp = Δu, in scaled rows p' = 2^−r p.
+    """Write the p of least norm along the *caller's* rows with Aᵀp = Δu, as p' = 2^−r p for the scaled rows.
 
-    Where row sizes differ, the least norm of p is found first, and what its rounding leaves of Δu is added by the
-    least norm of p', which no difference of sizes harms.
+    If row sizes differ, the p of least norm is computed first. Its rounding leaves a residual of Δu, which a p' of
+    least norm then corrects; this second solve does not depend on the row sizes.
     """
     d, c, impact = work.velocity.shape[0], work.row_exponent.shape[0], work.impact
     even = row_sizes(work)
@@ -217,7 +217,7 @@ def least_norm_impulses(work, rank):
 
 @kernel
 def row_sizes(work):
-    """Write 2^−r (c,), largest 1; whether all are 1. A row of zeros counts as one of the largest."""
+    """Write the sizes 2^−r (c,), scaled to a largest of 1; return whether all are 1. A row of zeros has size 1."""
     c, d, row = work.row_exponent.shape[0], work.velocity.shape[0], work.row_exponent
     least, even = -_LOWEST_EXPONENT, True
     for i in range(c):
@@ -235,9 +235,9 @@ def row_sizes(work):
 
 @kernel
 def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impulses):
-    """Write the impact in the caller's units; the last step again where scaling back rounded v⁺ the wrong way.
+    """Write the impact in the caller's units; clamp the step again if the rounding of this raised the energy.
 
-    Returns the factor of that step, and (energy change, its lower and upper bound); NaN where v⁺ is out of range.
+    Returns the factor of this clamp, and (energy change, its lower and upper bound); they are NaN if v⁺ overflows.
     """
     d, s, k = velocity.shape[0], work.coordinate_exponent, work.velocity_exponent[0]
     for i in range(d):
@@ -270,7 +270,7 @@ def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impul
 
 @kernel
 def _outward(value, exponent, towards):
-    """value · 2^exponent, one step outwards for what rounding took; a bound of no gain or no loss stays one."""
+    """Return value · 2^exponent, rounded one step outwards; a bound that shows no gain (or no loss) still shows it."""
     bound = np.nextafter(np.ldexp(value, exponent), towards)
     if towards > 0.0 and value <= 0.0:
         return min(bound, 0.0)
@@ -281,7 +281,7 @@ def _outward(value, exponent, towards):
 
 @kernel
 def _out_of_range(v_plus, momentum, impulses, energy):
-    """Which result is not finite, FINE where none."""
+    """Return which result is not finite, FINE if all are."""
     for i in range(v_plus.shape[0]):
         if not math.isfinite(v_plus[i]):
             return VELOCITY_RANGE
@@ -299,7 +299,7 @@ def whole_impacts(masses, jacobians, velocities, restitution, tolerance, budget,
                   impulses, counts, numbers):
     """`whole_impact` of n problems; counts (n, 2): rank, status; numbers (n, 4): clamp, energy change, its bounds.
 
-    Returns (reason, i, j) of the first that is refused and its index; FINE and n where none is.
+    Returns (reason, i, j) and the index of the first impact that is refused; FINE and n if none is.
     """
     n = velocities.shape[0]
     for m in range(n):

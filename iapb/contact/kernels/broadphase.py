@@ -1,10 +1,10 @@
-"""Broad phase: the pairs of shapes whose bounding spheres meet, at a cost that is linear in the moving shapes.
+"""Broad phase: find the pairs of shapes whose bounding spheres overlap, at a cost linear in the moving shapes.
 
-Moving shapes are sorted into the cells of a uniform grid as wide as the largest of them; two can touch only in
-the same cell or in neighbouring ones. Cells are found through a hash table with counted buckets (no list, no
-allocation). Every moving shape is held against every static one: linear in the moving shapes, too.
+Moving shapes are sorted into the cells of a uniform grid. A cell is as wide as the largest moving shape, so two shapes
+can touch only in the same cell or in neighbouring cells. A hash table with counted buckets finds the cells (no list,
+no allocation). Every moving shape is compared with every static one, which is linear in the moving shapes too.
 
-The pairs come out in the order of the candidate pairs, so that a scene runs to the same last bit with and without.
+The pairs keep the order of the candidate pairs, so a scene gives the same bits with and without the broad phase.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from iapb.compiled import kernel
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, POLYGON, SPHERE, Integers, Shapes
 
-# Below this number of candidate pairs testing them all is as fast: the narrow phase leaves far ones early.
+# Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant pairs early.
 WORTHWHILE_PAIRS = 150
-# Pairs kept per shape: bounding spheres of equal shapes meet about a dozen neighbours when they lie closely packed.
+# Pairs kept per shape: bounding spheres of equal, closely packed shapes overlap about a dozen neighbours.
 PAIRS_PER_SHAPE = 40
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ class BroadPhase(NamedTuple):
     radius: Floats  # (n,) [m], infinite for half-planes and half-spaces
     cell_size: float  # [m] largest diameter of a moving shape
     neighbours: int  # cells to look at: 9 in the plane, 27 in space
-    center: Floats  # (n, 3) [m] world; static ones are there from the start
+    center: Floats  # (n, 3) [m] world; those of static shapes are constant
     cell: NDArray[np.int64]  # (k, 3)
     bucket: NDArray[np.int64]  # (k,)
     start: NDArray[np.int64]  # (buckets + 1,)
@@ -47,7 +47,7 @@ class BroadPhase(NamedTuple):
 
 
 def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
-    """Return the broad phase of the candidate pairs (k, 2); switched off scenes pass no pairs and get a stub."""
+    """Return the broad phase of the candidate pairs (k, 2); without pairs (broad phase off) it is a stub."""
     n = len(shapes.kind) if len(pairs) else 0
     allowed = np.zeros((n, n), np.int8)
     for a, b in pairs:
@@ -70,7 +70,7 @@ def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
 
 
 def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
-    """Centre in the body's frame and radius [m]: of the box around a polygon, exact for the other shapes."""
+    """Return the centre in the body's frame and the radius [m]: of the box around a polygon, exact for others."""
     kind = int(shapes.kind[i])
     if kind in (HALF_PLANE, HALF_SPACE):
         return np.zeros(3), np.inf
@@ -83,12 +83,12 @@ def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
     return shapes.center[i].copy(), extent
 
 
-LARGEST_CELL = 2**40  # of a coordinate far away; the hash wants integers, and int64 holds the cell and its neighbours
+LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cell and its neighbours
 
 
 @kernel
 def near_pairs(broad, R, p, margin):
-    """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 when they do not fit."""
+    """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do not fit."""
     place_bounds(broad, R, p)
     fill_buckets(broad, margin)
     count = moving_pairs(broad, margin)
@@ -106,7 +106,7 @@ def near_pairs(broad, R, p, margin):
 
 @kernel
 def place_bounds(broad, R, p):
-    """Centres of the bounding spheres of all moving shapes, in the world."""
+    """Write the centres of the bounding spheres of all moving shapes, in the world."""
     for i in broad.moving:
         body = broad.body[i]
         for row in range(3):
@@ -118,20 +118,20 @@ def place_bounds(broad, R, p):
 
 @kernel
 def bucket_of(x, y, z, buckets):
-    """Bucket of a cell, `buckets` a power of two: three large primes mix its coordinates (Teschner et al., 2003)."""
+    """Return the bucket of a cell by a hash with three primes (Teschner et al., 2003); `buckets`: a power of two."""
     return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (buckets - 1)
 
 
 @kernel
 def cell_number(value, width):
-    """Cell of a coordinate; those out of range of integers, infinite or not a number share the last."""
+    """Return the cell of a coordinate; LARGEST_CELL if it is too large, infinite or not a number."""
     number = math.floor(value / width)
     return int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
 
 
 @kernel
 def fill_buckets(broad, margin):
-    """Counting sort of the moving shapes by the bucket of their cell."""
+    """Sort the moving shapes by the bucket of their cell (counting sort)."""
     buckets = broad.start.shape[0] - 1
     width = broad.cell_size + margin
     broad.start[:] = 0
@@ -153,7 +153,7 @@ def fill_buckets(broad, margin):
 
 @kernel
 def moving_pairs(broad, margin):
-    """Pairs of moving shapes from the 9 (plane) or 27 cells around each; each pair is seen from both, kept once."""
+    """Append the pairs of moving shapes from the 9 (plane) or 27 cells around each shape, each pair once."""
     buckets, count = broad.start.shape[0] - 1, 0
     for m in range(broad.moving.shape[0]):
         for neighbour in range(broad.neighbours):
@@ -173,7 +173,7 @@ def moving_pairs(broad, margin):
 
 @kernel
 def static_pairs(broad, margin, count):
-    """Pairs of a moving and a static shape."""
+    """Append the pairs of a moving and a static shape."""
     if count < 0:
         return -1
     for i in broad.moving:
@@ -186,7 +186,7 @@ def static_pairs(broad, margin, count):
 
 @kernel
 def keep_pair(broad, i, j, margin, count):
-    """Append the pair if it is a candidate and the bounding spheres meet; shapes without bound always do."""
+    """Append the pair if it is a candidate and its bounding spheres overlap; those of unbounded shapes always do."""
     if i > j:
         i, j = j, i
     if broad.allowed[i, j] == 0:
@@ -205,7 +205,7 @@ def keep_pair(broad, i, j, margin, count):
 
 @kernel
 def sort_keys(keys, count):
-    """Heapsort of the first `count` keys: no recursion, no scratch, n log n whatever their order."""
+    """Sort the first `count` keys by heapsort: no recursion, no scratch, n log n in every order."""
     for root in range(count // 2 - 1, -1, -1):
         _sift(keys, root, count)
     for end in range(count - 1, 0, -1):

@@ -1,4 +1,4 @@
-"""Collisions of one step, island by island: paper section V on the state of a world."""
+"""Collisions of one step, island by island (paper section V)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from iapb.mechanics.kernels.vectors import load
 
 @kernel
 def gather_dofs(world, state, island):
-    """List the coordinates of an island, of a contact group (2)-(3) or a part of one; return how many."""
+    """List the coordinates of an island, which is a contact group (2)-(3) or a part of one; return how many."""
     size = 0
     for t in range(world.tree_start.shape[0]):
         if state.island_of_tree[t] == island:
@@ -47,7 +47,7 @@ def _store_row(state, size, contact, count):
 
 @kernel
 def gather_rows(world, state, island, size):
-    """Rows of J_c: (11) against the static world; (12), or the two of (13)-(14), at a self-collision."""
+    """Write the rows of J_c, return how many: (11) against the world; (12), or both of (13)-(14), for two bodies."""
     contacts = state.contacts
     count = 0
     for i in range(state.contact_count[0]):
@@ -67,7 +67,7 @@ def gather_rows(world, state, island, size):
 
 @kernel
 def gather_tangents(world, state, size, count):
-    """Rows of the tangents of each contact, into the friction's scratch."""
+    """Write the rows of each contact's tangents into the scratch of friction."""
     contacts, free = state.contacts, state.friction_work.free
     tangents = state.friction_work.velocity.shape[0]
     for r in range(count):
@@ -81,14 +81,14 @@ def gather_tangents(world, state, size, count):
 
 @kernel
 def pair_restitution(own, a, b, otherwise):
-    """e of two shapes: the smaller of those they give; `otherwise` where neither gives one (above 1)."""
+    """Return e of two shapes: the smaller of their values; `otherwise` if neither has one (both are above 1)."""
     e = min(own[a], own[b])
     return otherwise if e > 1.0 else e
 
 
 @kernel
 def gather_restitution(world, state, count):
-    """Write the rows' restitution; return the smallest, and whether they differ."""
+    """Write the restitution of each row; return the smallest value, and whether the values differ."""
     contacts, smallest, largest = state.contacts, 1.0, 0.0
     for r in range(count):
         i = state.rows[r]
@@ -100,7 +100,7 @@ def gather_restitution(world, state, count):
 
 @kernel
 def largest_share(impulse, dofs, size, dt, force_limit):
-    """Largest common factor in [0, 1] with |share · p_i / Δt| <= the limit of its dof, in floating point too.
+    """Return the largest share in [0, 1] with |share · p_i / Δt| <= the limit of each dof, in floating point too.
 
     impulse (size,) [N s, N m s] of a group; dofs (size,) its coordinates; force_limit (d,) [N, N m], inf = none
     """
@@ -119,7 +119,7 @@ def largest_share(impulse, dofs, size, dt, force_limit):
 def apply_group(world, state, size, share):
     """Write the group's new velocity and impulse back; return the kinetic energy it lost [J] and the share applied.
 
-    That is `share` unless the velocity so rounded would gain energy (`iapb.contact.kernels.passive`).
+    The applied share is `share` unless rounding of the velocity would gain energy (`iapb.contact.kernels.passive`).
     With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
     """
     mass, v, change = state.group_mass[:size, :size], state.group_v[:size], state.work.v_change[:size]
@@ -127,7 +127,7 @@ def apply_group(world, state, size, share):
     for i in range(size):
         change[i] = state.group_v_plus[i] - v[i]
     write_step(v, change, share, after)
-    certain = share == 1.0  # the velocity that the resolver let through
+    certain = share == 1.0  # the velocity that the resolver has accepted
     for i in range(size):
         certain = certain and after[i] == state.group_v_plus[i]
     if not certain and not plainly_loses(mass, v, after):
@@ -144,7 +144,7 @@ def apply_group(world, state, size, share):
 
 @kernel
 def count_approaching(world, work, size, count, share):
-    """Rows of the impact that approach still after it: what a clamp, a scale or a lost rank leaves."""
+    """Return how many rows still approach after the impact, because of a clamp, a scale or a row not used."""
     approaching = 0
     for i in range(count):
         gamma = 0.0
@@ -175,7 +175,7 @@ def log_impact(state, island, rows, rank, share, clamp, friction_share, solved, 
 
 @kernel
 def resolve_unequal(world, state, size, count, smallest):
-    """Poisson's law for rows that differ in e; where it fails the scalar rule with the smallest e, passive for all."""
+    """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     v_plus, impulse, work = state.group_v_plus[:size], state.group_impulse[:size], state.work
     rank, clamp = poisson_impact(mass, lower, v, state.row_restitution, count, True, work, state.push_work,
@@ -189,7 +189,7 @@ def resolve_unequal(world, state, size, count, smallest):
 
 @kernel
 def add_friction_to_impact(world, state, size, count, rank):
-    """Friction on top of the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
+    """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
     gather_tangents(world, state, size, count)
     for r in range(count):
         state.friction_work.coefficient[r] = friction_of(world, state.contacts, state.rows[r])
@@ -201,7 +201,7 @@ def add_friction_to_impact(world, state, size, count, rank):
 
 @kernel
 def resolve_rows(world, state, size, count):
-    """(20)-(21), or what the scene and the law ask for beyond; return (rank, clamp, share of friction, solved)."""
+    """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
     if world.switches.unequal_restitution or world.switches.pushing:
@@ -228,7 +228,7 @@ def resolve_rows(world, state, size, count):
 
 @kernel
 def resolve_island(world, state, island):
-    """One simultaneous impact, scaled to the device where the scene has limits."""
+    """Resolve one simultaneous impact; scale it to the device if the scene has limits."""
     size = gather_dofs(world, state, island)
     gather_group(world, state, size)
     count = gather_rows(world, state, island, size)

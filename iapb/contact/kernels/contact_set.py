@@ -1,4 +1,4 @@
-"""The contact set of a step (paper section III): clusters, what is new, groups, states, which rows collide."""
+"""The contact set of a step (paper section III): clusters, new contacts, groups, states, colliding rows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from iapb.run import COLLIDING, FREE, RESTING
 # wall, or two sides of a triangle, do not.
 ALIGNED_COSINE = 0.85
 
-# An overlap up to this [m] is touching: rounding of the places makes it, and no spring feels it.
+# An overlap up to this [m] counts as touching: rounding of positions causes it, and its penalty force is negligible.
 TOUCHING = 1e-12
 
 _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
@@ -21,14 +21,14 @@ _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
 
 @kernel
 def squared_distance(first, i, second, j):
-    """Squared distance of the points of two contacts [m²]."""
+    """Return the squared distance of the points of two contacts [m²]."""
     apart = subtract(load(first.point, i), load(second.point, j))
     return dot(apart, apart)
 
 
 @kernel
 def same_surface(first, i, second, j, cosine):
-    """Is it the same pair of bodies, with aligned normals? (The pair may be listed the other way round.)"""
+    """Return whether both contacts have the same two bodies, in either order, and aligned normals."""
     aligned = dot(load(first.normal, i), load(second.normal, j))
     a, b = first.body_a[i], first.body_b[i]
     if a == second.body_a[j] and b == second.body_b[j]:
@@ -40,8 +40,8 @@ def same_surface(first, i, second, j, cosine):
 def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     """Collapse contacts of one surface closer than `distance` [m] into the deepest; return how many stay.
 
-    Deepest first: a contact stays unless one that stays lies deeper and closer than `distance`. So those that
-    stay are at least `distance` apart, in their former order, and each one dropped has its deeper neighbour.
+    Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer than
+    `distance`. So kept contacts of a surface are at least `distance` apart; they keep their order.
     """
     if not _any_near(contacts, count, distance, cosine):
         return count
@@ -66,14 +66,14 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
 
 @kernel
 def _is_near(contacts, i, j, distance, cosine):
-    """Are two contacts on one surface and closer than `distance`?"""
+    """Return whether two contacts are on one surface and closer than `distance`."""
     near = squared_distance(contacts, i, contacts, j) < distance * distance
     return near and same_surface(contacts, i, contacts, j, cosine)
 
 
 @kernel
 def _any_near(contacts, count, distance, cosine):
-    """Is there anything to collapse? Mostly there is not, and this is the cheaper question."""
+    """Return whether any two contacts collapse; usually none do, and this test is cheaper than the clustering."""
     for i in range(count):
         for j in range(i):
             if _is_near(contacts, i, j, distance, cosine):
@@ -83,7 +83,7 @@ def _any_near(contacts, count, distance, cosine):
 
 @kernel
 def _close_ranks(contacts, count):
-    """Move the kept contacts to the front, geometry only: nothing else is computed before clustering."""
+    """Move the kept contacts to the front; only their geometry, as nothing else is computed before clustering."""
     row = 0
     for i in range(count):
         if contacts.mark[i] != _KEPT:
@@ -95,16 +95,16 @@ def _close_ranks(contacts, count):
 
 @kernel
 def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED_COSINE):
-    """Write is_new: temporal coherence through space, or by identity alone where `distance` is 0.
+    """Write is_new from temporal coherence: by position, or by shapes and feature alone if `distance` is 0.
 
-    A contact is old if the step before had one (overlap beyond TOUCHING) with the same shapes and feature, or within
-    `distance` [m] on the same surface. The distance must exceed (largest speed) × (step). One old contact
-    may vouch for several: a facet's edge that appears beside the facet is the same contact, as paper III says.
-    A corner that slides along the floor into a wall is new, since the normals differ though the point is one.
-    A contact that only touched is new: no force has held it yet (balls of a cradle).
+    A contact is old if the step before had a contact (overlap beyond TOUCHING) with the same shapes and feature, or
+    one within `distance` [m] on the same surface. The distance must exceed (largest speed) × (step). One previous
+    contact may match several: a facet's edge that appears beside the facet is the same contact (paper III).
+    A corner that slides along the floor into a wall is new, since the normals differ at the same point.
+    A contact that only touched in the step before is new, since no force has acted at it yet (balls of a cradle).
 
-    Contacts keep their order from step to step, so the search begins behind the last one found: the cost is
-    linear in lasting contacts.
+    Contacts keep their order from step to step, so the search begins after the last match. The cost is linear in
+    the contacts that last.
     """
     begin = 0
     for i in range(count):
@@ -134,7 +134,7 @@ def _is_same(contacts, i, previous, j, distance, cosine):
 
 @kernel
 def moving_tree(body, tree_of_body, tree_start, tree_stop):
-    """Tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
+    """Return the tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
     if body < 0:
         return -1
     tree = tree_of_body[body]
@@ -143,7 +143,7 @@ def moving_tree(body, tree_of_body, tree_start, tree_stop):
 
 @kernel
 def join(group_of_tree, a, b):
-    """Make one group of those of two trees; a root is the smallest tree of its group."""
+    """Merge the groups of two trees; the root of a group is its smallest tree."""
     while group_of_tree[a] != a:
         a = group_of_tree[a]
     while group_of_tree[b] != b:
@@ -153,7 +153,7 @@ def join(group_of_tree, a, b):
 
 @kernel
 def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree):
-    """Write group_of_tree: the first tree of the group that contacts between moving trees link it to."""
+    """Write group_of_tree, the first tree of each tree's group; contacts between moving trees link groups."""
     for t in range(group_of_tree.shape[0]):
         group_of_tree[t] = t
     for i in range(count):
@@ -169,7 +169,7 @@ def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_t
 
 @kernel
 def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree):
-    """Group of a contact, -1 when nothing at it can move."""
+    """Return the group of a contact, -1 if neither of its bodies can move."""
     tree = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
     if tree < 0:
         tree = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
@@ -180,14 +180,14 @@ def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_
 def classify(
     contacts, count, tree_of_body, tree_start, tree_stop, approach_velocity, spreading, group_of_tree, state_of_tree
 ):
-    """Groups, the state of each (free, colliding, resting) and the contacts that collide.
+    """Write the groups, the state of each (free, colliding, resting) and the contacts that collide.
 
-    A contact has gap <= 0; it approaches when v_n < −approach_velocity [m/s]. A group collides when a *new*
-    contact of it approaches, or any contact while an impulse is still being spread; then every contact of the
-    group that approaches, new or old, enters the impact.
+    Only contacts with gap <= 0 count. A contact approaches if v_n < −approach_velocity [m/s]. A group collides if one
+    of its *new* contacts approaches, or if any contact approaches while an impulse is still being spread. Then every
+    approaching contact of the group, new or old, enters the impact.
 
     contacts : is_new and normal_velocity up to date; collides is written
-    spreading (t,) bool : trees with an unfinished impulse; cleared where the group collides no more
+    spreading (t,) bool : trees with an unfinished impulse; cleared if the group no longer collides
     group_of_tree (t,), state_of_tree (t,) : written, the state for every tree of the group
     """
     link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree)
@@ -220,15 +220,15 @@ def classify(
 
 # Islands of a colliding group: trees that contacts *of this collision* link.
 #
-# M is block diagonal in the trees and a row has entries for the trees of its contact only, so (21) falls apart into
-# its islands: what lies still among the touching is neither copied nor factored.
+# M is block diagonal in the trees, and a row has entries only for the trees of its contact, so (21) separates into the
+# islands. Touching trees outside the islands are neither copied nor factored.
 
 
 @kernel
 def find_islands(world, state):
-    """Write island_of_tree, the first tree of each one's island, and collides_of_tree for these; False if none does.
+    """Write island_of_tree, the first tree of each tree's island, and collides_of_tree; return False if none collides.
 
-    Where impulses are scaled to the device, islands are the groups: the paper's factor is one for a group.
+    With an impulse limit islands are the groups, since the paper scales all impulses of a group by one factor.
     """
     any_collides = False
     for t in range(world.tree_start.shape[0]):

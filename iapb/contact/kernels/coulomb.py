@@ -1,9 +1,10 @@
-"""Coulomb friction of a step, implicit in the velocity: it takes energy in every step and drives nothing backwards.
+"""Coulomb friction of a step, implicit in the velocity: it dissipates in every step and does not reverse a slip.
 
 The other forces of the step lead to v. Friction adds Δv = M⁻¹ Jᵀ p with the tangential impulses p that minimize
-½ Δvᵀ M Δv + p · J v in the discs |p_i| ≤ μ F_n,i Δt, where F_n are the normal forces (5) of the step: each contact
-stops, or slides on against p_i at the limit. The sweeps start where this function is not above zero and each lowers it,
-so friction takes kinetic energy wherever they end; `passive_factor` makes its work over the step negative as well.
+½ Δvᵀ M Δv + p · J v in the discs |p_i| ≤ μ F_n,i Δt, where F_n are the normal forces (5) of the step. Each contact
+stops, or slides against p_i at the limit. The sweeps over the contacts start at a p where this function is not above
+zero, and each sweep lowers it, so friction takes kinetic energy after any number of sweeps. `passive_factor` also
+keeps the work of friction over the step from being positive.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from iapb.mechanics.kernels.cholesky import solve_tree_blocks
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
 
-SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
-STILL = 1e-6  # of the fastest slip: a sweep that moves less is the last one
+SWEEPS = 30  # at most in a step: contacts that have not converged slip, and the next step continues from there
+STILL = 1e-6  # share of the fastest slip: a sweep that changes velocities by less is the last one
 
 
 class StepFriction(NamedTuple):
@@ -30,13 +31,13 @@ class StepFriction(NamedTuple):
 
     contact: np.ndarray  # (c,) int64: contacts that carry friction in this step
     tree: np.ndarray  # (c, 2) int64: their two trees, −1 = none or the same
-    rows: np.ndarray  # (c m, 2 w) tangents' rows of J L⁻ᵀ, w entries for each tree: the others are zero
+    rows: np.ndarray  # (c m, 2 w) tangents' rows of J L⁻ᵀ, w entries for each tree; the rest of a full row is zero
     slip: np.ndarray  # (c m,) tangential velocity without friction [m/s]
     p: np.ndarray  # (c m,) tangential impulses [N s]
     radius: np.ndarray  # (c,) limit μ F_n Δt [N s]
     inertia: np.ndarray  # (c,) largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
     moved: np.ndarray  # (d,) Lᵀ Δv
-    local: np.ndarray  # (2 w,) the part of it that one contact touches
+    local: np.ndarray  # (2 w,) entries of `moved` for the two trees of one contact
     velocity: np.ndarray  # (m,)
 
 
@@ -52,7 +53,7 @@ def make_step_friction(coordinates: int, contacts: int, tangents: int, tree_size
 
 @kernel
 def remember_friction(state):
-    """The friction forces of this step become those of the step before, where the sweeps start."""
+    """Copy the friction forces of the last step to `previous`; the sweeps start from them."""
     for i in range(state.contact_count[0]):
         store(state.previous.friction_force, i, load(state.contacts.friction_force, i))
 
@@ -61,8 +62,8 @@ def remember_friction(state):
 def add_step_friction(world, state):
     """Add the friction of the step to v; write friction_force (d,) and that of each contact.
 
-    Places and factor of M are those at the start of the step, v is what the other forces make of it. Trees that rub
-    move with the new velocity, whatever the integrator: then friction does the work p · J v⁺.
+    Poses and factor of M are those at the start of the step; v is the velocity that the other forces lead to. Trees
+    with friction move with the new velocity under every integrator, so the work of friction is p · J v⁺.
     """
     f, dt, size = state.step_friction, world.dt, state.step_friction.velocity.shape[0]
     count = _gather(world, state)
@@ -93,7 +94,7 @@ def add_step_friction(world, state):
 
 @kernel
 def passive_factor(p, slip, moved):
-    """Largest α ≤ 1 with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0."""
+    """Return the largest α ≤ 1 with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0."""
     given, square = along(p, slip[: p.shape[0]]), along(moved, moved)
     if given >= 0.0:
         return 0.0
@@ -102,7 +103,7 @@ def passive_factor(p, slip, moved):
 
 @kernel
 def _gather(world, state):
-    """Rows, slips, limits and first impulses of the contacts that push in this step; return their number."""
+    """Write rows, slips, limits and starting impulses of the contacts with F_n > 0; return their number."""
     f, contacts, size = state.step_friction, state.contacts, state.step_friction.velocity.shape[0]
     count = begin = 0
     for i in range(state.contact_count[0]):
@@ -132,7 +133,7 @@ def _gather(world, state):
 
 @kernel
 def _before(state, i, begin):
-    """The contact of the step before with the shapes and feature of contact i, −1 = none. Order mostly lasts."""
+    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
     now, before, total = state.contacts, state.previous, state.contact_count[1]
     for k in range(total):
         j = begin + k if begin + k < total else begin + k - total
@@ -144,7 +145,7 @@ def _before(state, i, begin):
 
 @kernel
 def _gather_row(world, state, j, r, i, tangent):
-    """Row j of J L⁻ᵀ and the slip along it: contact i, number r of those that rub, along one of its tangents."""
+    """Write row j of J L⁻ᵀ and its slip, for a tangent of contact i; r is the number of i among those with friction."""
     f, lower, row, x = state.step_friction, state.lower, state.row, load(state.contacts.point, i)
     width = f.rows.shape[1] // 2
     f.rows[j] = 0.0
@@ -169,7 +170,7 @@ def _gather_row(world, state, j, r, i, tangent):
 
 @kernel
 def _start(world, state, count):
-    """Start from the impulses of the step before where they take energy, else from none; `moved` goes with p."""
+    """Start from the impulses of the step before if they take energy, else from zero; write `moved` for this p."""
     f, size = state.step_friction, state.step_friction.velocity.shape[0]
     f.moved[:] = 0.0
     for r in range(count):
@@ -185,7 +186,7 @@ def _start(world, state, count):
 
 @kernel
 def _fetch(world, f, r):
-    """local ← what contact r touches of `moved`."""
+    """local ← the entries of `moved` for the trees of contact r."""
     width = f.local.shape[0] // 2
     f.local[:] = 0.0
     for side in range(2):
@@ -197,7 +198,7 @@ def _fetch(world, f, r):
 
 @kernel
 def _give_back(world, f, r):
-    """`moved` ← local."""
+    """Write `local` back to the entries of `moved` for the trees of contact r."""
     width = f.local.shape[0] // 2
     for side in range(2):
         tree = f.tree[r, side]
@@ -208,7 +209,7 @@ def _give_back(world, f, r):
 
 @kernel
 def _sweep(world, state, count):
-    """Sweep p, contact by contact, until a sweep moves nothing; `moved` follows."""
+    """Sweep p, contact by contact, until a sweep changes no velocity by more than STILL; update `moved`."""
     f, size, fastest = state.step_friction, state.step_friction.velocity.shape[0], 0.0
     for j in range(count * size):
         fastest = max(fastest, abs(f.slip[j]))

@@ -14,9 +14,9 @@ from iapb.double_double import add_product, symmetric_entry
 from iapb.mechanics.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
 
 UNIT_ROUNDOFF = 2.0**-53
-# Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. Restitution is
-# then unmet by at most (1 + e) · tolerance · |u|. Larger would leave real contacts unmet (the kit asks 1e-8);
-# smaller would take rounding of a computed Jacobian (1e-16, amplified by √κ(M)) for a contact.
+# Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of
+# restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would violate restitution at real contacts
+# (the kit requires 1e-8); a smaller one would treat rounding of a Jacobian (1e-16, amplified by √κ(M)) as a contact.
 RANK_TOLERANCE = 1e-10
 _NOISE_FACTOR = 8.0  # rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
 
@@ -49,7 +49,7 @@ def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
 
 @kernel
 def rank_tolerance(lower):
-    """Eligibility tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding noise where that is larger."""
+    """Return the rank tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding of the rows if it is larger."""
     d = lower.shape[0]
     largest = smallest = lower[0, 0]
     for k in range(1, d):
@@ -60,7 +60,7 @@ def rank_tolerance(lower):
 
 @kernel
 def whiten_impact(lower, v, count, work):
-    """From rows of J in `work.columns` and v to unit rows of A (kept in `work.rows` too), their lengths, and u."""
+    """Write unit rows of A (`work.columns`, `work.rows`), their lengths and u, from v and J in `work.columns`."""
     d = v.shape[0]
     columns = work.columns[:d]
     to_whitened(lower, v, work.u[:d])
@@ -76,8 +76,8 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
     """Resolve `count` rows, given as columns of `work.columns`, by (21) in factored form.
 
     Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u; returns (rank, clamp).
-    Every row is an equality J v⁺ = −e J v⁻, whatever its sign; choosing the rows is the caller's.
-    A group smaller than its scratch uses the first d coordinates of it; what lies beyond is another group's.
+    Every row is an equality J v⁺ = −e J v⁻, whatever the sign of its velocity; the caller chooses the rows.
+    A group smaller than the scratch uses only its first d coordinates.
     """
     whiten_impact(lower, v, count, work)
     return project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum)
@@ -85,7 +85,7 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
 
 @kernel
 def project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
-    """`factored_impact` from where `whiten_impact` ends."""
+    """Do the part of `factored_impact` that follows `whiten_impact`."""
     d = v.shape[0]
     columns, u, change = work.columns[:d], work.u[:d], work.change[:d]
     rank = orthonormal_basis(columns, count, u, tolerance, budget, work.basis, work.closing, work.size,
@@ -97,7 +97,7 @@ def project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget,
 
 @kernel
 def apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, momentum):
-    """`apply_change` for a Δu in the span of the basis; where it is clamped, it is first made exact for M itself."""
+    """Do `apply_change` for a Δu in the span of the basis; with the clamp, `refine_change` corrects Δu first."""
     d = v.shape[0]
     from_whitened(lower, work.change[:d], work.v_change[:d])
     if clamped:
@@ -108,7 +108,7 @@ def apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, m
 
 @kernel
 def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
-    """v⁺ = v + α L⁻ᵀ Δu with the clamp's α; generalized impulse α L Δu. Returns α."""
+    """Write v⁺ = v + α L⁻ᵀ Δu and the generalized impulse α L Δu; return the clamp's α."""
     d = v.shape[0]
     from_whitened(lower, work.change[:d], work.v_change[:d])
     return _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum)
@@ -116,9 +116,9 @@ def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
 
 @kernel
 def _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum):
-    """v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change. Returns α.
+    """Write v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change; return α.
 
-    Where it is clamped, v⁺ has no more kinetic energy than v, in real arithmetic; α = 0 is the last resort.
+    With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is found.
     """
     d = v.shape[0]
     alpha = 1.0
@@ -134,22 +134,22 @@ def _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum):
     return alpha
 
 
-# Make an impact exact for M itself, where Cholesky's backward error would let L Lᵀ ≠ M be felt.
+# Refinement of an impact for M itself, where Cholesky's backward error L Lᵀ ≠ M affects the result.
 
-# The factor's error |E| below this share is left to the energy clamp: it moves energy and restitution by as little.
+# An error |E| of the factor below this share is left to the energy clamp; its effect is as small.
 _FELT = 1e-12
-_CONTRACTS = 0.1  # above this share the fixed point below may not converge; the clamp then has the last word
-_PASSES = 3  # each multiplies what is left by |E|, about d ε κ(M): 1e-3 at κ(M) = 1e12
+_CONTRACTS = 0.1  # above this share the fixed-point iteration below may not converge; the clamp then ensures passivity
+_PASSES = 3  # each multiplies the remaining error by |E|, about d ε κ(M): 1e-3 at κ(M) = 1e12
 
 
 @kernel
 def refine_change(mass_matrix, lower, basis, rank, change, v_change, deviation, along, shifted):
-    """Replace Δu = change of (21) by the one that M, not L Lᵀ, calls for.
+    """Correct Δu = change of (21) for M instead of L Lᵀ.
 
-    In whitened coordinates M is I + E with |E| about d ε κ(M). Wanted is a Δu whose part in the row space is the
-    given one (restitution) and whose impulse (I + E) Δu lies in the row space: Δu ← Δu₀ − (I − Q Qᵀ) E Δu, with
-    E Δu = L⁻¹ M Δv − Δu and M Δv summed in double-double. Without this the clamp alone would answer for E,
-    and it pays in restitution.
+    In whitened coordinates M is I + E with |E| about d ε κ(M). The corrected Δu has the given part in the row space
+    (restitution), and its impulse (I + E) Δu lies in the row space. The iteration is Δu ← Δu₀ − (I − Q Qᵀ) E Δu, with
+    E Δu = L⁻¹ M Δv − Δu and M Δv summed in double-double. Without it the clamp alone would compensate E, which
+    reduces restitution.
 
     change : (d,) Δu₀ in span Q; on return L⁻¹ of the generalized impulse.
     v_change : (d,) L⁻ᵀ Δu₀; on return Δv.  deviation, along, shifted : (≥d,) scratch.

@@ -1,7 +1,7 @@
-"""Dry friction in an impact: what `iapb.contact.impact_laws` states, on plain arrays and linear in the contacts.
+"""Dry friction in an impact, as stated in `iapb.contact.impact_laws`: on plain arrays, linear in the contacts.
 
-The normal part is done and stands in an `ImpactWork`: u, its change Δ_n and the basis Q of the normal rows. Added is
-Δ_t = α Bᵀ p_t with B = A_t (I − Q Qᵀ), which moves no normal velocity.
+The normal part is computed before; its `ImpactWork` holds u, the change Δ_n and the basis Q of the normal rows. These
+kernels add Δ_t = α Bᵀ p_t with B = A_t (I − Q Qᵀ), which changes no normal velocity.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factor
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
 
-GONE = 1e-13  # of a tangent's row: less than this outside the normal rows' span is their rounding
+GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
 
 class FrictionWork(NamedTuple):
     """Scratch of the friction of one impact: d coordinates, c contacts, m tangents each (1 planar, 2 spatial)."""
 
     free: np.ndarray  # (c m, d) tangents' rows of J, then of A, then B
-    normal_part: np.ndarray  # (c m, d) A_t Qᵀ: what was taken out, along the basis
+    normal_part: np.ndarray  # (c m, d) A_t Qᵀ: the removed part, along the basis
     slip: np.ndarray  # (c m,) tangential velocity after the normal impact [m/s]
     p: np.ndarray  # (c m,) tangential impulses [N s]
     inertia: np.ndarray  # (c,) ‖B_i B_iᵀ‖ [1/kg]
-    response: np.ndarray  # (c m,) ∂p_n,i / ∂p_t,i by least norm: how friction at a contact loads or relieves it
+    response: np.ndarray  # (c m,) ∂p_n,i / ∂p_t,i by least norm: effect of a contact's friction on its normal impulse
     coefficient: np.ndarray  # (c,) μ
     radius: np.ndarray  # (c,) Coulomb's limit μ p_n [N s]
-    change: np.ndarray  # (c,) what a round finds the limits off by
-    sliding: np.ndarray  # (c,) μ, 0 where the contact pulls without friction
+    change: np.ndarray  # (c,) change of each limit that a round asks for
+    sliding: np.ndarray  # (c,) μ; 0 where the frictionless normal impulse pulls
     without: np.ndarray  # (c,) normal impulses without friction [N s]
-    wanted: np.ndarray  # (c,) normal impulses with it
+    wanted: np.ndarray  # (c,) normal impulses with friction
     target: np.ndarray  # (d,) Q Δ_n
     left: np.ndarray  # (d,)
     moved: np.ndarray  # (d,) Bᵀ p_t
@@ -58,7 +58,7 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
     """Add Coulomb friction to the normal impact in `work`; `f.free` holds the tangents' rows of J, `f.coefficient` μ.
 
     Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
-    friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, settled or not.
+    friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence.
     """
     d = v.shape[0]
     share, met = friction_change(lower, count, rank, work, push, f, d)
@@ -74,7 +74,7 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
 def friction_change(lower, count, rank, work, push, f, d):
     """Add α Bᵀ p_t to `work.change`; return the share of p_t that is kept and whether Coulomb's law is met.
 
-    The share is α times what keeps p_t within the cones where no p_t obeyed Coulomb's law.
+    The share is α times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
     """
     u, change, moved = work.u[:d], work.change[:d], f.moved[:d]
     scale = split_tangents(lower, count, rank, work, f, d)
@@ -91,9 +91,9 @@ def friction_change(lower, count, rank, work, push, f, d):
 
 @kernel
 def split_tangents(lower, count, rank, work, f, d):
-    """Whiten the tangents' rows, write the slip, and take the normal rows' span out: B and A_t Qᵀ.
+    """Whiten the tangents' rows, write the slip, and remove the span of the normal rows: write B and A_t Qᵀ.
 
-    Returns the largest |A_t,j| |u| [m/s]: what a tangential velocity is summed from, so its rounding's scale.
+    Returns the largest |A_t,j| |u| [m/s], the scale of the rounding of a tangential velocity.
     """
     u, largest = work.u[:d], 0.0
     for j in range(count * f.velocity.shape[0]):
@@ -121,7 +121,7 @@ def split_tangents(lower, count, rank, work, f, d):
 
 @kernel
 def share_within_cone(count, f):
-    """Largest common factor β of p_t with β |p_t| ≤ μ p(β) at every contact, p(β) linear between the two."""
+    """Return the largest β with β |p_t| ≤ μ p(β) at every contact; p(β) is linear between `without` and `wanted`."""
     size = f.velocity.shape[0]
     share, largest = 1.0, 0.0
     for i in range(count):
@@ -137,7 +137,7 @@ def share_within_cone(count, f):
 
 @kernel
 def passive_share(u, change, moved):
-    """Largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ what the normal part lost: the whole gains no energy."""
+    """Return the largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ loss of the normal part: the sum gains no energy."""
     square, slope = along(moved, moved), along(u, moved)
     lost = max(0.0, -along(u, change) - 0.5 * along(change, change))
     if square == 0.0 or 0.5 * square + slope <= lost:
@@ -146,38 +146,38 @@ def passive_share(u, change, moved):
     return min(1.0, (root - slope) / square if slope <= 0.0 else 2.0 * lost / (root + slope))
 
 
-# Coulomb's law in an impact: tangential impulses and the limits μ p_n that move with them, settled together.
+# Coulomb's law in an impact: an iteration for the tangential impulses p_t and the limits μ p_n, which depend on p_t.
 #
-# Each round moves the normal impulses to those that go with p_t, the limits with them, and p_t by a few sweeps. Where
-# contacts are redundant the normal impulses are not unique, and the choice must be continuous in p_t, or the limits
-# jump from round to round: here the non-negative ones *nearest to the round before*, by alternating projections; where
-# no non-negative ones explain the motion (some contact pulls), those of least norm, which are linear in p_t.
+# Each round updates the normal impulses for p_t, then the limits, then p_t by a few sweeps. At redundant contacts the
+# normal impulses are not unique. The choice must be continuous in p_t, or the limits jump from round to round. The
+# iteration takes the non-negative impulses nearest to those of the round before, by alternating projections. If no
+# non-negative impulses produce the motion (some contact pulls), it takes those of least norm, which are linear in p_t.
 
-# What has not settled by then swings or grows without end (no solution), or no non-negative impulses exist. Where the
-# limits settle it takes 3 to 30 rounds, as a rule.
+# Largest number of rounds. Convergence usually takes 3 to 30; an iteration that has not converged by then oscillates or
+# diverges (no solution), or no non-negative impulses exist.
 ROUNDS = 200
-UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way only, then a fifth: large μ can make them swing
+UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way, then a fifth: large μ can make them oscillate
 HALF, FIFTH = 0.5, 0.2
-STRIDE = 10.0  # times its change that a limit may move at once where friction loads its own contact, μ ∂p_n/∂p_t → 1
-AT_LIMIT = 0.99  # of a limit: what is below it sticks, or will
-# Of the speeds that a slip is summed from: a round that moves less is the last one. Some thousand roundings.
+STRIDE = 10.0  # largest over-relaxation of a limit, for friction that loads its own contact, μ ∂p_n/∂p_t → 1
+AT_LIMIT = 0.99  # share of a limit: a contact below it sticks
+# Share of the speeds that a slip is summed from: a round with smaller changes is the last one. Some thousand roundings.
 STILL = 1e-12
-# Coulomb's law counts as met to this, as restitution does: two rows that differ by less count as one (RANK_TOLERANCE).
+# Tolerance for Coulomb's law, the same as for restitution: rows that differ by less count as one (RANK_TOLERANCE).
 MET = 1e-10
-# Sweeps of p_t in a round, for limits that move anyway: as many as make the last move a tenth of the first.
+# Sweeps of p_t in a round, in which the limits move anyway: until one changes velocities by a tenth of the first.
 SWEEPS, SETTLED = 10, 0.1
-HELD_SWEEPS = 200  # with the limits held for good
-PUSHES = 1e-9  # share of the normal impulse that a non-negative choice may leave unexplained: an active set's rounding
+HELD_SWEEPS = 200  # sweeps with constant limits
+PUSHES = 1e-9  # share of the normal impulse that non-negative impulses may miss: rounding of the active set
 # Of the largest normal impulse: friction may exceed a limit by this, the rounding of impulses that cancel.
 CONE_ROUNDING = 1e-12
-TRIMS = 5  # each takes what the last round left outside the cones, and leaves a share of μ of it
+TRIMS = 5  # each removes the excess over the cones and leaves a share of μ of it
 
 
 @kernel
 def settle_friction(count, rank, work, push, f, d, scale):
     """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the law is met to MET.
 
-    Where it is not, p_t dissipates most under the limits of the impact *without* friction: a convex problem.
+    If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem.
     scale : speed [m/s] to which STILL and MET are relative.
     """
     for i in range(count):
@@ -187,7 +187,7 @@ def settle_friction(count, rank, work, push, f, d, scale):
     if pushes and _settle(count, rank, work, push, f, d, scale, True):
         _trim(count, rank, work, push, f, True)
         return True
-    if pushes:  # not with friction: from here as where contacts pull
+    if pushes:  # did not converge: continue as if contacts pull
         _least_norm_start(count, rank, work, push, f)
     if _settle(count, rank, work, push, f, d, scale, False):
         _trim(count, rank, work, push, f, False)
@@ -203,7 +203,7 @@ def settle_friction(count, rank, work, push, f, d, scale):
 
 @kernel
 def tangent_inertia(free, first, size):
-    """Largest eigenvalue of B_i B_iᵀ, one or two rows."""
+    """Return the largest eigenvalue of B_i B_iᵀ, which has one or two rows."""
     x = free[first]
     xx = along(x, x)
     if size == 1:
@@ -215,7 +215,7 @@ def tangent_inertia(free, first, size):
 
 @kernel
 def _start(count, rank, work, push, f, d):
-    """Factor the normal rows and write the impulses without friction; return whether they can push only."""
+    """Factor the normal rows and write the impulses without friction; return whether non-negative ones exist."""
     change, left = work.change[:d], f.left[:d]
     length = math.sqrt(along(change, change))
     for k in range(d):
@@ -239,7 +239,7 @@ def _start(count, rank, work, push, f, d):
 
 @kernel
 def _responses(count, rank, work, push, f):
-    """∂p_n,i / ∂p_t,i of each tangent: what a contact's own friction adds to its limit."""
+    """Write ∂p_n,i / ∂p_t,i of each tangent: the change of a contact's normal impulse with its own friction."""
     size = f.velocity.shape[0]
     for j in range(count * size):
         for i in range(rank):
@@ -251,7 +251,7 @@ def _responses(count, rank, work, push, f):
 
 @kernel
 def _stride(f, i, size):
-    """Factor 1/(1 − μ ∂p_n/∂p_t) of a limit's change that settles a sliding contact by itself: Newton's step."""
+    """Return the factor 1/(1 − μ ∂p_n/∂p_t) on a limit's change: Newton's step for a single sliding contact."""
     own = f.p[i * size : (i + 1) * size]
     length = math.sqrt(along(own, own))
     if length == 0.0 or length < AT_LIMIT * f.radius[i]:
@@ -262,14 +262,14 @@ def _stride(f, i, size):
 
 @kernel
 def _spread(count, rank, work, push, f):
-    """Start from the impulses of least norm: an active set loads few of many redundant contacts."""
+    """Start from least-norm impulses, since an active set loads only a few of many redundant contacts."""
     f.wanted[:count] = 0.0
     _move_normals(count, rank, work, push, f, True)
 
 
 @kernel
 def _least_norm_start(count, rank, work, push, f):
-    """Impulses without friction by least norm; what pulls carries no friction."""
+    """Write least-norm impulses without friction; contacts that pull get no friction."""
     f.p[: count * f.velocity.shape[0]] = 0.0
     _move_normals(count, rank, work, push, f, False)
     for i in range(count):
@@ -279,9 +279,9 @@ def _least_norm_start(count, rank, work, push, f):
 
 @kernel
 def _move_normals(count, rank, work, push, f, near):
-    """Move `f.wanted` to normal impulses that go with p_t: nearest to what they are, or of least norm.
+    """Move `f.wanted` to normal impulses consistent with p_t: the nearest ones (`near`), or those of least norm.
 
-    Returns how far they were from it [√J].
+    Returns the distance of the old impulses from consistency [√J].
     """
     left, defect = f.left, 0.0
     for i in range(rank):
@@ -301,7 +301,7 @@ def _move_normals(count, rank, work, push, f, near):
 
 @kernel
 def _settle(count, rank, work, push, f, d, scale, pushes):
-    """Rounds of normal impulses, limits and p_t; return whether the last one moved less than MET of the scale."""
+    """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET times the scale."""
     size, speed = f.velocity.shape[0], math.sqrt(along(work.u[:d], work.u[:d]))
     moved = math.inf
     for done in range(ROUNDS):
@@ -322,9 +322,9 @@ def _settle(count, rank, work, push, f, d, scale, pushes):
 
 @kernel
 def _sweep_tangents(f, count, size, d, still):
-    """Sweep p_t; return the largest velocity [m/s] that the first sweep, or a limit that holds p_t, moved.
+    """Sweep p_t; return the largest change of velocity [m/s] by the first sweep or by a limit that holds p_t.
 
-    A limit counts by the whole change that it was to make, damped or not.
+    A limit counts with its full change, before damping.
     """
     p, rows, radius = f.p[: count * size], f.free[: count * size, :d], f.radius[:count]
     moved = friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, 1, 0.0)
@@ -340,7 +340,7 @@ def _sweep_tangents(f, count, size, d, still):
 
 @kernel
 def _trim(count, rank, work, push, f, near):
-    """Shorten what lies outside its cone by the last round's rest; the normal impulses follow."""
+    """Shorten each contact's p_t that the last round left outside its cone, and update the normal impulses."""
     size = f.velocity.shape[0]
     for _ in range(TRIMS):
         _move_normals(count, rank, work, push, f, near)
@@ -364,9 +364,9 @@ def _trim(count, rank, work, push, f, near):
             f.wanted[i] = 0.0
 
 
-# Tangential impulses within Coulomb's discs: sweeps over the contacts, each stopped or held at its limit.
+# Tangential impulses within Coulomb's discs: sweeps over the contacts; each contact stops or slides at its limit.
 
-# sin² of the angle between two tangents' rows below which one is a multiple of the other, but for rounding.
+# sin² of the angle between two tangents' rows; below it one row is a multiple of the other, up to rounding.
 SINGULAR = 1e-12
 
 
@@ -374,10 +374,10 @@ SINGULAR = 1e-12
 def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, still):
     """Sweep p_i ← where w_i = 0, or proj(p_i − w_i / ρ_i), in discs |p_i| ≤ radius_i; w = slip + B Bᵀ p; p in place.
 
-    free : (k m, d) rows B, by which tangential impulses move the group while the normal velocities are kept
+    free : (k m, d) rows B: tangential impulses change u by Bᵀ p and keep the normal velocities
     slip : (k m,) tangential velocity without friction; radius : (k,) μ p_n; inertia : (k,) ρ ≥ ‖B_i B_iᵀ‖
     moved : (d,) scratch for Bᵀ p, so that a sweep is linear in the contacts; velocity : (m,) scratch.
-    Stops after the sweep that makes no velocity above `still`; returns the largest that the last one made [m/s].
+    Stops after a sweep that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
     """
     count, size, fastest = radius.shape[0], velocity.shape[0], 0.0
     for _ in range(sweeps):
@@ -393,7 +393,7 @@ def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, sti
 
 @kernel
 def combine(rows, weight, out):
-    """out (d,) = rowsᵀ weight."""
+    """Write out (d,) = rowsᵀ weight."""
     for k in range(out.shape[0]):
         out[k] = 0.0
     for j in range(weight.shape[0]):
@@ -412,7 +412,7 @@ def along(row, vector):
 
 @kernel
 def slide(free, slip, radius, inertia, p, moved, velocity, first):
-    """Move one contact's impulse to where it stops the slip, or towards its limit; return the velocity this made."""
+    """Move one contact's impulse to stop its slip, or towards its limit; return the change of velocity [m/s]."""
     size = velocity.shape[0]
     for a in range(size):
         velocity[a] = slip[first + a] + along(free[first + a], moved)
@@ -439,9 +439,9 @@ def slide(free, slip, radius, inertia, p, moved, velocity, first):
 
 @kernel
 def _stops(free, radius, p, velocity, first):
-    """Replace the slip of a contact with two tangents by the impulse that stops it, if that is within the limit.
+    """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds the limit.
 
-    One step of length 1/ρ would take κ(B_i B_iᵀ) sweeps to get there: a lever makes it hundreds.
+    Steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps to reach this impulse; with a lever these are hundreds.
     """
     if velocity.shape[0] != 2:
         return False

@@ -1,4 +1,4 @@
-"""Narrow phase: contacts of candidate pairs of shapes, from the placements of their bodies; planar pairs are here.
+"""Narrow phase: contacts of candidate pairs of shapes from the poses of their bodies; this module has planar pairs.
 
 Every contact has a unit normal from b into a, a gap (negative = overlap) along it, and a point midway between
 the two surfaces, so that swapping the two shapes negates the normal and changes nothing else. A contact is
@@ -26,10 +26,10 @@ from iapb.elementary import hypotenuse
 
 @kernel
 def detect(shapes, pairs, R, p, margin, buffer):
-    """Write the contacts of all pairs into `buffer`; return how many, or -1 when its capacity is exceeded.
+    """Write the contacts of all pairs into `buffer`; return how many, or -1 if its capacity is exceeded.
 
     shapes : Shapes; pairs : (k, 2); R (nb, 3, 3), p (nb, 3) : world placements of the bodies
-    margin : float [m], contacts with gap <= margin are kept; 0 keeps overlap and exact touch only
+    margin : float [m], contacts with gap <= margin are kept; 0 keeps overlaps and exact contact only
     buffer : ContactBuffer; only its geometric fields are written
     """
     count = 0
@@ -55,7 +55,7 @@ def detect(shapes, pairs, R, p, margin, buffer):
 
 @kernel
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
-    """One contact per vertex of polygon a (or for circle a): gap = (vertex - point)·normal - radius."""
+    """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal - radius."""
     vertices, plane, first = shapes.vertices, shapes.first[b], shapes.first[a]
     x0, y0 = to_world(vertices[plane, 0], vertices[plane, 1], shapes.body[b], R, p)
     nx, ny = turn_to_world(vertices[plane + 1, 0], vertices[plane + 1, 1], shapes.body[b], R)
@@ -79,8 +79,8 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
 def circles(shapes, a, b, R, p, margin, buffer, count):
     """Two circles: gap = distance of the centres - both radii, normal along the line of centres.
 
-    Coincident centres have no such line; the normal is then +y for the pair with the smaller shape index
-    first and -y for the swapped pair: finite, and still antisymmetric.
+    Coincident centres have no such line. The normal is then +y if a has the smaller shape index and -y for the
+    swapped pair, so that it is finite and still antisymmetric.
     """
     xa, ya = world_point(shapes, shapes.first[a], a, R, p)
     xb, yb = world_point(shapes, shapes.first[b], b, R, p)
@@ -105,7 +105,7 @@ def circles(shapes, a, b, R, p, margin, buffer, count):
 def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
     """A circle and a convex polygon: one contact at the polygon's nearest edge or vertex.
 
-    A centre inside the polygon is pushed out through the nearest edge.
+    For a centre inside the polygon, the contact is at the nearest edge.
     """
     nx, ny, distance, feature = nearest_on_polygon(shapes, circle, polygon, margin, R, p)
     radius = shapes.radius[circle]
@@ -123,9 +123,9 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
 
 @kernel
 def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
-    """Direction (polygon frame) and signed distance from the polygon to a circle's centre, and the feature.
+    """Return direction (polygon frame) and signed distance from the polygon to a circle's centre, and the feature.
 
-    Returns early, with a lower bound of the distance, once an edge shows the gap to exceed the margin.
+    It returns early, with a lower bound of the distance, if an edge shows that the gap exceeds the margin.
     """
     Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, polygon, circle, R, p)
     row = shapes.first[circle]
@@ -149,7 +149,7 @@ def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
 
 @kernel
 def _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny):
-    """Decide whether the point (x, y) outside edge `edge` is nearest to the edge or to one of its ends."""
+    """Return direction, distance and feature of the edge, or of its end if this is nearer to the point (x, y)."""
     if best <= 0.0:
         return nx, ny, best, vertex_feature(1, 0, edge)
     ux, uy = shapes.vertices[first + edge, 0], shapes.vertices[first + edge, 1]
@@ -165,22 +165,22 @@ def _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny):
     return dx / distance, dy / distance, distance, vertex_feature(2, corner, 0)
 
 
-# Contacts of two convex polygons: separating axes, clipping, and closest corners when they are apart.
+# Contacts of two convex polygons: separating axes, clipping, and closest corners if they are separated.
 #
 # The axis of largest separation s picks a reference edge; the other polygon's most opposed edge is clipped to
 # the strip over it, which leaves at most two points. Overlapping polygons always have the deepest vertex inside
 # that strip: the point of a Minkowski difference's boundary nearest to an interior point lies within an edge.
-# Polygons apart may be closest at two corners instead; then the contact is that one pair of points.
+# Separated polygons may be closest at two corners instead; then the contact is this pair of points.
 
-# The lowest point over the reference edge may lie above the separation s by this share of the size of the
-# numbers it was computed from before the polygons count as closest elsewhere: two dozen operations round to
-# below 1e-14, and 1e-12 of the shapes' size is far below any geometry's accuracy.
+# If the lowest point over the reference edge lies above the separation s by more than this share of the size of the
+# numbers it was computed from, the polygons are closest elsewhere. Two dozen operations round to below 1e-14, and
+# 1e-12 of the shapes' size is far below the accuracy of any geometry.
 ROUNDING_SHARE = 1e-12
 
 
 @kernel
 def polygons(shapes, a, b, R, p, margin, buffer, count):
-    """Contacts (two at most) of convex polygons a and b; see the module for the method."""
+    """Write the contacts (two at most) of convex polygons a and b; comments above describe the method."""
     separation_a, edge_a = best_edge(shapes, a, b, R, p, margin)
     if separation_a > margin:
         return count
@@ -194,7 +194,7 @@ def polygons(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def best_edge(shapes, onto, other, R, p, margin):
-    """Largest separation over the edge normals of `onto`, and its edge; early out above the margin.
+    """Return the largest separation over the edge normals of `onto`, and its edge; return early above the margin.
 
     separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v its start
     """
@@ -218,7 +218,7 @@ def best_edge(shapes, onto, other, R, p, margin):
 
 @kernel
 def edge_frame(shapes, first, count, edge):
-    """Start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's frame."""
+    """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's frame."""
     following = edge + 1 if edge + 1 < count else 0
     ux, uy = shapes.vertices[first + edge, 0], shapes.vertices[first + edge, 1]
     ex, ey = shapes.vertices[first + following, 0] - ux, shapes.vertices[first + following, 1] - uy
@@ -228,7 +228,7 @@ def edge_frame(shapes, first, count, edge):
 
 @kernel
 def opposed_edge(shapes, other, mx, my):
-    """Edge of `other` whose outward normal is most opposed to (mx, my), given in its frame."""
+    """Return the edge of `other` whose outward normal is most opposed to (mx, my), given in the frame of `other`."""
     first, count = shapes.first[other], shapes.count[other]
     best, edge = math.inf, 0
     for i in range(count):
@@ -240,7 +240,7 @@ def opposed_edge(shapes, other, mx, my):
 
 @kernel
 def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
-    """Contacts over the reference edge, or between two corners when the polygons are closest there."""
+    """Write the contacts over the reference edge, or between two corners if the polygons are closest there."""
     Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, ref, other, R, p)
     ux, uy, nx, ny, length = edge_frame(shapes, shapes.first[ref], shapes.count[ref], edge)
     incident = opposed_edge(shapes, other, Qxx * nx + Qyx * ny, Qxy * nx + Qyy * ny)
@@ -259,7 +259,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
         start_s, start_h = (s0, separation) if h0 < h1 else (s1, separation)
         end_h = math.inf
 
-    side, opposite = (0, 1) if ref_is_b else (1, 0)  # whose vertex touches: the incident or the reference one
+    side, opposite = (0, 1) if ref_is_b else (1, 0)  # vertex of the incident or of the reference edge
     for s, h, vertex, corner, cut in (
         (start_s, start_h, incident, edge + 1, s0 > length),
         (end_s, end_h, following, edge, s1 < 0.0),
@@ -279,7 +279,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
 
 @kernel
 def over_edge(shapes, row, Qxx, Qxy, Qyx, Qyy, tx, ty, nx, ny):
-    """Coordinates of a vertex over the reference edge: s along it from its start, h along its normal."""
+    """Return the coordinates of a vertex over the reference edge: s along it from its start, h along its normal."""
     x, y = shapes.vertices[row, 0], shapes.vertices[row, 1]
     x, y = Qxx * x + Qxy * y + tx, Qyx * x + Qyy * y + ty
     return -ny * x + nx * y, nx * x + ny * y
@@ -287,7 +287,7 @@ def over_edge(shapes, row, Qxx, Qxy, Qyx, Qyy, tx, ty, nx, ny):
 
 @kernel
 def height_at(s, s0, h0, s1, h1):
-    """Height over the point s of the line through (s0, h0) and (s1, h1); h0 if that line is upright."""
+    """Return the height at s of the line through (s0, h0) and (s1, h1); h0 if s0 = s1."""
     return h0 if s0 == s1 else h0 + (h1 - h0) * (s - s0) / (s1 - s0)
 
 
@@ -304,7 +304,7 @@ def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, 
 
 @kernel
 def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
-    """One contact between the closest points of two polygons that are apart (both are corners)."""
+    """Write one contact between the closest points of two separated polygons (both points are corners)."""
     distance, vx, vy, wx, wy, feature = closest_points(shapes, ref, other, R, p)
     if distance > margin:
         return count
@@ -315,10 +315,10 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
 
 @kernel
 def closest_points(shapes, ref, other, R, p):
-    """Distance of two separated polygons' corners, the corners v of `ref` and w of `other`, the feature.
+    """Return the smallest distance of two polygons' corners, the corners v of `ref` and w of `other`, and the feature.
 
-    Only pairs of corners are looked at: whenever a corner is closest to the inside of an edge, the best axis
-    is that edge's normal and its separation is the distance already. All in the frame of `ref`.
+    Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is the normal of this
+    edge and its separation is already the distance. All values are in the frame of `ref`.
     """
     Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, ref, other, R, p)
     best, feature = math.inf, 0

@@ -1,14 +1,14 @@
-"""The last step of every impact: no gain of kinetic energy in real arithmetic, and the enclosure that shows it.
+"""Last step of every impact: prevent a gain of kinetic energy in real arithmetic; the enclosure that proves it.
 
-With s = w + v, Δ = w − v and A = M + Mᵀ, all as exact pairs of doubles, four times the gain of energy is
+Let s = w + v, Δ = w − v and A = M + Mᵀ, each an exact pair of doubles. Four times the gain of kinetic energy is
 
     Γ = Δᵀ A s = 2 (wᵀMw − vᵀMv)
 
-for the mass matrix M as given: a skew part cancels, and no rounded symmetric part takes its place. (Δᵀ M s without the
-transpose is something else where M is asymmetric in the last bit.) A candidate w is taken where an upper bound of Γ is
-not positive. Three evaluations bound Γ, each with the proof of its bound: `plainly_loses` in plain doubles, `gain` in
-double-double, `wide_gain` for numbers of any size. u = 2⁻⁵³, η = 2⁻¹⁰⁷⁴; operations round to nearest, without fastmath
-and without contraction; d ≤ 2¹⁵, so that (1 + u) to the power 8d² + 9 is below θ = 1 + 2⁻¹⁶.
+for the mass matrix M as given. A skew part of M cancels, and M is not replaced by a rounded symmetric part. (Δᵀ M s,
+without the transpose, differs from Γ/2 if M is asymmetric in the last bit.) A candidate w is accepted if an upper bound
+of Γ is not positive. Three functions bound Γ, each with a proof of its bound: `plainly_loses` in plain doubles, `gain`
+in double-double, `wide_gain` for numbers of any size. u = 2⁻⁵³ and η = 2⁻¹⁰⁷⁴. Operations round to nearest, without
+fastmath and without contraction. d ≤ 2¹⁵, so that (1 + u) to the power 8d² + 9 is below θ = 1 + 2⁻¹⁶.
 """
 
 from __future__ import annotations
@@ -21,28 +21,29 @@ from iapb.compiled import copy_into, kernel
 from iapb.double_double import add_product, in_range, passive_range, symmetric_entry, two_product, two_sum
 
 UNIT = 2.0**-53
-_CLEAR = 2.0**-40  # share of T by which a loss is clear: far above rounding, far below what e < 1 loses
+_CLEAR = 2.0**-40  # share of T that makes a loss clear: far above rounding, far below the loss at e < 1
 _PLAIN_UNDERFLOW = 2.0**-1000
 _UNDERFLOW = 2.0**-1070  # 16 η
-_DROPPED = -800  # binary exponent below the largest term's where `wide_gain` leaves a term out
-# Where a step is shortened: the first attempt takes what the upper bound asks for, each further one four times as much.
-# Beyond _GENTLE of the step restitution would feel it (the kit asks for 1e-8): rounding is turned first.
+_DROPPED = -800  # exponent relative to the largest term below which `wide_gain` omits a term
+# Shortening of a step: the first attempt takes off what the upper bound requires, each further one four times as much.
+# A reduction beyond the share _GENTLE would affect restitution (the kit requires 1e-8); roundings are changed first.
 _GROWTH, _GENTLE, _TURNS = 4.0, 2.0**-27, 3
 
 
 @kernel
 def plainly_loses(mass_matrix, v, w):
-    """Whether plain doubles show that w has less energy than v, and by a margin (see below); half of all impacts.
+    """Return whether plain doubles prove that w has less energy than v, by a margin; this settles half of all impacts.
 
     G is Γ in plain doubles, T = Σ tᵢ |Aᵢⱼ| tⱼ with tᵢ = |vᵢ| + |wᵢ|; accepted where G + (2⁻⁴⁰ + 4 (d+4) u) T ≤ 0.
 
-    Bound. Δᵢ, sⱼ and Aᵢⱼ are rounded once each; a term meets two products and at most 2d sums: G is off by at most
-    (2d + 5) u θ T, where T's own roundings (as many, all terms positive) are in the 4 (d+4) too. Underflow in a product
-    is at most η/2, d² times with a factor |Δᵢ| ≤ 2tᵢ and d times without: below d² 2⁻¹⁰⁷² (1 + Σ tᵢ), for which
-    `_PLAIN_UNDERFLOW` stands with 2⁷⁰ to spare. An overflow gives an infinity or NaN, which no comparison accepts.
+    Bound. Δᵢ, sⱼ and Aᵢⱼ are rounded once each. A term passes through two products and at most 2d sums, so G is off by
+    at most (2d + 5) u θ T. T has as many roundings, with positive terms only; 4 (d+4) covers them too. Underflow in a
+    product is at most η/2. It occurs d² times with a factor |Δᵢ| ≤ 2tᵢ and d times without: in sum below
+    d² 2⁻¹⁰⁷² (1 + Σ tᵢ), which `_PLAIN_UNDERFLOW` exceeds by 2⁷⁰. An overflow gives an infinity or NaN, which fails
+    the comparison.
 
-    Margin. With w = fl(v + δ) the energy clamp would leave δ as it is: its x = vᵀMδ, y = δᵀMδ, each rounded once,
-    differ from x + y/2 = Γ/4 by the rounding of w, |w − v − δ| ≤ u|w|, and their own: less than 8 u T < 2⁻⁴² T in all.
+    Margin. With w = fl(v + δ) the energy clamp would not change δ: its x = vᵀMδ and y = δᵀMδ, each rounded once, differ
+    from x + y/2 = Γ/4 by the rounding of w, |w − v − δ| ≤ u|w|, and by their own: less than 8 u T < 2⁻⁴² T in all.
     """
     d, total, size, sum_t = v.shape[0], 0.0, 0.0, 0.0
     for i in range(d):
@@ -63,19 +64,19 @@ def gain(mass_matrix, v, w):
     """Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤ radius + underflow.
 
     Proof of the bound, with Rᵢ = Σⱼ |ah sh| and S = Σᵢ |dhᵢ| Rᵢ. The pairs s = sh + sl, Δ = dh + dl, A = ah + al are
-    exact (TwoSum), |sl| ≤ u|sh| and so on. In row i, h + l stands for Σⱼ Aᵢⱼ sⱼ; step j adds p + e = ah·sh, exact
-    (TwoProduct), and c = fl(fl(ah·sl) + fl(al·sh)); TwoSum(h, p) = h' + t is exact. What is rounded, in units of u² θ
-    Rᵢ over the row: al·sl left out 1; the two products in c 2; their sum 2; fl(t + e) d + 1, as |t| ≤ u|h'| and |e| ≤
+    exact (TwoSum), |sl| ≤ u|sh| and so on. In row i, h + l approximates Σⱼ Aᵢⱼ sⱼ; step j adds p + e = ah·sh, exact
+    (TwoProduct), and c = fl(fl(ah·sl) + fl(al·sh)); TwoSum(h, p) = h' + t is exact. Errors, in units of u² θ
+    Rᵢ over the row: omitted al·sl 1; the two products in c 2; their sum 2; fl(t + e) d + 1, as |t| ≤ u|h'| and |e| ≤
     u|p|; adding c to it d + 3; adding that to l, |l| ≤ u(k + 3) Rᵢ after k steps, d²/2 + 7d/2. Together d²/2 + 11d/2 +
     9. The sum over i goes the same way with the row's (h, l), |l| ≤ u(d + 3) Rᵢ, in place of (sh, sl), in units of u² θ
-    S: dl·l left out d + 3; the products 1 + (d + 3); their sum d + 4; fl(t + e) d + 1; adding c 2d + 5; adding to l,
+    S: omitted dl·l d + 3; the products 1 + (d + 3); their sum d + 4; fl(t + e) d + 1; adding c 2d + 5; adding to l,
     now |l| ≤ u(k + d + 5) S, 3d²/2 + 11d/2. Together with the rows 2d² + 17d + 26. `radius` is 2 (d+6)² u² S = (2d² +
-    24d + 72) u² S. Its rest of 7d + 46 covers θ, the rounding of S and of the radius, and that of low + radius, which
+    24d + 72) u² S. The excess of 7d + 46 covers θ, the rounding of S and of the radius, and that of low + radius, which
     callers add first: u|low| ≤ (2d + 5) u² S.
 
-    Underflow: TwoProduct then errs by at most 7η/2 (Boldo 2006), the other products by η/2: at most 6dη Σ|dhᵢ| + 6dη
-    with what S lacks; `underflow` is 16 d η (1 + Σ|dhᵢ|). Overflow, also in Dekker's splitting, makes some result NaN
-    or infinite, and with it high + (low + radius): no comparison accepts it.
+    Underflow: the error of TwoProduct is then at most 7η/2 (Boldo 2006), of the other products η/2: in sum at most
+    6dη Σ|dhᵢ| + 6dη, with the underflow in S; `underflow` is 16 d η (1 + Σ|dhᵢ|). Overflow, also in Dekker's splitting,
+    makes high + (low + radius) NaN or infinite, which fails every comparison.
     """
     d = v.shape[0]
     high = low = size = moved = 0.0
@@ -108,13 +109,13 @@ def wide_gain(mass_matrix, v, w):
 
     Γ = Σᵢⱼ Mᵢⱼ (Δᵢ sⱼ + sᵢ Δⱼ) has n = 8d² products x M y of doubles, x and y the halves of the pairs Δ and s. Each is
     evaluated on mantissas in [½, 1), so that nothing under- or overflows, and scaled to the largest exponent among them
-    by a power of two: exact, as all that is summed is a multiple of 2⁻¹⁶⁰, and what is below 2⁻⁸⁰⁰ is left out.
+    by a power of two. Scaling is exact: products are multiples of 2⁻¹⁶⁰, and those below 2⁻⁸⁰⁰ are omitted.
 
     Proof of the bound: with p + e = x M and q + f = p y exactly, the low part fl(f + fl(e y)) errs by 3u² of the
     product; the sum is the compensated one of `gain`: with S = Σ|q|, (n + 3) u² for fl(t + f) and (n²/2 + 7n/2) u² for
-    low. Together below (n + 5)² u² S, which with its rest covers S's rounding, θ and that of low + radius. What is left
-    out, at most n 2⁻⁸⁰⁰, is added. Where w ± v could overflow, both are divided by 4 first: if that takes bits of the
-    smaller one, they are below 2⁻²⁰⁰⁰ of the larger one, whose products are there too.
+    low. Together this is below (n + 5)² u² S, whose excess covers θ and the rounding of S and of low + radius. The
+    omitted terms, at most n 2⁻⁸⁰⁰, are added. If w ± v could overflow, both are divided by 4 first. Bits of the smaller
+    one that this loses are below 2⁻²⁰⁰⁰ of the larger one, whose products are in the sum too.
     """
     d, top, count = v.shape[0], -100_000, 0
     high = low = size = 0.0
@@ -149,7 +150,7 @@ def wide_gain(mass_matrix, v, w):
 
 @kernel
 def _half(v, w, difference, is_low):
-    """Mantissa and exponent of the high or the low half of w − v or of w + v."""
+    """Return mantissa and exponent of the high or the low half of w − v or of w + v."""
     scale, shift = (0.25, 2) if max(abs(v), abs(w)) > 2.0**1020 else (1.0, 0)
     high, low = two_sum(scale * w, -scale * v if difference else scale * v)
     mantissa, exponent = math.frexp(low if is_low else high)
@@ -158,9 +159,9 @@ def _half(v, w, difference, is_low):
 
 @kernel
 def gain_enclosure(mass_matrix, v, w):
-    """Return (lower, upper, exponent): Γ lies in [lower, upper] · 2^exponent, to one rounding of each end.
+    """Return (lower, upper, exponent): Γ lies in [lower, upper] · 2^exponent, up to one rounding of each end.
 
-    The sign of an upper end that is at most 0 is certain: the sum that gives it rounds once, and keeps its sign.
+    If upper ≤ 0, then Γ ≤ 0 is certain: the last sum rounds once and keeps its sign.
     """
     high, low, radius, underflow = gain(mass_matrix, v, w)
     radius += underflow
@@ -175,7 +176,7 @@ def gain_enclosure(mass_matrix, v, w):
 
 @kernel
 def gain_signs(masses, v, w, signs):
-    """Write −1 (no gain), 1 (a gain) or 0 (left open by the bound) for each of n steps; `masses`: n, or one for all."""
+    """Write −1 (no gain), 1 (a gain) or 0 (undecided by the bound) for each of n steps; `masses`: n, or one for all."""
     for k in range(v.shape[0]):
         lower, upper, _ = gain_enclosure(masses[k] if masses.shape[0] > 1 else masses[0], v[k], w[k])
         signs[k] = -1 if upper <= 0.0 else (1 if lower > 0.0 else 0)
@@ -183,20 +184,20 @@ def gain_signs(masses, v, w, signs):
 
 @kernel
 def never_gains(mass_matrix, v, w):
-    """Whether it is certain that w has no more kinetic energy than v."""
+    """Return whether w has certainly no more kinetic energy than v."""
     return gain_enclosure(mass_matrix, v, w)[1] <= 0.0
 
 
 @kernel
 def write_step(v, change, factor, w):
-    """w = v + factor · change."""
+    """Write w = v + factor · change."""
     for k in range(v.shape[0]):
         w[k] = v[k] + factor * change[k]
 
 
 @kernel
 def _turn_roundings(mass_matrix, change, w):
-    """Move each coordinate that changes by one unit in the last place, against its momentum: the energy falls."""
+    """Move each changed coordinate by one unit in the last place against its momentum, which lowers the energy."""
     for i in range(w.shape[0]):
         if change[i] == 0.0:
             continue
@@ -211,12 +212,13 @@ def _turn_roundings(mass_matrix, change, w):
 
 @kernel
 def passive_step(mass_matrix, v, change, alpha, w):
-    """Write w = v + β change with no more energy than v in real arithmetic; return β ≤ α, and 0 with w = v at the
-    worst.
+    """Write w = v + β change with no more energy than v in real arithmetic; return β ≤ α. If no β > 0 is found, it
+    writes w = v and returns 0.
 
-    β = α wherever that candidate passes. Else β goes towards −x/y, x = vᵀM change, y = changeᵀM change, where the loss
-    is largest, in growing steps; before restitution would feel the shorter step, the roundings of v + α change are
-    turned to where they take energy. Both cost energy of the order of one rounding of v⁺ alone.
+    β = α if this candidate passes. Otherwise β decreases in growing steps towards −x/y, x = vᵀM change,
+    y = changeᵀM change, where the loss is largest. Before a shorter step would affect restitution, the entries of
+    v + α change are moved by last-place units that lower the energy. Both cost an energy of the order of one rounding
+    of v⁺.
     """
     write_step(v, change, alpha, w)
     if never_gains(mass_matrix, v, w):
@@ -242,7 +244,7 @@ def passive_step(mass_matrix, v, change, alpha, w):
 
 @kernel
 def _turned(mass_matrix, v, change, alpha, w):
-    """Write v + α change with its roundings turned; whether it gains nothing."""
+    """Write v + α change, moved by last-place units that lower its energy; return whether it gains no energy."""
     write_step(v, change, alpha, w)
     for _ in range(_TURNS):
         _turn_roundings(mass_matrix, change, w)
@@ -253,25 +255,24 @@ def _turned(mass_matrix, v, change, alpha, w):
 
 @kernel
 def clamped_step(mass_matrix, v, change, w, on_v, on_change, size):
-    """`passive_step` from the largest α in [0, 1] that gains no energy before w is rounded; cheap, as that costs d²
-    once.
+    """Do `passive_step` from the largest α in [0, 1] that gains no energy before w is rounded; sums over d²
+    entries are computed once.
 
     With H = ½ (M + Mᵀ) and ρ = w − v − α change, the rounding of w, a quarter of Γ is
 
         αx + ½α²y + ρᵀ(Hv + αH change) + ½ρᵀHρ,   x = vᵀH change, y = changeᵀH change.
 
-    x and y are summed in double-double as ever; ρ, exact for each α, is so small that plain doubles will do for the
-    rest.
+    x and y are summed in double-double. ρ is exact for each α, and so small that plain doubles suffice for its terms.
 
     Proof of the bound, with X = Σ|vᵢ||Hᵢⱼ||δⱼ|, Y = Σ|δᵢ||Hᵢⱼ||δⱼ|, Pᵢ = Σ|Hᵢⱼ|(|vⱼ| + |δⱼ|), Q = Σ|ρᵢ|Pᵢ, δ = change,
     α ≤ 1. A step of `add_product` rounds a low product and its sum, 5u²|p|, then lo + r, t + (lo + r) and, where |s| <
     |t|, the last difference, together u²(8R + 9|p|) for partial sums up to R: a row errs by (8d + 14) u² R, x by (16d +
     28) u² X, y by as much of Y. z = x + ½αy, αz and the last additions cost below 40 u² (X + ½αY). `rounding` is (16d +
-    96) u² α (X + ½αY), whose rest covers its own roundings and θ. t + e gives −ρᵢ to u. The entry of H, its product and
-    d sums, α· and the next sum, the product with ρᵢ and d sums, the last additions make (2d + 11) u θ Q at most, ½ρᵀHρ
-    another u θ Q, as |ρⱼ| ≤ 2u(|vⱼ| + |δⱼ|): (4d + 16) u Q holds them. Underflow: with σ = Σ(|vᵢ| + |δᵢ|) the products
-    of x and y err by at most 22 d η (1 + σ)², those with Hv, Hδ and in X, Y, Q by less, and ρ by 4η, which counts Pᵢ
-    times: `lost` is 2¹⁴ η (d (1 + σ)² + Σ Pᵢ). An overflow decides nothing.
+    96) u² α (X + ½αY), whose excess covers its own roundings and θ. t + e is −ρᵢ up to u. The entry of H, its product
+    and d sums, α· and the next sum, the product with ρᵢ and d sums, the last additions make (2d + 11) u θ Q at most,
+    ½ρᵀHρ another u θ Q, as |ρⱼ| ≤ 2u(|vⱼ| + |δⱼ|): (4d + 16) u Q holds them. Underflow: with σ = Σ(|vᵢ| + |δᵢ|) the
+    products of x and y err by at most 22 d η (1 + σ)², those with Hv, Hδ and in X, Y, Q by less, and ρ by 4η, which
+    counts Pᵢ times: `lost` is 2¹⁴ η (d (1 + σ)² + Σ Pᵢ). An overflow accepts no candidate.
     """
     d, sigma, weight = v.shape[0], 1.0, 0.0
     cross_hi = cross_lo = square_hi = square_lo = cross_size = square_size = 0.0

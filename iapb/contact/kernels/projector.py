@@ -9,10 +9,10 @@ import math
 
 from iapb.compiled import kernel
 
-# Pivots are taken among residual rows at least this share of the longest one. A short residual carries rounding
-# of ε / ‖r‖ into its direction, and where one direction is left all rows tie, so that rounding would choose.
+# A pivot is a residual row of at least this share of the longest one. A short residual has the rounding ε / ‖r‖ in its
+# direction. If one direction is left, all rows tie, and without this rule rounding would choose.
 _PIVOT_SHARE = 0.1
-_PASSES = 4  # each pass gains all digits that the one before left; a vector that survives none is rounding
+_PASSES = 4  # each pass corrects the error of the one before; a vector that no pass leaves long enough is rounding
 
 
 @kernel
@@ -34,7 +34,7 @@ def unit_columns(columns, count, length):
 
 @kernel
 def _most_violating(closing, size, count, eligible_above):
-    """Pivot: the residual row with the largest |rᵢ·u| / ‖rᵢ‖ among eligible and not too short ones, −1 if none."""
+    """Return the pivot: the eligible, long enough residual row with the largest |rᵢ·u| / ‖rᵢ‖; −1 if none."""
     best = -1
     best_speed = -1.0
     longest = 0.0
@@ -52,10 +52,10 @@ def _most_violating(closing, size, count, eligible_above):
 
 @kernel
 def _next_direction(columns, pivot, basis, rank):
-    """Append the pivot's residual row, made orthonormal to the basis; False if nothing but rounding is left of it.
+    """Append the pivot's residual row, made orthonormal to the basis; return False if only its rounding is left.
 
-    A pass that shortens the unit vector by less than half left it orthogonal to rounding (Kahan, in Parlett 1980);
-    the residual is nearly orthogonal already, so the first pass almost always is the last.
+    A vector that a pass shortens by less than half is orthogonal to rounding (Kahan, in Parlett 1980).
+    The residual is nearly orthogonal already, so one pass is almost always enough.
     """
     d = columns.shape[0]
     q = basis[rank, :d]
@@ -111,7 +111,7 @@ def _deflate(columns, count, q, along_q, closing, size, overlap):
 
 @kernel
 def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size, overlap):
-    """Orthonormal basis of A's row space, most violated rows first; return its size.
+    """Write an orthonormal basis of A's row space, most violated rows first; return its size.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def projected_change(basis, rank, u, factor, change):
 
 # The minimum-norm impulses p among all with Jᵀ p = given generalized impulse.
 
-# A direction of which less than this share is left after orthogonalization is rounding: no row can push along it.
+# If orthogonalization leaves less than this share of a direction, it is rounding: no row can push along it.
 _NOISE = 1e-15
 
 
@@ -196,7 +196,7 @@ def minimum_norm_impulses(rows, length, count, basis, rank, change, impulses, ta
 
 @kernel
 def minimum_norm_factors(rows, length, count, d, basis, rank, tall, triangle):
-    """B = A Qᵀ = V T: write Vᵀ into `tall` and T into `triangle`; a direction that no row reaches becomes zero."""
+    """Factor B = A Qᵀ = V T: write Vᵀ into `tall`, T into `triangle`; a direction that no row reaches becomes zero."""
     for j in range(rank):
         for i in range(count):
             total = 0.0
@@ -228,7 +228,7 @@ def minimum_norm_factors(rows, length, count, d, basis, rank, tall, triangle):
 
 @kernel
 def add_minimum_norm(count, rank, target, tall, triangle, impulses):
-    """impulses += V T⁻ᵀ target, the least change by which Bᵀ p grows by `target` (rank,), which is overwritten."""
+    """Add V T⁻ᵀ target to impulses, the least-norm change that adds `target` (rank,) to Bᵀ p; overwrite `target`."""
     for j in range(rank):
         total = target[j]
         for m in range(j):
@@ -241,7 +241,7 @@ def add_minimum_norm(count, rank, target, tall, triangle, impulses):
 
 @kernel
 def subtract_pushed(count, rank, impulses, tall, triangle, along, target):
-    """target (rank,) −= Bᵀ p = Tᵀ Vᵀ p; `along` (≥rank,) is scratch."""
+    """Subtract Bᵀ p = Tᵀ Vᵀ p from `target` (rank,); `along` (≥rank,) is scratch."""
     for j in range(rank):
         along[j] = 0.0
         for i in range(count):

@@ -1,7 +1,7 @@
 """Contacts of spatial shapes: spheres, half-spaces and boxes.
 
-As in the plane: the normal points from b into a, gap < 0 is overlap, the point lies midway between the surfaces,
-a contact is kept when gap <= margin. Every normal is finite and of unit length, also where centres coincide.
+Conventions are those of the plane: the normal points from b into a, gap < 0 is overlap, the point lies midway between
+the surfaces, and a contact is kept if gap <= margin. Every normal has unit length, also where centres coincide.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtrac
 
 @kernel
 def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
-    """Contacts of two spatial shapes; a half-space is always b."""
+    """Write the contacts of two spatial shapes; a half-space is always b."""
     kind_a, kind_b = shapes.kind[a], shapes.kind[b]
     if kind_b == HALF_SPACE:
         if kind_a == SPHERE:
@@ -89,7 +89,7 @@ def box_half_space(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
-    """A sphere and a box: one contact at the box's nearest point; a centre inside leaves by the nearest face."""
+    """A sphere and a box: one contact at the nearest point of the box; for a centre inside, at the nearest face."""
     center = world_center(shapes, sphere, R, p)
     apart = subtract(center, world_center(shapes, box, R, p))
     half, radius = load(shapes.half_size, box), shapes.radius[sphere]
@@ -129,25 +129,25 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
 # The axis of largest separation decides. A face of one box (the reference) meets the most opposed face of the
 # other (incident): seen along the normal a rectangle and a parallelogram, whose intersection has three kinds of
 # corners, each found without a list: incident corners in the rectangle, reference corners in the parallelogram,
-# crossings of edges. Of more than four points four stay, so that the stiffness under a face does not depend on
-# how the faces are turned. Source: Gottschalk, Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
+# crossings of edges. Of more than four points four are kept, so that the stiffness under a face does not
+# depend on the orientation of the faces. Source: Gottschalk, Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
 #
-# The gap of boxes apart is the largest separation over the axes: exact where a face or two edges face each other,
+# The gap of separated boxes is the largest separation over the axes: exact where a face or two edges face each other,
 # elsewhere a lower bound of the distance.
 
-# Edges whose directions differ by a sine below this have no axis of their own: a face's axis is as good to 1e-12
-# of the size, and the normalized cross product would carry rounding of 1e-16 / 1e-6.
+# Two edges give no axis if the sine of their angle is below this. A face's axis is then as good to 1e-12 of the size,
+# and the normalized cross product would carry rounding of 1e-16 / 1e-6.
 PARALLEL_SINE = 1e-6
-# Two edges decide only where they overlap less than faces do by this share: a face that rests on a face, tilted by
-# a hair, keeps its whole patch. The gap reported is then at most this share deeper than the true one.
+# Two edges decide only if they overlap less than the faces by this share: a face that rests on a face with a small tilt
+# keeps its whole patch. The gap reported is then at most this share deeper than the true one.
 EDGE_SHARE = 0.05
-# ... and by this share of the boxes' size, the rounding of the separations.
+# They must also overlap less by this share of the boxes' size, the rounding of the separations.
 ROUNDING_SHARE = 1e-12
 
 
 @kernel
 def boxes(shapes, a, b, R, p, margin, buffer, count):
-    """Contacts (four at most) of two boxes."""
+    """Write the contacts (four at most) of two boxes."""
     center_a, center_b = world_center(shapes, a, R, p), world_center(shapes, b, R, p)
     apart = subtract(center_a, center_b)
     A = (world_axis(shapes, a, 0, R), world_axis(shapes, a, 1, R), world_axis(shapes, a, 2, R))
@@ -174,13 +174,13 @@ def boxes(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def _reach(axes, half, n):
-    """Half the extent of a box along n."""
+    """Return half the extent of a box along n."""
     return half[0] * abs(dot(axes[0], n)) + half[1] * abs(dot(axes[1], n)) + half[2] * abs(dot(axes[2], n))
 
 
 @kernel
 def _best_face(apart, A, B, half_a, half_b):
-    """Face axis of largest separation, whether it is a's, and the separation. Ties go to a, then to the first."""
+    """Return the face axis of largest separation, whether it is a's, and the separation. Ties: a first."""
     face, of_a, best = 0, True, -math.inf
     for k in range(3):
         separation = abs(dot(apart, A[k])) - half_a[k] - _reach(B, half_b, A[k])
@@ -195,7 +195,7 @@ def _best_face(apart, A, B, half_a, half_b):
 
 @kernel
 def _best_edges(apart, A, B, half_a, half_b):
-    """Edge directions i of a and j of b with the largest separation along their common normal."""
+    """Return the edge directions i of a and j of b of largest separation on their common normal, and the separation."""
     best_i, best_j, best = 0, 0, -math.inf
     for i in range(3):
         for j in range(3):
@@ -212,7 +212,7 @@ def _best_edges(apart, A, B, half_a, half_b):
 
 @kernel
 def _edge_middle(center, axes, half, k, n):
-    """Middle of the edge along axis k that lies farthest in direction n, and its number among the four."""
+    """Return the middle of the edge along axis k that lies farthest in direction n, and its feature number."""
     point, number = center, 0
     for other in range(3):
         if other != k:
@@ -224,7 +224,7 @@ def _edge_middle(center, axes, half, k, n):
 
 @kernel
 def _edges(shapes, a, b, i, j, gap, center_a, center_b, A, B, half_a, half_b, buffer, count):
-    """One contact midway between the closest points of two edges."""
+    """Write one contact midway between the closest points of two edges."""
     n = cross(A[i], B[j])
     n = scale(1.0 / math.sqrt(dot(n, n)), n)
     if dot(n, subtract(center_a, center_b)) < 0.0:
@@ -248,13 +248,13 @@ def _edges(shapes, a, b, i, j, gap, center_a, center_b, A, B, half_a, half_b, bu
 # c + α e1 + β e2 with α, β in [-1, 1].
 
 
-MOST_POINTS = 4  # of a face on a face: the corners of the largest quadrilateral carry any load in between
+MOST_POINTS = 4  # of a face on a face: the corners of a large quadrilateral carry any load between them
 
 
 @kernel
 def clip_faces(shapes, ref, other, ref_is_a, face, separation, center, center_other, axes, axes_other, half,
                half_other, margin, buffer, count):
-    """Contacts over the reference face `face` of box `ref`; its outward normal m points towards the other box."""
+    """Write the contacts over the reference face `face` of box `ref`; its outward normal m points to the other box."""
     apart = subtract(center_other, center)
     sign = 1.0 if dot(apart, axes[face]) >= 0.0 else -1.0
     m = scale(sign, axes[face])
@@ -294,10 +294,10 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, center, center_ot
 
 @kernel
 def _corner_of_overlap(number, cx, cy, ch, ax, ay, ah, bx, by, bh, hu, hv):
-    """Candidate corner `number` of the overlap: (is it one?, x, y, h).
+    """Return candidate corner `number` of the overlap: (whether it is a corner, x, y, h).
 
     0-3 incident corners in the rectangle (its border included), 4-7 reference corners strictly inside the
-    parallelogram, 8-23 crossings strictly inside both edges: so that faces that coincide give four points.
+    parallelogram, 8-23 crossings strictly inside both edges. Faces that coincide thus give four points.
     """
     first, second = 1.0 - 2.0 * (number & 1), 1.0 - (number & 2)
     if number < 4:
@@ -360,7 +360,7 @@ def _extreme_gap(buffer, start, count):
 
 @kernel
 def _swap_in(buffer, target, source):
-    """Exchange two rows; a row that is not kept may be lost, so the last row of the buffer is not needed."""
+    """Exchange the geometry of two rows."""
     if target == source:
         return
     a, b, feature, gap = buffer.shape_a[target], buffer.shape_b[target], buffer.feature[target], buffer.gap[target]

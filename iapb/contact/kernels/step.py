@@ -1,7 +1,7 @@
-"""One step of the paper's algorithm, compiled: a function per effect, an `if` each.
+"""One step of the paper's algorithm, compiled: one function per effect, behind one `if` each.
 
 `advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration by Δt.
-The Penalty law is the same page with the impulses switched off (e = −1, claim C09).
+The Penalty law is the same algorithm with the impulses switched off (e = −1, claim C09).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.run import COLLIDING, FREE, RESTING
 
-# Faster than this [m/s, rad/s] no product of masses, stiffnesses, displacements and speeds is sure to be finite: the
-# motion has diverged. (Scenes hold numbers up to 1e9.)
+# Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may overflow: the motion has
+# diverged. (Scenes hold numbers up to 1e9.)
 LARGEST_SPEED = 1e100
 
 OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
@@ -49,7 +49,7 @@ def advance(world, state, applied):
 
 @kernel
 def contact_state(state, tool_tree):
-    """State of the tool's group; without a hand: colliding if any tree collides, else resting if any rests."""
+    """Return the state of the tool's group; without a tool: COLLIDING if any tree collides, RESTING if any rests."""
     if tool_tree >= 0:
         return state.state_of_tree[tool_tree]
     found = FREE
@@ -63,7 +63,7 @@ def contact_state(state, tool_tree):
 
 @kernel
 def clear(state):
-    """Forget the forces and impulses of the step before."""
+    """Set the forces and impulses of the step before to zero."""
     for k in range(state.v.shape[0]):
         state.penalty_force[k] = 0.0
         state.friction_force[k] = 0.0
@@ -73,7 +73,7 @@ def clear(state):
 
 @kernel
 def locate(world, state):
-    """Place all bodies at q; refresh M and its factor where they depend on q. False: M is not definite."""
+    """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not definite."""
     forward_kinematics(world.mechanism, state.q, state.body)
     if not world.switches.varying_inertia:
         return True
@@ -83,7 +83,7 @@ def locate(world, state):
 
 @kernel
 def find_contacts(world, state):
-    """Section III: touching contacts, filtered, new or old, each group in one of three states."""
+    """Find the contacts (section III): cluster them, mark new ones, classify groups; return how many, -1: too many."""
     remember(state)
     if world.coulomb:
         remember_friction(state)
@@ -111,7 +111,7 @@ def find_contacts(world, state):
 
 @kernel
 def touching(world, state, contacts):
-    """Narrow phase at the present placements, on the near pairs only where there are many; -1: too many."""
+    """Run the narrow phase, with the broad phase if it is on; return the number of contacts, -1: too many."""
     R, p = state.body.rotation, state.body.position
     if not world.switches.broad_phase:
         return detect(world.shapes, world.pairs, R, p, 0.0, contacts)
@@ -123,7 +123,7 @@ def touching(world, state, contacts):
 
 @kernel
 def remember(state):
-    """The contacts of this step become those of the step before: what `mark_new` compares with."""
+    """Copy the contacts of the last step to `previous`, with which `mark_new` compares."""
     now, before = state.contacts, state.previous
     for i in range(state.contact_count[0]):
         before.shape_a[i], before.shape_b[i] = now.shape_a[i], now.shape_b[i]
@@ -168,7 +168,7 @@ def move(world, state, applied):
 
 @kernel
 def implicit_forces(world, state, rubs):
-    """Damping of the joints and Coulomb friction, from places and normal forces at the start. False: M not definite."""
+    """Apply joint damping and Coulomb friction, from the state at the start of the step. False: M not definite."""
     if world.stage_weight.shape[0] > 1:
         copy_into(state.q, state.start_q)
         if not locate(world, state):
@@ -185,11 +185,11 @@ def implicit_forces(world, state, rubs):
 
 @kernel
 def damp_joints(world, state):
-    """(M + Δt D) v⁺ = M v for the trees that are damped, D diagonal; −D v⁺ into `acceleration`. False: not definite.
+    """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not definite.
 
     v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every Δt: the step is
-    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M. These trees move with the new velocity, whatever the
-    integrator.
+    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M. These trees move with the new velocity under
+    every integrator.
     """
     a = state.acceleration
     for t in range(world.tree_start.shape[0]):
@@ -215,7 +215,7 @@ def damp_joints(world, state):
 
 @kernel
 def go_to_stage(world, state, time):
-    """Follow the last stage's velocity and acceleration for `time` [s] from the start of the step."""
+    """Move to a stage: from the start of the step, `time` [s] with velocity and acceleration of the stage before."""
     integrate(world.mechanism, state.start_q, state.v, time, state.q)
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + time * state.acceleration[k]
@@ -224,7 +224,7 @@ def go_to_stage(world, state, time):
 
 @kernel
 def accelerate(world, state, applied, stage):
-    """(7): M a = applied + penalty + friction − B − G at the present stage."""
+    """Solve (7), M a = applied + penalty + friction − B − G, at the present stage."""
     rest(world, state, stage)
     a = state.acceleration
     for k in range(a.shape[0]):
@@ -242,7 +242,7 @@ def accelerate(world, state, applied, stage):
 
 @kernel
 def rest(world, state, stage):
-    """(4)-(6) at the contacts of every group that is not colliding: there the impulse holds the constraint."""
+    """Write the forces (4)-(6) at the contacts of groups that do not collide; in a collision the impulse acts."""
     for k in range(state.v.shape[0]):
         state.stage_penalty[k] = 0.0
         state.stage_friction[k] = 0.0

@@ -1,4 +1,4 @@
-"""Impulses that push only: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution built on it.
+"""Impulses that only push: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution based on it.
 
 The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. Active-set method of Lawson and Hanson
 (Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factors.
@@ -14,19 +14,19 @@ import numpy as np
 from iapb.compiled import kernel
 from iapb.contact.kernels.impact import apply_change, whiten_impact
 
-# A row counts as still closing when it does so faster than this share of |b|: rounding of a d-term sum of unit rows.
+# A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of unit rows.
 _CLOSING = 1e-13
 
 
 class PushWork(NamedTuple):
-    """Scratch of impulses that push only: d coordinates, up to c contacts."""
+    """Scratch of impulses that only push: d coordinates, up to c contacts."""
 
     q: np.ndarray  # (d + 1, d) orthonormal directions of the passive rows
     triangle: np.ndarray  # (d + 1, d + 1)
     solution: np.ndarray  # (d + 1,)
     passive: np.ndarray  # (d + 1,) int64: rows that push
-    held: np.ndarray  # (c,) bool: is it one of them
-    banned: np.ndarray  # (c,) bool: dependent on them to rounding
+    held: np.ndarray  # (c,) bool: the row is passive
+    banned: np.ndarray  # (c,) bool: the row depends on the passive rows to rounding
     compressed: np.ndarray  # (d,) whitened velocity after compression
     final: np.ndarray  # (d,) after restitution
     more: np.ndarray  # (c,) impulses of the restitution phase beyond E p_c
@@ -41,9 +41,9 @@ def make_push_work(coordinates: int, contacts: int) -> PushWork:
 
 @kernel
 def _solve_passive(rows, b, passive, known, size, q, triangle, solution):
-    """Least squares on the passive rows: solution[j] for passive[j]; return how many are independent, `size` if all.
+    """Solve least squares on the passive rows: solution[j] for passive[j]; return how many rows are independent.
 
-    The first `known` directions are there from the call before, with the same rows: they are not computed again.
+    The first `known` directions are reused from the call before, which had the same rows.
     """
     d = b.shape[0]
     for j in range(known, size):
@@ -79,7 +79,7 @@ def _solve_passive(rows, b, passive, known, size, q, triangle, solution):
 
 @kernel
 def _most_closing(rows, count, residual, work):
-    """Free row with the most negative rᵢ·residual, and that speed."""
+    """Return the free row with the most negative rᵢ·residual, and this value."""
     best, speed = -1, 0.0
     for i in range(count):
         if not (work.held[i] or work.banned[i]):
@@ -115,7 +115,7 @@ def push_only(rows, count, b, p, residual, work):
         if size <= d:
             known = _solve_passive(rows, b, work.passive, known, size, work.q, work.triangle, work.solution)
         if known < size:
-            work.banned[entering] = True  # dependent to rounding: it cannot close by itself
+            work.banned[entering] = True  # dependent on the passive rows: it cannot close alone
             size -= 1
             continue
         work.held[entering] = True
@@ -128,8 +128,8 @@ def push_only(rows, count, b, p, residual, work):
 
 @kernel
 def _retreat(rows, b, size, p, work):
-    """Move p towards the passive solution, letting go of rows that would pull; return the passive size, and how many
-    of its directions are known."""
+    """Move p towards the passive solution and release rows that would pull; return the number of passive rows, and
+    how many of their directions are known."""
     passive, solution = work.passive, work.solution
     while True:
         step, blocking = 1.0, -1
@@ -154,7 +154,7 @@ def _retreat(rows, b, size, p, work):
 
 @kernel
 def _set_residual(rows, b, passive, size, p, residual):
-    """residual = b + Aᵀp."""
+    """Write residual = b + Aᵀp."""
     for k in range(b.shape[0]):
         total = b[k]
         for j in range(size):
@@ -164,7 +164,7 @@ def _set_residual(rows, b, passive, size, p, residual):
 
 @kernel
 def poisson_impulses(rows, count, u, restitution, p, change, work):
-    """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. False: no convergence.
+    """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. Return False if not converged.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
     p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
@@ -187,7 +187,7 @@ def poisson_impulses(rows, count, u, restitution, p, change, work):
     return True
 
 
-# An impact whose contacts differ in restitution: Poisson's law by two LCPs, then the energy clamp.
+# An impact with unequal restitution: Poisson's law by two LCPs, then the energy clamp.
 
 
 @kernel
@@ -195,7 +195,7 @@ def poisson_impact(mass_matrix, lower, v, restitution, count, clamped, work, pus
     """Resolve `count` rows, given as columns of `work.columns`, each with its own e in [0, 1].
 
     Writes v⁺, the generalized impulse M(v⁺ − v⁻) and the impulses along the rows; returns (number of rows that
-    push, clamp), and (−1, 1) where the active-set method did not converge: nothing is resolved then.
+    push, clamp). If the active-set method does not converge, it returns (−1, 1) and v⁺ is not written.
     """
     d = v.shape[0]
     whiten_impact(lower, v, count, work)
