@@ -1,8 +1,8 @@
-"""Which effects a scene calls for, and why (paper: all of (1)-(26) that the scene needs, and no more).
+"""Decide which effects a scene needs, and why: those of the paper's (1)-(26) that the scene needs, and no others.
 
-The decision is made once, here: the engine's switches are made from it (`iapb.system.make_world`, `make_port`), every
-run records it, and `iapb effects` prints it. An effect is a function of a `Question`; to add one, write it and name it
-in `EFFECTS`.
+The decision is made once, here. `iapb.system.make_world` and `make_port` set the engine's switches from it, every run
+records it, and `iapb effects` prints it. An effect is a function of a `Question`; to add one, write the function and
+add it to `EFFECTS`.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from iapb.scene.model import Hand
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
-_POSES = 4  # at which gravity is looked for
+_POSES = 4  # number of poses at which gravity is evaluated
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect of a scene: on or off, why, and what leaving it out would change.
+    """One effect of a scene: whether it is on, why, and what would change without it.
 
     `reason` and `left_out` are sentences for readers; `reason` carries the scene's own values. `ignores` names the
-    field of the contact section that contacts would need and that the law does not use; else it is empty.
+    contact field that contacts would need but the law does not use; it is empty if there is none.
     """
 
     name: str
@@ -56,19 +56,19 @@ class Effect:
 
 
 class Facts(NamedTuple):
-    """What the effects ask of a scene besides what it says."""
+    """Quantities derived from a scene that the effects need besides its fields."""
 
     mechanism: Mechanism
     wall_pairs: int  # candidate pairs of a moving shape and a static one
-    body_pairs: int  # of shapes of two trees
-    tree_pairs: int  # of shapes of one tree
+    body_pairs: int  # candidate pairs of shapes of two trees
+    tree_pairs: int  # candidate pairs of shapes of one tree
     restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
     frictions: tuple[float, ...]  # different values of mu among the pairs, ascending
 
 
 @dataclass(frozen=True)
 class Question:
-    """A scene and the caller's law, coupling and rendering; None = not chosen yet, so the scene decides alone."""
+    """A scene and the caller's law, coupling and rendering. None means not chosen yet: only the scene decides."""
 
     scene: Scene
     mechanism: Mechanism  # this and the next five: see `Facts`
@@ -79,10 +79,10 @@ class Question:
     frictions: tuple[float, ...]
     limited: tuple[str, ...]  # bodies whose joint has limits that the law keeps
     law: str | None
-    uses: frozenset[str]  # what the law makes of the contact section
+    uses: frozenset[str]  # parts of the contact section that the law uses
     coupling: str | None
-    logs_impulses: bool  # the law says what its impulses take, which the observer of pulses asks
-    own_gains: Any  # of a coupling that the caller made; None: the scene's count
+    logs_impulses: bool  # the law logs the energy lost in impulses, which the observer of pulses needs
+    own_gains: Any  # of a coupling object of the caller; None: the scene's gains
     rendering: str | None
 
     @property
@@ -92,7 +92,7 @@ class Question:
 
     @property
     def contacts(self) -> int:
-        """Everything that can touch: pairs of shapes, and joints at their limits."""
+        """Number of pairs of shapes and of joints with limits, which all can touch."""
         return self.pairs + len(self.limited)
 
     def unused(self, part: str) -> str | None:
@@ -102,7 +102,7 @@ class Question:
         return None if part in self.uses else f"the law '{self.law}' does not use it"
 
     def ignored(self, field: str, *parts: str) -> str:
-        """Return the field where contacts would need it and the law uses none of these parts; else an empty text."""
+        """Return the field if something can touch and the law uses none of these parts; else an empty text."""
         return field if self.contacts and not self.uses.intersection(parts) else ""
 
     def without_device(self) -> str | None:
@@ -117,7 +117,7 @@ class Question:
         return None
 
     def gains(self) -> Any:
-        """Return the gains of the chosen coupling, those of any coupling where none is chosen; None without."""
+        """Return the gains of the chosen coupling, or of any coupling if none is chosen; None if there are no gains."""
         couplings = self.scene.couplings
         if self.own_gains is not None:
             return self.own_gains
@@ -127,17 +127,17 @@ class Question:
 
 
 def number(value: float) -> str:
-    """Return a number as a sentence shows it."""
+    """Return a number as text for a sentence."""
     return f"{value:g}"
 
 
 def numbers(values: Any) -> str:
-    """Return a list of numbers as a sentence shows it."""
+    """Return a list of numbers as text for a sentence."""
     return "[" + ", ".join(number(value) for value in values) + "]"
 
 
 def gravity(question: Question) -> Effect:
-    """G of (1)."""
+    """Gravity, G of (1)."""
     field = question.scene.gravity
     sinking = _sinking(question, field) if field is not None and any(field) else []
     if sinking:
@@ -153,7 +153,7 @@ def gravity(question: Question) -> Effect:
 
 
 def _sinking(question: Question, field: Sequence[float]) -> list[str]:
-    """Names of the bodies whose joints feel gravity: whose generalized force is not exactly zero at poses by chance."""
+    """Return the names of bodies whose generalized gravity force is not exactly zero at all of some random poses."""
     mechanism, numbers_by_chance = question.mechanism, np.random.default_rng(0)
     q = np.array([x for body in question.scene.bodies for x in body.position], np.float64)
     felt = np.zeros(mechanism.nv, np.bool_)
@@ -164,7 +164,7 @@ def _sinking(question: Question, field: Sequence[float]) -> list[str]:
 
 
 def varying_inertia(question: Question) -> Effect:
-    """M(q) of (1), where it is not constant."""
+    """Configuration-dependent mass matrix, M(q) of (1)."""
     active = not question.mechanism.has_constant_mass_matrix
     reason = (
         f"the mass matrix depends on the configuration: {_turning(question)} carries mass off its axis or other links"
@@ -175,7 +175,7 @@ def varying_inertia(question: Question) -> Effect:
 
 
 def velocity_terms(question: Question) -> Effect:
-    """B of (1): Coriolis and centripetal forces."""
+    """Coriolis and centripetal forces, B of (1)."""
     active = question.mechanism.has_velocity_terms
     reason = (
         f"bodies carried by {_turning(question)} feel Coriolis or centripetal forces"
@@ -186,7 +186,7 @@ def velocity_terms(question: Question) -> Effect:
 
 
 def hand_force(question: Question) -> Effect:
-    """J_h^T F_h of (1)."""
+    """Force of the hand, J_h^T F_h of (1)."""
     hand = question.scene.hand
     active = hand is not None and (any(hand.force) or hand.changes)
     if hand is None:
@@ -202,7 +202,7 @@ def hand_force(question: Question) -> Effect:
 
 
 def _over_time(hand: Hand) -> str:
-    """Say how the hand's force changes."""
+    """Return text that describes how the hand's force changes over time."""
     said = [f"hand.force = {numbers(hand.force)}"] if any(hand.force) else []
     if hand.force_table:
         rows = hand.force_table
@@ -214,7 +214,7 @@ def _over_time(hand: Hand) -> str:
 
 
 def joint_damping(question: Question) -> Effect:
-    """Viscous damping of joints, implicit in the step."""
+    """Viscous damping of joints, integrated implicitly."""
     damped = [body for body in question.scene.bodies if any(body.joint_damping)]
     unused = None if damped else "no joint has damping"
     if damped and JOINTS not in question.uses:
@@ -226,7 +226,7 @@ def joint_damping(question: Question) -> Effect:
 
 
 def joint_limits(question: Question) -> Effect:
-    """Ends of the joints' ranges: contacts of a link with its parent."""
+    """Limits of joints, which act as contacts of a link with its parent."""
     given = [body for body in question.scene.bodies if body.joint_limits is not None]
     unused = None if given else "no joint has limits"
     if given and not question.limited:
@@ -238,13 +238,13 @@ def joint_limits(question: Question) -> Effect:
 
 
 def _turning(question: Question) -> str:
-    """Name the joints that turn something."""
+    """Return the names of the bodies whose joints rotate."""
     turning = [body.name for body in question.scene.bodies if body.joint in TURNING_JOINTS]
     return f"the joint{'' if len(turning) == 1 else 's'} of {', '.join(turning)}"
 
 
 def wall_contacts(question: Question) -> Effect:
-    """Contacts with the static world."""
+    """Contacts of moving shapes with the static world."""
     count = question.wall_pairs
     reason = f"{_pairs(count)} of a moving shape and a static one can touch"
     reason = reason if count else "no moving shape has a static one to touch"
@@ -274,7 +274,7 @@ def self_collisions(question: Question) -> Effect:
 
 
 def impulses(question: Question) -> Effect:
-    """Impulses (20)-(21) when a contact is new."""
+    """Impulses (20)-(21) at new contacts."""
     unused = question.unused(IMPULSES)
     if unused is None and question.restitutions[-1] == -1.0:
         unused = f"{_restitution(question)}: an impulse would be zero"
@@ -285,7 +285,7 @@ def impulses(question: Question) -> Effect:
 
 
 def _restitution(question: Question) -> str:
-    """Say the restitution of the pairs that can touch."""
+    """Return text with the restitution of the pairs that can touch."""
     smallest, largest = question.restitutions[0], question.restitutions[-1]
     if smallest < largest:
         return f"restitution {number(smallest)} to {number(largest)}, the smaller that body or wall of a pair gives"
@@ -294,10 +294,10 @@ def _restitution(question: Question) -> str:
 
 
 def unequal_restitution(question: Question) -> Effect:
-    """Contacts of one impact that differ in restitution: a future extension in the paper.
+    """Different restitution at the contacts of one impact, a future extension in the paper.
 
-    The engine's impulses follow Poisson's law there; rigid constraints Newton's for each contact while that has a
-    solution that gains nothing, else Poisson's.
+    The engine's impulses then follow Poisson's law. Rigid constraints follow Newton's law at each contact if that has a
+    solution without energy gain, and Poisson's law otherwise.
     """
     unused = question.unused(OWN_RESTITUTION)
     if unused is None and len(question.restitutions) == 1:
@@ -307,7 +307,7 @@ def unequal_restitution(question: Question) -> Effect:
 
 
 def impact_friction(question: Question) -> Effect:
-    """Coulomb friction in the impacts themselves: a future extension in the paper."""
+    """Coulomb friction during impacts, a future extension in the paper."""
     contact = question.scene.contact
     active, reason = _rough(question, IMPACT_FRICTION)
     if active and contact.self_collision_rows == "per_body":
@@ -316,7 +316,7 @@ def impact_friction(question: Question) -> Effect:
 
 
 def penalty_stiffness(question: Question) -> Effect:
-    """K of (5)."""
+    """Penalty stiffness, K of (5)."""
     value = question.scene.contact.stiffness
     active, reason = _valued(question, PENALTY, "stiffness", value, "N/m")
     ignored = question.ignored("stiffness", PENALTY) if value else ""
@@ -324,7 +324,7 @@ def penalty_stiffness(question: Question) -> Effect:
 
 
 def contact_damping(question: Question) -> Effect:
-    """B of (5)."""
+    """Contact damping, B of (5)."""
     value = question.scene.contact.damping
     active, reason = _valued(question, PENALTY, "damping", value, "N s/m")
     ignored = question.ignored("damping", PENALTY) if value else ""
@@ -332,7 +332,7 @@ def contact_damping(question: Question) -> Effect:
 
 
 def friction(question: Question) -> Effect:
-    """Friction at resting contacts: Coulomb's law, or (6)."""
+    """Friction at resting contacts, by Coulomb's law or by (6)."""
     active, reason = _rough(question, FRICTION)
     rough = question.frictions[-1:] > (0.0,)
     ignored = question.ignored("friction", FRICTION) if rough else ""
@@ -340,7 +340,7 @@ def friction(question: Question) -> Effect:
 
 
 def _rough(question: Question, part: str) -> tuple[bool, str]:
-    """Decide an effect that is on where a pair has friction and the law uses this part."""
+    """Decide an effect that is on if a pair has friction and the law uses this part."""
     unused, values = question.unused(part), question.frictions
     if unused is None and not values:
         unused = "nothing can rub: the scene has no pair of shapes"
@@ -355,21 +355,21 @@ def _rough(question: Question, part: str) -> tuple[bool, str]:
 
 
 def clustering(question: Question) -> Effect:
-    """Contacts close together count as one (section III)."""
+    """Clustering: contacts close together count as one (section III)."""
     value = question.scene.contact.cluster_distance
     active, reason = _valued(question, CLUSTERS, "cluster_distance", value, "m")
     return Effect("clustering", active, reason, "contacts that a fine mesh repeats would count several times")
 
 
 def coherence(question: Question) -> Effect:
-    """A contact near one of the step before is not new (section III)."""
+    """Coherence: a contact near one of the previous step is not new (section III)."""
     value = question.scene.contact.coherence_distance
     active, reason = _valued(question, NEWNESS, "coherence_distance", value, "m")
     return Effect("coherence", active, reason, "contacts that move from facet to facet would collide again")
 
 
 def _valued(question: Question, part: str, field: str, value: float, unit: str) -> tuple[bool, str]:
-    """Decide an effect that is on where its number is not zero and a contact needs it."""
+    """Decide an effect that is on if its value is not zero and a contact needs it."""
     unused = question.unused(part)
     if unused is None and value == 0.0:
         unused = f"contact.{field} = 0"
@@ -381,7 +381,7 @@ def _pairs(count: int) -> str:
 
 
 def coupling(question: Question) -> Effect:
-    """A device coordinated with the tool (section VI)."""
+    """Coupling of a device to the tool (section VI)."""
     absent = question.without_device()
     gains = question.gains()
     name = question.coupling or "a coupling"
@@ -394,9 +394,9 @@ def coupling(question: Question) -> Effect:
 
 
 def device_limits(question: Question) -> Effect:
-    """Largest forces that the device renders, and what is done about larger ones (section VI)."""
+    """Force limits of the device, and the treatment of larger forces (section VI)."""
     limit = question.scene.device.force_limit if question.scene.device else None
-    scaled = question.rendering in ("scale", "spread")  # the tool's impulse is scaled, device or not
+    scaled = question.rendering in ("scale", "spread")  # the tool's impulse is scaled with and without a device
     absent = None if scaled else question.without_device()
     if absent is None and limit is None:
         absent = "the scene gives no device.force_limit"
@@ -410,7 +410,7 @@ def device_limits(question: Question) -> Effect:
 
 
 def delay(question: Question) -> Effect:
-    """Steps that pass between world and device."""
+    """Delay between world and device, in steps."""
     steps = question.scene.device.delay if question.scene.device else 0
     absent = question.without_device() or ("device.delay = 0" if steps == 0 else None)
     reason = absent or f"device.delay = {steps} steps, {number(1e3 * steps * question.scene.step)} ms"
@@ -420,14 +420,14 @@ def delay(question: Question) -> Effect:
 
 
 def quantisation(question: Question) -> Effect:
-    """Positions as the device's sensors see them."""
+    """Quantised positions of the device's sensors."""
     resolution = question.scene.device.position_resolution if question.scene.device else None
     active, reason = _listed(question, "position_resolution", resolution, "m, rad")
     return Effect("quantisation", active, reason, "the coupling would be fed exact positions and velocities")
 
 
 def device_damping(question: Question) -> Effect:
-    """Physical damping of the device: it bounds the virtual damping (C20)."""
+    """Physical damping of the device, which bounds the virtual damping (C20)."""
     damping = question.scene.device.damping if question.scene.device else None
     active, reason = _listed(question, "damping", damping, "N s/m, N m s/rad")
     return Effect(
@@ -436,7 +436,7 @@ def device_damping(question: Question) -> Effect:
 
 
 def waveform(question: Question) -> Effect:
-    """An impulse handed out to the device over many steps."""
+    """Waveform that spreads an impulse to the device over many steps."""
     name = question.scene.device.waveform if question.scene.device else "step"
     absent = question.without_device() or question.unused(IMPULSES)
     if absent is None and question.coupling == "unilateral":
@@ -450,7 +450,7 @@ def waveform(question: Question) -> Effect:
 
 
 def _listed(question: Question, field: str, values: Sequence[float] | None, unit: str) -> tuple[bool, str]:
-    """Decide an effect that is on where a device takes part and any of its numbers is not zero."""
+    """Decide an effect that is on if a device takes part and one of the values is not zero."""
     absent = question.without_device()
     if absent is None and not any(values or ()):
         absent = f"the scene gives no device.{field}"
@@ -497,16 +497,16 @@ def decide_effects(
     scene
         a checked scene.
     law, coupling
-        the objects, or their names in a run file, such as "penalty" and "four-channel". None: an effect is on if some
-        law or coupling needs it. The attribute ``uses`` of a law names the parts of the contact section that it uses
-        (`iapb.contact.laws`); a law without it is assumed to use all of them.
+        the objects, or their names in a run file, such as "penalty" and "four-channel". With None, an effect is on if
+        some law or coupling needs it. The attribute ``uses`` of a law names the parts of the contact section that it
+        uses (`iapb.contact.laws`); a law without it is assumed to use all of them.
     rendering
-        such as "scale"; default: the law's own.
+        such as "scale"; default: the rendering of the law.
 
     Returns
     -------
     tuple of Effect
-        every effect in a fixed order: whether it is active, why, and what leaving it out would change.
+        all effects in a fixed order, each with its state, the reason, and what would change without it.
     """
     scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
@@ -517,7 +517,7 @@ def decide_effects(
 
 
 def count_pairs(mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) -> tuple[int, int, int]:
-    """Return how many candidate pairs there are with walls, between trees and within one."""
+    """Return the numbers of candidate pairs with walls, between two trees, and within one tree."""
     counts = {"wall": 0, "body": 0, "tree": 0}
     for a, b in pairs:
         tree_a, body_b = mechanism.tree_of_body[shapes.body[a]], shapes.body[b]
@@ -530,7 +530,7 @@ def decide_for(
     scene: Scene, facts: Facts, law: ContactLaw | str | None, coupling: Coupling | str | None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
-    """`decide_effects` for a settled scene of which the facts are known."""
+    """Do what `decide_effects` does for a settled scene with known facts."""
     known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
     if rendering is None and law is not None and not isinstance(law, str):
         rendering = getattr(law, "rendering", "full")
@@ -547,7 +547,7 @@ def decide_for(
 
 
 def ignored_fields(effects: Iterable[Any]) -> tuple[str, ...]:
-    """Return the fields that the scene gives and the law ignores, friction first; of effects, or those of a run."""
+    """Return the fields that the law ignores, friction first, from effects or from the rows of a run."""
     found = [effect.ignores for effect in effects if effect.ignores]
     return tuple(sorted(found, key=lambda field: field != "friction"))
 

@@ -1,4 +1,4 @@
-"""Recording of a simulation, chunk by chunk: what the loop writes, and how it becomes a Run."""
+"""Record a simulation chunk by chunk, and turn the record into a Run."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, blank, di
 from iapb.scene.model import SpatialScene
 
 Floats = NDArray[np.float64]
-Start = tuple[dict[str, Floats], dict[str, float]]  # state and energy at the start of all
+Start = tuple[dict[str, Floats], dict[str, float]]  # state and energy at the first instant
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
-_ROOM = 30e6  # bytes that chunks in a row may take together, unless one is larger
-_STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C answer at least that often
+_ROOM = 30e6  # bytes of consecutive chunks together, unless one chunk is larger
+_STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
 
-# What the loop writes; poses, energies and digests of M follow from it.
+# Arrays that the loop writes; poses, energies and digests of M are computed from them.
 STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
 STEPS = quantities(Run, "step")
 CONTACTS = quantities(ContactTable, "contact")
@@ -40,34 +40,34 @@ _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "
 
 
 class Record(NamedTuple):
-    """Arrays of one chunk of n steps, by the names of `iapb.run`."""
+    """Arrays of one chunk of n steps, with the names of `iapb.run`."""
 
     used: np.ndarray  # (2,) int64: contacts and impacts written so far
     contact_count: np.ndarray  # (n,) int64
-    steps: Any  # n lines; states are those at the *end* of each step
-    contacts: Any  # up to m lines, m the capacity of the chunk
-    impacts: Any  # up to n t lines, one per island and step, t trees
+    steps: Any  # n lines, with the states at the *end* of each step
+    contacts: Any  # up to m lines, where m is the capacity of the chunk
+    impacts: Any  # up to n t lines, one per island and step, with t trees
 
 
 def chunk_steps(contacts: int, remaining: int) -> int:
-    """Number of steps of the next chunk."""
+    """Return the number of steps of the next chunk."""
     return max(1, min(remaining, _STEPS_PER_CHUNK, _CONTACT_ROWS_PER_CHUNK // max(1, contacts)))
 
 
 def bytes_per_step(simulation: Any) -> int:
-    """Bytes that each step adds to a run: its lines twice while chunks are joined, and the ledger; no contacts."""
+    """Return the bytes that a step without contacts adds to a run: lines (twice, for joining) and energies."""
     return 2 * _line_bytes(coordinates_of(simulation), 0, 0) + 8 * len(FORCES) + 40
 
 
 def coordinates_of(simulation: Any) -> tuple[int, int, int, int]:
-    """Lengths of q and v, and of the device's."""
+    """Return the lengths of q and v, of the scene and of the device."""
     mechanism, port = simulation.system.mechanism, simulation.port
     return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
 
 
 @lru_cache(maxsize=8)
 def _line_bytes(coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> int:
-    """Bytes of the lines of a step, with all contacts that there can be."""
+    """Return the bytes of the lines of a step with so many contacts and trees."""
     return sum(array.nbytes for array in chain(*_lines(1, coordinates, contacts, trees, np.empty).values()))
 
 
@@ -78,7 +78,7 @@ def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: in
 
 @lru_cache(maxsize=8)
 def _first_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Any:
-    """A chunk that says where everything lies in those of its shape; its zeros take no memory."""
+    """Make a chunk that serves as the layout for others of its shape; its zeros take no memory."""
     lines = _lines(steps, coordinates, contacts, trees, np.zeros)
     return block(Record(np.zeros(2, np.int64), np.zeros(steps, np.int64), **lines))
 
@@ -91,11 +91,11 @@ def _lines(steps: int, coordinates: tuple[int, int, int, int], contacts: int, tr
 
 
 class Room:
-    """Memory for chunks one after another: the lines of a run that fits in need no joining.
+    """Memory for consecutive chunks: the lines of a run that fits in need no joining.
 
     Parameters
     ----------
-    steps : of all chunks together
+    steps : number of steps of all chunks together
     coordinates, contacts, trees : see `make_record`
     """
 
@@ -108,15 +108,15 @@ class Room:
         self._places = np.array([address_of(array) for array in self._arrays])
         self._strides = np.array([array.strides[0] for array in self._arrays])
         self.chunks = 0
-        self.used = [0, 0, 0]  # steps, contacts and impacts that are kept
-        self._open: Any = None  # the chunk that is written
+        self.used = [0, 0, 0]  # numbers of kept steps, contacts and impacts
+        self._open: Any = None  # the chunk that is being written
 
     def fits(self, steps: int) -> bool:
-        """Whether there is room for another chunk, and the last one is kept."""
+        """Whether the last chunk is kept and there is room for another one."""
         return self._open is None and self.used[0] + steps <= self._most
 
     def record(self, steps: int) -> Record:
-        """Return the next chunk, in which there may be anything."""
+        """Return the next chunk; its content is not initialised."""
         coordinates, contacts, trees = self._sizes
         used, sizes = np.zeros(2, np.int64), (steps, steps * contacts, steps * trees)
         arrays = [array[self.used[t] : self.used[t] + sizes[t]]
@@ -128,7 +128,7 @@ class Room:
         return made
 
     def keep(self, record: Any, steps: int) -> bool:
-        """Keep the lines of the chunk that was written; False where it is another one."""
+        """Keep the lines written to the open chunk; return False if `record` is another one."""
         if record is not self._open:
             return False
         self._open, self.chunks = None, self.chunks + 1
@@ -194,9 +194,10 @@ def _write_impacts(record, step, state):
 
 
 class Recorder:
-    """The chunks of a simulation in the making, joined into a Run with its poses, energy ledger and effects.
+    """Collect the chunks of a running simulation and join them into a Run with poses, energies and effects.
 
-    What is held can be taken as a Run that is a part of the whole, and forgotten: the next part goes on from there.
+    `take` returns the chunks held so far as a Run that is a part of the whole, and releases them. The next part
+    continues from its end.
     """
 
     def __init__(self, simulation: Any) -> None:
@@ -208,32 +209,32 @@ class Recorder:
         self._room: Room | None = None
         self.sizes: list[int] = []
         self.seconds: list[float] = []
-        self.first, self.steps = 0, 0  # steps before those that are held, and steps in all
-        self._before: dict[str, float] | None = None  # the ledger at `first`
+        self.first, self.steps = 0, 0  # number of steps before those held, and number of all steps
+        self._before: dict[str, float] | None = None  # the energies at `first`
         self._at_first: Start | None = None
 
     @property
     def held_bytes(self) -> int:
-        """Memory of the chunks that are held."""
+        """Memory of the chunks held [bytes]."""
         return sum(array.nbytes for record in self.records for array in record.arrays())
 
     def chunk(self, total: int) -> BaseException | None:
-        """Do and keep the next chunk; return what stopped it before its end."""
+        """Simulate and keep the next chunk; return the exception that stopped it early, if any."""
         record, size = self._in_a_row(total)
         if self.steps == 0:
-            self.simulation.prepare(record)  # what is timed is steps alone
+            self.simulation.prepare(record)  # so that only steps are timed
         started = time.perf_counter()
         done, stop = self.simulation.advance_chunk(record, size)
         self.keep(record, done, time.perf_counter() - started)
         return stop
 
     def blank(self, total: int) -> tuple[Record, int]:
-        """Return a record by itself for the next chunk and its number of steps; the whole run has `total`."""
+        """Return a record of its own for the next chunk, and its number of steps; the whole run has `total` steps."""
         size = chunk_steps(self.simulation.system.capacity, total - self.steps)
         return make_record(size, *self._sizes), size
 
     def _in_a_row(self, total: int) -> tuple[Record, int]:
-        """Return the same behind the last chunk, where there is room."""
+        """Return the record behind the last chunk if there is room, else in new memory, and its number of steps."""
         size = chunk_steps(self.simulation.system.capacity, total - self.steps)
         if self._room is None or not self._room.fits(size):
             most = int(_ROOM / max(1, _line_bytes(*self._sizes)))
@@ -242,7 +243,7 @@ class Recorder:
 
     @property
     def coordinates(self) -> tuple[int, int, int, int]:
-        """Lengths of q and v, and of the device's."""
+        """Lengths of q and v, of the scene and of the device."""
         return coordinates_of(self.simulation)
 
     @cached_property
@@ -251,7 +252,7 @@ class Recorder:
         return self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
 
     def keep(self, record: Any, steps: int, seconds: float) -> None:
-        """Take a chunk of which `steps` lines are written, in `seconds` of work."""
+        """Keep a chunk with `steps` written lines, which took `seconds` to simulate."""
         if self._room is not None and not self._room.keep(record, steps):
             self._room = None
         self.records.append(record)
@@ -260,19 +261,19 @@ class Recorder:
         self.steps += steps
 
     def held(self) -> list[tuple[Any, int, float]]:
-        """The chunks that are held: each record, its steps and its seconds."""
+        """Return the chunks held, each as its record, steps and seconds."""
         return list(zip(self.records, self.sizes, self.seconds, strict=True))
 
     def forget(self) -> None:
-        """Hold nothing any more: somebody else has written the chunks down."""
+        """Release all chunks, after the caller has stored them."""
         self.records, self.sizes, self.seconds, self.first, self._room = [], [], [], self.steps, None
 
     def go_on(self, steps: int) -> None:
-        """Count from a number of steps that were done, and written down, before."""
+        """Continue the count from a number of steps that were done and stored before."""
         self.first = self.steps = steps
 
     def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
-        """The columns of the record's `steps`, `contacts` or `impacts` over all chunks; `before`: a line ahead."""
+        """Return the columns of `steps`, `contacts` or `impacts` over all chunks; `before` gives a first line."""
         table, ahead = list(_LINES).index(lines), before or {}
         if self._room is not None and self._room.chunks == len(self.records):
             used = self._room.used[table]
@@ -286,17 +287,17 @@ class Recorder:
             for each in _LINES[lines]}
 
     def _counts(self) -> NDArray[np.int64]:
-        """Contacts of each step."""
+        """Return the number of contacts of each step."""
         if self._room is not None and self._room.chunks == len(self.records):
             return self._room.counts[: self._room.used[0]]
         return np.concatenate([each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)])
 
     def run(self, world: str, stopped: str) -> Run:
-        """Everything held as a Run; `stopped` says why it is not complete."""
+        """Return everything held as a Run; `stopped` says why it is incomplete, empty if it is complete."""
         return self._part(world, stopped)[0]
 
     def take(self, world: str) -> Run:
-        """Return what is held as a part of a run, and forget it: the next part starts where this one ends."""
+        """Return and release everything held, as a part of a run; the next part starts at its end."""
         part, ledger = self._part(world, "")
         self._at_first = self._at_first or _first_of(part)
         self._before = last_of(ledger(part), self._before)
@@ -305,7 +306,7 @@ class Recorder:
         return part
 
     def _part(self, world: str, stopped: str) -> tuple[Run, Callable[[Run], dict[str, Floats]]]:
-        """The Run, and what gives its whole ledger."""
+        """Return the Run, and the function that computes all its energies."""
         simulation, system = self.simulation, self.simulation.system
         steps = self.joined("steps", self.start)
         states = {each.name: steps.pop(each.name) for each in STATES}
@@ -348,7 +349,7 @@ def _rows(effects: Sequence[Effect], run: Run) -> tuple[EffectRow, ...]:
 
 
 def _once(make: Callable[[Run], dict[str, Floats]]) -> Callable[[Run], dict[str, Floats]]:
-    """The same function, which keeps what it returned."""
+    """Return the function with its first result cached."""
     known: list[dict[str, Floats]] = []
 
     def ask(run: Run) -> dict[str, Floats]:
@@ -360,18 +361,18 @@ def _once(make: Callable[[Run], dict[str, Floats]]) -> Callable[[Run], dict[str,
 
 
 def _shown(ledger: Callable[[Run], dict[str, Floats]], carried: bool, run: Run) -> dict[str, Floats]:
-    """The ledger without the tool's balance under a unilateral coupler, where the tool is carried at times."""
+    """Return the energies to record. A unilateral coupler carries the tool at times: then leave its balance out."""
     return {name: values for name, values in ledger(run).items() if name in _KEPT_WHEN_CARRIED or not carried}
 
 
 def _first_of(run: Run) -> Start:
-    """State and energy at the start of a run."""
+    """Return state and energy at the start of a run."""
     return ({name: getattr(run, name)[0].copy() for name in ("q", "v")},
             {name: run.energy[name][0] for name in ("kinetic", "potential")})
 
 
 def _distrust(at_first: Start | None, part: Run) -> tuple[str, ...]:
-    """Distrust of a run or, for a later part, of one that goes from the first state of all to those of the part."""
+    """Return the distrust of a run; of a later part, as if its first state were that of the whole run."""
     if at_first is None:
         return distrust_of(part)
     states: dict[str, Any] = {
@@ -381,5 +382,5 @@ def _distrust(at_first: Start | None, part: Run) -> tuple[str, ...]:
 
 
 def _filled(array: np.ndarray, used: int) -> np.ndarray:
-    """The first lines of an array; where most of it is empty, a copy, for they would keep all of it."""
+    """Return the first lines of an array; if most of it is unused, as a copy, which does not keep the array alive."""
     return array[:used] if 2 * used >= len(array) else array[:used].copy()

@@ -1,13 +1,12 @@
-"""The loop: couple, advance the contact law, drive the device, record. One page, compiled or from Python.
+"""The simulation loop: couple, advance the contact law, drive the device, record. It runs compiled or in Python.
 
     every step of length Δt:
-        hand and coupling pull at the tool              (VI)   couple
+        hand and coupling pull the tool                 (VI)   couple
         contacts → collisions → resting forces → move   (III-V, IV)   the law
         F_env is rendered, the device moves             (V-C, VI)   drive_device
 
-A step has two halves, with the world's own time between them where a device is real: `begin_step` (hand and coupling
-pull, the law advances, the device is given its force) and `end_step` (the device has moved: by its kernel, or by
-itself, and is read).
+A step has two halves, and a real device moves between them. In `begin_step` hand and coupling pull, the law advances
+and the device gets its force. In `end_step` the compiled device moves, or the position of a real device is read.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range
 def compiled_steps(  # type: ignore[no-untyped-def]
     world, state, port, record, first, steps
 ):
-    """Do `steps` steps of an engine law; return (steps done, status)."""
+    """Do `steps` steps of an engine law; return the number of steps done and the status."""
     for k in range(steps):
         if port.planned.shape[0] > 0:
             copy_into(port.wrench, port.planned[k])
@@ -61,12 +60,12 @@ def compiled_steps(  # type: ignore[no-untyped-def]
 
 
 class Stepper:
-    """The parts of a step of one simulation, entered without numba's look-up of types (some 10 µs a call).
+    """The parts of a step of one simulation, called without numba's look-up of types (about 10 µs a call).
 
     Parameters
     ----------
-    world, state, port : the simulation's blocks; they stay the same.
-    link : to a device of its own; None: the compiled device.
+    world, state, port : the simulation's blocks, which must not be replaced.
+    link : link to an external device; None for the compiled device.
     """
 
     def __init__(self, world: Any, state: Any, port: Any, link: DeviceLink | None) -> None:
@@ -78,7 +77,7 @@ class Stepper:
         self._write: Any = Entry(write_step)
 
     def prepare(self, record: Record) -> None:
-        """Find the machine code of every part now, which takes milliseconds, rather than in the first step."""
+        """Find the machine code of every part before the first step; this takes milliseconds."""
         world, state, port = blocks = self._blocks
         self._couple = Entry(couple).taking(*blocks)
         self._advance = Entry(advance).taking(world, state, port.applied)
@@ -86,24 +85,24 @@ class Stepper:
         self._write = Entry(write_step).taking(record, 0, 0, state, port)
 
     def couple(self) -> None:
-        """Forces of the hand and of the coupling on the tool: into ``port.applied``."""
+        """Write the forces of hand and coupling on the tool into ``port.applied``."""
         self._couple(*self._blocks)
 
     def advance(self) -> None:
-        """Advance an engine law by one step; raise IapbError where that cannot be done."""
+        """Advance an engine law by one step; raise IapbError if the step fails."""
         world, state, port = self._blocks
         status = self._advance(world, state, port.applied)
         if status:
             raise IapbError(FAILURES[status])
 
     def render(self) -> None:
-        """What the device is to give (26); a device of its own is told so."""
+        """Compute the force that the device renders (26), and send it to an external device."""
         self._render(*self._blocks)
         if self._link is not None:
             self._link.send()
 
     def finish(self) -> None:
-        """The device moves; one of its own is read."""
+        """Move the compiled device, or read the external one."""
         if self._link is not None:
             self._link.receive()
         elif self._blocks[2].coupling != NO_COUPLING and not self._move(*self._blocks):
@@ -118,30 +117,30 @@ Floats = NDArray[np.float64]
 
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
-INTERRUPTED = "interrupted"  # what `Run.stopped` says after Ctrl-C
+INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 
 
 class Checkpoint(Protocol):
-    """Something that keeps a run in the making."""
+    """An object that stores an unfinished run from time to time."""
 
     @property
     def due(self) -> bool:
-        """Whether enough has happened since the last time."""
+        """Whether the run should be stored now."""
         ...
 
     def __call__(self, run: Run) -> object:
-        """Keep the run so far."""
+        """Store the run so far."""
         ...
 
 
 class Simulation:
-    """A scene under a contact law and a coupling, stepped one step at a time or all at once.
+    """A simulation of a scene under a contact law and a coupling, advanced by single steps or by chunks.
 
     Parameters
     ----------
     scene : Scene, its `iapb.system.System`, the path of a scene file, or the name of a scene of the project.
     law : contact law; default `ImpulseAugmented()`.
-    coupling : between device and tool; default `NoCoupling()`: the hand holds the tool itself.
+    coupling : coupling of device and tool; default `NoCoupling()`, with which the hand holds the tool itself.
     device : a Python device model (`iapb.haptics.device.Device`); default: the compiled device.
 
     Examples
@@ -172,12 +171,12 @@ class Simulation:
         self.steps_done = 0
 
     def arrays(self) -> list[np.ndarray]:
-        """Everything that a step may change, in a fixed order: with it another simulation goes on from here."""
+        """Return all arrays that a step may change, in a fixed order; a simulation resumes from copies of them."""
         return [*self.state.arrays(), *self.port.arrays()]  # type: ignore[attr-defined]
 
     @property
     def keeps_no_state(self) -> bool:
-        """Whether `arrays` are all that the next step depends on: no device of its own, no law with a memory."""
+        """Whether the next step depends on `arrays` alone: no external device, and no law with a state of its own."""
         return self.link is None and (self.compiled or _is_frozen(self.law))
 
     @property
@@ -186,19 +185,19 @@ class Simulation:
         return self.steps_done * self.system.dt
 
     def step(self, hand_force: ArrayLike | None = None) -> StepResult:
-        """Do one step and return it; the arrays are copies, and q and v those at the end of the step.
+        """Do one step and return its result; the arrays are copies, with q and v at the end of the step.
 
         Parameters
         ----------
-        hand_force : (3,) force [N] in the plane and torque [N m], or (6,) force and torque, world axes, from now
-            on; None keeps the last one (at first the scene's, which may change over time).
+        hand_force : force [N] and torque [N m] of the hand from now on in world axes, (3,) in the plane or (6,) in
+            space. None keeps the last one; at first that is the scene's force, which may change over time.
 
         Raises
         ------
         ArgumentError
-            A force of the wrong shape or not finite, or a hand force in a scene without a hand.
+            The force has a wrong shape or is not finite, or the scene has no hand.
         IapbError
-            The step cannot be done (see `iapb.contact.kernels.step`), or the law returned what is no step.
+            The step fails (see `iapb.contact.kernels.step`), or the law returned an invalid step.
         """
         if hand_force is not None:
             self._grip(hand_force)
@@ -207,7 +206,7 @@ class Simulation:
         return copied_step(self.system, self.state)
 
     def begin_step(self) -> None:
-        """Do the first half of a step: hand and coupling, the law, and the device is told its force."""
+        """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
         if self._planned:
             self.port.wrench[:] = wrenches_of(self.scene, [self.time])[0]
         self.stepper.couple()
@@ -218,7 +217,7 @@ class Simulation:
         self.stepper.render()
 
     def end_step(self) -> None:
-        """Do the second half of a step: the device has moved."""
+        """Do the second half of a step: move the device or read it."""
         self.stepper.finish()
         self.steps_done += 1
 
@@ -232,7 +231,7 @@ class Simulation:
         self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
 
     def _take(self, result: StepResult) -> None:
-        """Copy what a law written in Python returned into the state that the device and the record read."""
+        """Copy the result of a law written in Python into the state that the device and the record read."""
         state, law = self.state, f"the law {self.law.name!r} returned"
         if not isinstance(result, StepResult):
             raise ArgumentError(f"{law} result", result, "a StepResult")
@@ -250,9 +249,9 @@ class Simulation:
             state.state_of_tree[:] = result.state
 
     def prepare(self, record: Record) -> None:
-        """Load or compile the machine code of a step, which takes up to minutes, before the first one is timed.
+        """Load or compile the machine code of a step, which can take minutes, before the first step is timed.
 
-        A law in Python does so in a first step, which is undone; one that may keep a state of its own is let be.
+        A law in Python does so in a first step, which is then undone. A law that may have its own state is skipped.
         """
         if self.compiled and self.link is None:
             self._steps(self.world, self.state, self.port, record, self.steps_done, 0)
@@ -263,7 +262,7 @@ class Simulation:
             self.steps_done, record.used[:] = 0, 0
 
     def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
-        """Do up to `steps` steps and record them; return (steps done, what stopped them before the last)."""
+        """Do and record up to `steps` steps; return the number done, and the exception that stopped them or None."""
         if self.compiled and self.link is None:
             planned, stop = self._plan(steps)
             done, status = self._steps(self.world, self.state, self.port, record, self.steps_done, planned)
@@ -279,7 +278,7 @@ class Simulation:
 
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:
-        """Tell the compiled loop the hand's changing force; return for how many of the steps it has a value."""
+        """Give the compiled loop the hand's force of each step; return the number of valid steps and the error."""
         self.port.planned[:steps] = self.port.wrench
         for k in range(steps if self._planned else 0):
             try:
@@ -291,7 +290,7 @@ class Simulation:
 
 @contextmanager
 def _undone(*blocks: Any) -> Iterator[None]:
-    """Put back what is written into the arrays of blocks."""
+    """Restore the arrays of the blocks at the end."""
     kept = [(array, array.copy()) for part in blocks for array in part.arrays()]
     try:
         yield
@@ -320,27 +319,27 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
 
     Parameters
     ----------
-    scene : Scene, the path of a scene file, or the name of a scene that comes with the project.
+    scene : Scene, the path of a scene file, or the name of a scene of the project.
     law, coupling : see `Simulation`.
-    world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`: selects the law, and the coupling with the scene's
-        gains. Beside a law of the caller's own it is any name for the record; default: law and coupling.
+    world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`, which selects the law, and the coupling with the
+        scene's gains. If `law` is given, it is only a name for the record; default: the names of law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
-    progress : called as progress(steps done, steps in all) after every chunk.
-    checkpoint : called with the run so far after a chunk, where its ``due`` is true.
-    max_memory : most bytes that the record may take, ``math.inf`` for any; default: half of the machine's memory.
+    progress : called as progress(steps done, total steps) after every chunk.
+    checkpoint : called with the run so far after a chunk if its ``due`` is true.
+    max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the machine's memory.
 
     Returns
     -------
     Run
-        ``complete`` is False where the loop was interrupted (Ctrl-C) or could not go on, and ``stopped`` says why;
-        the arrays then end at the last whole chunk or step.
+        ``complete`` is False if the loop was interrupted (Ctrl-C) or failed, and ``stopped`` says why. The arrays then
+        end at the last complete chunk or step.
 
     Raises
     ------
     SceneError, ArgumentError
-        The scene or the arguments cannot be used, or the record would not fit: before anything is allocated.
+        The scene or the arguments are invalid, or the record would exceed `max_memory`; nothing is allocated yet.
     IapbError, KeyboardInterrupt
-        Stopped before the first step was done: there is nothing to return.
+        The run stopped before its first step was done, so there is nothing to return.
     """
     if not isinstance(scene, Scene):
         scene = _scene_at(find_scene(scene))
@@ -355,11 +354,11 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
 
 
 def _scene_at(path: Path) -> Scene:
-    """The scene of a file, read again where its text has changed; one with a robot always, for that is a file too."""
+    """Return the scene of a file, cached by its text; a scene with a robot is read again, for its URDF may change."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError):
-        return load_scene(path)  # which says what is wrong
+        return load_scene(path)  # this raises the right error
     return load_scene(path) if "urdf" in text else _scene_of(path, text)
 
 
@@ -370,7 +369,7 @@ def _scene_of(path: Path, text: str) -> Scene:
 
 def _simulated(simulation: Simulation, world: str, total: int, progress: Callable[[int, int], None] | None,
                checkpoint: Checkpoint | None) -> Run:
-    """The loop of `simulate`, chunk by chunk."""
+    """Run the loop of `simulate`, chunk by chunk."""
     recording = Recorder(simulation)
 
     def keep() -> None:
@@ -383,14 +382,14 @@ def _simulated(simulation: Simulation, world: str, total: int, progress: Callabl
 
 def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None,
            between: Callable[[], None] | None = None) -> str:
-    """Do the steps that are missing of `total`, chunk by chunk; return why they are not all done, "" where they are.
+    """Simulate up to `total` steps, chunk by chunk; return why the run stopped early, or "" if it did not.
 
     progress : see `simulate`; between : called between two chunks.
 
     Raises
     ------
     IapbError, KeyboardInterrupt
-        Stopped before the first step was done.
+        The run stopped before its first step was done.
     """
     stop: BaseException | None = None
     try:
@@ -415,7 +414,7 @@ def _step_count(steps: Any) -> int:
 
 
 def _fits(simulation: Simulation, steps: int, most: float) -> None:
-    """Refuse a record that would not fit, with what it would take."""
+    """Raise an ArgumentError if the record would take more than `most` bytes."""
     each = bytes_per_step(simulation)
     if steps * each > most:
         raise ArgumentError("steps", steps, f"at most {int(most / each):,}: the record takes {each} bytes a step and "
@@ -429,7 +428,7 @@ def _bytes(count: float) -> str:
 
 
 def _half_of_memory() -> float:
-    """Half of the machine's memory [bytes]; 4 GB where the system does not say."""
+    """Return half of the machine's memory [bytes], or 4 GB if the system does not report it."""
     try:
         return 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):

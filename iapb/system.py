@@ -1,4 +1,4 @@
-"""System: a scene turned into the arrays that the compiled step and the hand's side read and write."""
+"""System: a scene as the arrays that the compiled step, the hand and the device read and write."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ _factored = Entry(cholesky)
 
 
 class Parts:
-    """What bodies and walls alone come to: one for all scenes that say the same of them, to the last bit.
+    """Everything that follows from bodies and walls alone, shared by scenes whose bodies and walls are identical.
 
     Attributes
     ----------
     mechanism, shapes, pairs, stops, capacity, joint_damping : see `System`
     own_restitution : (r,), see `World`; pair_counts : see `iapb.effects.Facts`
-    firsts : states, ports and the like, of which twins are used
+    firsts : blocks such as ports and switches, of which twins are used
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -75,7 +75,7 @@ class Parts:
 
     @cached_property
     def of_world(self) -> dict[str, Any]:
-        """What of a world is the same under every law."""
+        """Fields of a world that are the same under every law."""
         ranges = np.array(self.mechanism.tree_dofs, dtype=np.int64).reshape(-1, 2)
         return {"mechanism": self.mechanism.block, "shapes": block(self.shapes),
                 "tree_of_body": self.mechanism.tree_of_body, "joint_damping": self.joint_damping,
@@ -83,21 +83,21 @@ class Parts:
                 "own_restitution": self.own_restitution, "stops": block(self.stops)}
 
     def broad_phase(self, pairs: NDArray[np.int32], used: bool) -> Any:
-        """A broad phase of its own, for a world writes into it; where it is not used, a stub that nobody writes."""
+        """Return a new broad phase, because a world writes into it; if unused, a shared empty one."""
         if not used:
             return kept(self.firsts, "stub", lambda: block(make_broad_phase(self.shapes, self.pairs[:0])))
-        if pairs is not self.pairs:  # somebody has left some out
+        if pairs is not self.pairs:  # the caller has left pairs out
             return block(make_broad_phase(self.shapes, pairs))
         return kept(self.firsts, "broad phase", lambda: block(make_broad_phase(self.shapes, pairs)).twin()).twin()
 
 
-_PARTS: dict[str, Parts] = {}  # by what the scene says of them
+_PARTS: dict[str, Parts] = {}  # by the scene's bodies and walls as text
 
 
 def parts_of(scene: Scene) -> Parts:
-    """Return the parts of a scene, the same for scenes that say the same of bodies and walls.
+    """Return the parts of a scene, which scenes with identical bodies and walls share.
 
-    Positions count where joints have limits, which stop them on an arm that depends on the start.
+    Start positions count only if joints have limits, because the arm of a stop depends on the start.
     """
     moved = {"__all__": {"position", "velocity"}}
     stopped = any(body.joint_limits is not None for body in scene.bodies)
@@ -110,16 +110,16 @@ class System:
 
     Attributes
     ----------
-    scene : Scene, with what `contact.auto` chooses
-    remarks : sentences on what it chose
+    scene : Scene, with the values that `contact.auto` chooses
+    remarks : sentences on the chosen values
     mechanism : Mechanism
-    tool_tree : int, tree that the hand holds; −1 without a hand
+    tool_tree : int, index of the tree that the hand holds; −1 without a hand
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
     dt : float [s]
-    restitutions : (r,) the different values of e among the pairs of shapes that can touch, ascending
-    frictions : Frictions, of any two shapes
+    restitutions : (r,) the distinct values of e among the pairs of shapes that can touch, ascending
+    frictions : Frictions, of all pairs of shapes
     start : (q, v)
-    joint_damping : (d,) [N s/m, N m s/rad]; stops : Stops, the ends of the joints' ranges
+    joint_damping : (d,) [N s/m, N m s/rad]; stops : Stops, the limits of the joints
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -153,16 +153,16 @@ class System:
         return (int(v_start), int(v_stop)), (start, start + size)
 
     def device_mechanism(self) -> Mechanism:
-        """The device: kinematically and inertially the hand-held tree, alone (paper VI)."""
+        """Return the mechanism of the device, which equals the tree in the hand (paper VI)."""
         return self.mechanism.alone(self.tool_tree)
 
     def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> ContactBuffer:
-        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q: geometry only.
+        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q, from geometry alone.
 
         Raises
         ------
         ArgumentError
-            q is no configuration, or the margin is not a number.
+            q is not a valid configuration, or the margin is NaN.
         IapbError
             There are more contacts than `capacity`.
         """
@@ -177,9 +177,9 @@ class System:
         return ContactBuffer(*columns)
 
     def world_under(self, law: Any, effects: Sequence[Effect] | None = None) -> World:
-        """The constant arrays of the step under one of the engine's laws (cached).
+        """Return the constant arrays of the step under one of the engine's laws (cached).
 
-        `effects` is what `decide` gives for the law, whatever the coupling.
+        `effects` is the result of `decide` for the law and any coupling.
         """
         key = _key(law)
         if key not in self._worlds:
@@ -187,7 +187,7 @@ class System:
         return self._worlds[key]
 
     def make_state(self) -> State:
-        """A fresh state at the scene's start."""
+        """Return a new state at the scene's start."""
         contact, mechanism = self.scene.contact, self.mechanism
         rows = self.capacity * (2 if contact.self_collision_rows == "per_body" else 1)  # (13)-(14): two each
         state: State = _blank_state(
@@ -209,13 +209,13 @@ class System:
         return {"mass_matrix": mass, "lower": lower}
 
     def advance_under(self, law: Any) -> Entry:
-        """The compiled step of one of the engine's laws, to be called again and again (cached)."""
+        """Return the compiled step of one of the engine's laws, for repeated calls (cached)."""
         return self._advances.setdefault(_key(law), Entry(advance))
 
     def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Port:
-        """Hand, coupling and device at the scene's start; `external`: the device moves by itself.
+        """Return hand, coupling and device at the scene's start; an `external` device moves by itself.
 
-        `effects` is what `decide` gives for the law; default: of ImpulseAugmented().
+        `effects` is the result of `decide` for the law; default: for ImpulseAugmented().
         """
         decided = self.decide(ImpulseAugmented(), coupling) if effects is None else effects
         on = active_names(decided) & _OF_PORT
@@ -227,14 +227,14 @@ class System:
 
     @cached_property
     def _of_port(self) -> tuple[Any, ...]:
-        """What the scene says of the hand's side, but for its force."""
+        """The scene's values for hand and device, without the force of the hand."""
         hand, places = self.scene.hand, (values.tobytes() for values in self.start)
         held = None if hand is None else (hand.body, repr(hand.point), hand.changes)
         return held, self.scene.model_dump_json(include={"device", "rate"}), *places
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
-        """What is on under a law and a coupling: the world, the port and the record are made from it."""
-        if type(law) not in (ImpulseAugmented, Penalty):  # one of a user's own may say something else each time
+        """Return the effects under a law and a coupling; the world, the port and the record are made from them."""
+        if type(law) not in (ImpulseAugmented, Penalty):  # a law of the user may answer differently each time
             return decide_for(self.scene, self._facts, law, coupling)
         key = law, *_gains_of(coupling)
         if key not in self._effects:
@@ -248,16 +248,16 @@ class System:
                      tuple(frictions.tolist()))
 
 
-_OF_PORT = frozenset({"delay", "quantisation", "waveform", "device_damping", "device_limits"})  # effects in a port
+_OF_PORT = frozenset({"delay", "quantisation", "waveform", "device_damping", "device_limits"})  # effects of a port
 
 
 def _gains_of(coupling: Coupling | None) -> tuple[Any, ...]:
-    """What a port and the effects depend on besides scene and law."""
+    """Return the key of a coupling: what a port and the effects depend on besides scene and law."""
     return (None,) if coupling is None else (coupling.kind, *map(tuple, coupling.settings.values()))
 
 
 def _key(law: Any) -> tuple[Any, ...]:
-    """What a world depends on besides the scene."""
+    """Return the key of a law: what a world depends on besides the scene."""
     return law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.impulses and law.pushing
 
 
@@ -265,12 +265,12 @@ _SYSTEMS: dict[int, System] = {}  # by the identity of the scene, which the syst
 
 
 def system_of(scene: Scene) -> System:
-    """Return the system of a scene, the same for the same scene: a scene never changes, nor does its system."""
+    """Return the system of a scene, cached by the scene's identity; neither of them ever changes."""
     return kept(_SYSTEMS, id(scene), lambda: System(scene))
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:
-    """The coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
+    """Return the coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
     if name == "none":
         return NoCoupling()
     kinds: dict[str, tuple[Callable[..., Coupling], Any]] = {
@@ -287,7 +287,7 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
 
 
 def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
-    """Collect the parameters of the scene and the switches of its effects under a law."""
+    """Return the parameters of the scene and the switches of its effects under a law."""
     scene, contact, mechanism = system.scene, system.scene.contact, system.mechanism
     limit = np.full(mechanism.nv, np.inf)
     on = active_names(effects)
@@ -322,7 +322,7 @@ def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
 
 
 def make_stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
-    """The ends of the joints' ranges as arrays; they are numbered behind the `shapes`."""
+    """Return the joint limits as arrays; their numbers follow those of the `shapes`."""
     found = stops_of(scene, mechanism)
     body, parent = (np.array([getattr(stop, name) for stop in found], np.int64) for name in ("body", "parent"))
     sign, bound, arm = (np.array([getattr(stop, name) for stop in found]) for name in ("sign", "bound", "arm"))
@@ -331,13 +331,13 @@ def make_stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
 
 
 def slides_in_impacts(scene: Scene) -> bool:
-    """Whether a law with friction in impacts has any here; rows (13)-(14) of one body alone have no slip to stop."""
+    """Whether impacts of this scene can have friction; per-body rows (13)-(14) have no slip, so they have none."""
     return largest_friction(scene) > 0.0 and scene.contact.self_collision_rows == "relative"
 
 
 @lru_cache(maxsize=8)
 def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int, sliding: bool, rubbing: bool) -> Any:
-    """A state of these sizes, of which twins are used; scenes that differ in values alone have the same."""
+    """Make a state of these sizes, of which twins are used; scenes with equal sizes share it."""
     bodies, trees, nq, d, largest_tree = sizes
     vectors = {name: np.zeros(d) for name in (
         "v", "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
@@ -364,7 +364,7 @@ def _largest_tree(mechanism: Mechanism) -> int:
 
 
 def _make_log(trees: int, d: int) -> Any:
-    """An empty log; what a law written in Python says nothing of stays as it is here."""
+    """Return an empty log with the defaults for fields that a law written in Python does not set."""
     lines = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
     for name in ("scale", "clamp", "friction_share", "solved"):
         lines[name][:] = 1
@@ -373,10 +373,10 @@ def _make_log(trees: int, d: int) -> Any:
 
 
 def _make_port(system: System, coupling: Coupling, on: frozenset[str], external: bool = False) -> Any:
-    """Allocate the hand's side: the device starts where the tool does, with its velocity.
+    """Allocate hand, coupling and device; the device starts at the tool's position with the tool's velocity.
 
-    `on` are the names of the effects that are on; `external` says that the device moves by itself: it is late and
-    coarse by itself, so the port adds neither delay nor sensors.
+    `on` holds the names of the active effects. An `external` device has its own delay and sensor resolution, so the
+    port adds neither.
     """
     on -= {"delay", "quantisation"} if external else set()
     scene, d = system.scene, system.mechanism.nv
@@ -407,12 +407,12 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
 
 
 def _force_limit(scene: Scene) -> tuple[float, ...] | None:
-    """The device's limits [N, N m], None where the scene gives none."""
+    """Return the device's force limits [N, N m]; None if the scene gives none."""
     return scene.device.force_limit if scene.device is not None else None
 
 
 def _hand(system: System, device: Any) -> dict[str, Any]:
-    """Which body is held, where, and how it is pushed."""
+    """Return the port's fields for the hand: held body, point and force."""
     hand, wrench, point = system.scene.hand, np.zeros(6), np.zeros(3)
     if hand is None:
         return {"hand_body": -1, "device_body": -1, "hand_point": point, "wrench": wrench,
@@ -423,7 +423,7 @@ def _hand(system: System, device: Any) -> dict[str, Any]:
 
 
 def wrenches_of(scene: Scene, times: Sequence[float]) -> Floats:
-    """Force and torque (n, 6) of the scene's hand at times [s], world axes; zeros without a hand."""
+    """Return force and torque (n, 6) of the scene's hand at n times [s] in world axes; zeros without a hand."""
     if scene.hand is None:
         return np.zeros((len(times), 6))
     forces = np.array(scene.hand.forces(times))
@@ -435,13 +435,13 @@ def wrenches_of(scene: Scene, times: Sequence[float]) -> Floats:
 def _gains(coupling: Coupling, size: int) -> dict[str, Any]:
     gains = coupling.settings if not isinstance(coupling, NoCoupling) else {}
     for name, values in gains.items():
-        if len(values) != size:  # the kernels would read past the end
+        if len(values) != size:  # else the kernels would read past the end
             raise ArgumentError(f"coupling {name}", values, f"{size} values, one for each coordinate of the tool")
     return {name: _per_coordinate(gains.get(name), size) for name in ("stiffness", "damping")}
 
 
 def _actuators(scene: Scene, sizes: tuple[int, int], on: frozenset[str]) -> dict[str, Any]:
-    """What the device adds: limits, damping, sensors, delay."""
+    """Return the port's fields for the device: limits, damping, sensor resolution and delay."""
     (nq, size), settings, limit = sizes, scene.device, _force_limit(scene)
     damped, limited, quantised = ("device_damping" in on, "device_limits" in on, "quantisation" in on)
     slots = 1 + (settings.delay if settings is not None and "delay" in on else 0)
@@ -456,7 +456,7 @@ def _actuators(scene: Scene, sizes: tuple[int, int], on: frozenset[str]) -> dict
 
 
 def _pulses(scene: Scene, dt: float, size: int, shaped: bool) -> dict[str, Any]:
-    """How the device gives an impulse to the hand."""
+    """Return the port's fields for the waveform by which the device renders an impulse."""
     weights = waveform_weights(scene.device.waveform if shaped and scene.device else "step", dt)
     return {"pulsed": len(weights) > 1, "pulse_weights": weights, "pulse_pending": np.zeros((len(weights), size)),
             "pulse_balance": np.zeros(1), "pulse_held": np.zeros(1, np.int64)}

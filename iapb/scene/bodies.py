@@ -1,7 +1,7 @@
-"""What a scene holds in the plane and in space: shapes, walls and moving bodies. Lengths in metres, angles in radians.
+"""Shapes, walls and moving bodies of a scene, in the plane and in space. Lengths are in metres, angles in radians.
 
-In space the angles of placements are roll, pitch and yaw about the fixed x, y and z axes, in this order, as in URDF.
-Quaternions are x, y, z, w.
+In space, placements have the angles roll, pitch and yaw about the fixed x, y and z axes, in this order, as in URDF.
+Quaternions are written x, y, z, w.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from iapb.scene.parts import (
     located,
 )
 
-INERTIAL = ("mass", "center_of_mass", "inertia")  # what a density gives
-WORLD = "world"  # the parent of a body that hangs on nothing
+INERTIAL = ("mass", "center_of_mass", "inertia")  # fields that a density replaces
+WORLD = "world"  # the parent of a root body
 ORIGIN = (0.0, 0.0, 0.0)
 MAX_SHAPES_OF_BODY = 64
-MAX_VERTICES = 256  # a polygon with more is a circle
-UNIT_TOLERANCE = 1e-6  # length of a quaternion as written: six digits are enough
-_STRAIGHT = 1e-9  # sine of the smallest turn that counts as a corner: below it, rounding decides convexity
+MAX_VERTICES = 256  # use a circle for more
+UNIT_TOLERANCE = 1e-6  # error of a written quaternion's length: six digits are enough
+_STRAIGHT = 1e-9  # sine of the smallest turn at a corner; below it, rounding errors would decide convexity
 
 
 def with_direction(vector: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the vector if it has a direction; its length is left as written."""
-    if math.hypot(*vector) < 1e-9:  # shorter, its direction would be decided by rounding of its parts
+    """Return the vector unchanged if its length is at least 1e-9, so that it has a direction."""
+    if math.hypot(*vector) < 1e-9:  # the direction of a shorter one would be rounding error
         raise expectation("a vector with a direction (length at least 1e-9)")
     return vector
 
@@ -98,7 +98,7 @@ class Polygon(Part):
 
 
 def _turn(before: Vector2, at: Vector2, after: Vector2) -> float:
-    """Return the angle by which the outline turns at a corner [rad]; 0 where two corners coincide."""
+    """Return the angle by which the outline turns at a corner [rad]; 0 if two corners coincide."""
     ux, uy = at[0] - before[0], at[1] - before[1]
     vx, vy = after[0] - at[0], after[1] - at[1]
     return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
@@ -124,7 +124,7 @@ class Ball(Part):
     center: Vector3 = Field(ORIGIN, description="its centre [m], in body axes (walls: world axes)")
 
 
-# Walls: shapes of the static world, and half of it
+# Walls: shapes of the static world, half-planes and half-spaces
 
 
 class _OfWall(Part):
@@ -134,7 +134,7 @@ class _OfWall(Part):
 
 
 class HalfPlaneWall(_OfWall):
-    """A straight wall without end; solid on the side that the normal points away from."""
+    """An infinite straight wall; the side opposite to the normal is solid."""
 
     kind: Literal["half_plane"] = Field(description="everything behind a straight line")
     point: Vector2 = Field(description="a point of the surface [m], world axes")
@@ -144,7 +144,7 @@ class HalfPlaneWall(_OfWall):
 
 
 class HalfSpaceWall(_OfWall):
-    """A flat wall without end; solid on the side that the normal points away from."""
+    """An infinite flat wall; the side opposite to the normal is solid."""
 
     kind: Literal["half_space"] = Field(description="everything behind a plane")
     point: Vector3 = Field(description="a point of the surface [m], world axes")
@@ -182,7 +182,7 @@ SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminat
 # Moving bodies
 
 _DENSITY: TypeAdapter[float] = TypeAdapter(Positive)
-LIMITED = ("revolute", "prismatic")  # the joints that can have limits: one coordinate that is a length or an angle
+LIMITED = ("revolute", "prismatic")  # joints that can have limits: their one coordinate is a length or an angle
 
 JointDamping = Annotated[
     tuple[NonNegative, ...],
@@ -196,23 +196,23 @@ JointLimits = Annotated[
 
 
 class _AnyBody(Part):
-    """What a joint asks of its body's numbers, in the plane and in space."""
+    """Checks of a body's values against its joint, in the plane and in space."""
 
-    _shapes: ClassVar[TypeAdapter[Any]]  # how its shapes are read
-    with_axis: ClassVar[tuple[str, ...]]  # the joints that have an axis
-    an_axis: ClassVar[str]  # what one looks like
+    _shapes: ClassVar[TypeAdapter[Any]]  # parser of its shapes
+    with_axis: ClassVar[tuple[str, ...]]  # joints that have an axis
+    an_axis: ClassVar[str]  # an example of an axis
 
     @model_validator(mode="before")
     @classmethod
     def _filled(cls, given: Any) -> Any:
-        """Turn a density into mass, centre of mass and inertia; one that cannot be is left for `across_fields`."""
+        """Replace a density by mass, centre of mass and inertia; `across_fields` reports an invalid one."""
         density = given.get("density") if isinstance(given, dict) else None
         if not isinstance(density, int | float) or isinstance(density, bool) or any(given.get(x) for x in INERTIAL):
             return given
         try:
             shapes, value = cls._shapes.validate_python(given.get("shapes") or ()), _DENSITY.validate_python(density)
             inertial = filled(shapes, value, spatial=cls.an_axis.count(",") == 2) if shapes else {}
-        except (ValidationError, ZeroDivisionError):  # no shapes, or of an area that rounds to nothing
+        except (ValidationError, ZeroDivisionError):  # invalid shapes, or an area that rounds to zero
             return given
         plain = {name: value for name, value in given.items() if name not in ("density", *INERTIAL)}
         return plain | inertial if inertial else given
@@ -293,9 +293,9 @@ class _AnyBody(Part):
 class Body(_AnyBody):
     """A rigid body of a tree.
 
-    The joint frame lies at `origin`, turned by `angle`, in the parent body's frame; the joint moves the body
-    frame away from it. Every moving body carries what its own joint accelerates, so that the mass matrix is
-    positive definite in every configuration.
+    The joint frame has the position `origin` and the rotation `angle` in the parent body's frame. The joint moves the
+    body frame relative to the joint frame. Every moving body has the mass or inertia that its joint accelerates, so the
+    mass matrix is positive definite in every configuration.
     """
 
     _shapes = TypeAdapter(tuple[Shape, ...])
@@ -394,7 +394,7 @@ class SpatialBody(_AnyBody):
 
 
 def inertia_matrix(inertia: Any) -> list[list[float]]:
-    """Return the (3, 3) matrix that three, six or nine numbers stand for."""
+    """Return the inertia matrix (3, 3) given by three, six or nine numbers."""
     if isinstance(inertia[0], (tuple, list)):
         return [list(row) for row in inertia]
     xx, yy, zz, xy, xz, yz = inertia if len(inertia) == 6 else (*inertia, 0.0, 0.0, 0.0)
@@ -402,9 +402,9 @@ def inertia_matrix(inertia: Any) -> list[list[float]]:
 
 
 def _least_eigenvalue_reaches(matrix: list[list[float]], least: float) -> bool:
-    """Return whether all eigenvalues of a symmetric (3, 3) matrix are at least `least`; decided exactly.
+    """Return whether all eigenvalues of a symmetric (3, 3) matrix are at least `least`, in exact arithmetic.
 
-    So they are where no principal minor of the matrix less `least` on its diagonal is negative.
+    This holds if and only if no principal minor of matrix − `least` · 1 is negative.
     """
     (a, b, c), (_, d, e), (_, _, f) = [[Exact(x) for x in row] for row in matrix]
     a, d, f = (x - Exact(least) for x in (a, d, f))

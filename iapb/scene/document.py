@@ -1,7 +1,7 @@
-"""YAML text to plain values, each with its line and column, and back. Safe: no tags, bounded size, depth and expansion.
+"""Convert YAML text to plain values with line and column, and back. Tags are refused; size and depth are bounded.
 
-Only ruamel's event stream is used, so nothing is ever constructed that is not a number, text, truth value, list or
-mapping; scalars follow YAML 1.2 (``1e-3`` is a number, ``yes`` is a text).
+Only ruamel's event stream is used, so the reader makes only numbers, texts, truth values, lists and mappings. Scalars
+follow YAML 1.2 (``1e-3`` is a number, ``yes`` is a text).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 MAX_CHARACTERS = 1_000_000
-MAX_DEPTH = 24  # the deepest legal value, a vertex of a shape of a body, lies at depth 7
-MAX_NODES = 100_000  # values and field names, aliases expanded: a small file cannot grow without bound
-MAX_REPEATED = 100  # repeated fields: more is not a slip, and no list to read
+MAX_DEPTH = 24  # the deepest valid value, a vertex of a body's shape, has depth 7
+MAX_NODES = 100_000  # values and field names after expansion of aliases, which could make a small file huge
+MAX_REPEATED = 100  # largest number of repeated fields to report
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}\Z")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
 _WORDS: dict[str, Any] = {
@@ -23,23 +23,23 @@ _WORDS: dict[str, Any] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-_PLAIN = re.compile(r"[A-Za-z_][\w ./()*+-]*(?<! )", re.ASCII)  # a text that YAML reads as itself without quotes
-_OTHERWISE = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")  # but for these
+_PLAIN = re.compile(r"[A-Za-z_][\w ./()*+-]*(?<! )", re.ASCII)  # a text that needs no quotes in YAML
+_OTHERWISE = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")  # these need quotes all the same
 Place = tuple[int, int]  # line and column, from 1
 
 
 @dataclass
 class Node:
-    """A value of the document and where it stands (line and column count from 1)."""
+    """A value of the document and its place (line and column count from 1)."""
 
     value: Any
     place: Place
-    size: int = 1  # values and field names in it, aliases expanded
+    size: int = 1  # number of values and field names in it, after expansion of aliases
     children: dict[str | int, Node] = field(default_factory=dict)
-    keys: dict[str, Place] = field(default_factory=dict)  # where each key of a mapping stands
+    keys: dict[str, Place] = field(default_factory=dict)  # place of each key of a mapping
 
     def stands_at(self, path: tuple[str | int, ...], key: bool = False) -> Place:
-        """Return the place of a value below (or of its key); of the nearest part around it where it is absent."""
+        """Return the place of a nested value or of its key; if it is absent, of the nearest value around it."""
         node = self
         for step in path:
             if key and step == path[-1] and step in node.keys:
@@ -51,7 +51,7 @@ class Node:
 
 
 class DocumentError(Exception):
-    """The text is no document that a scene can be read from; one mistake with its place."""
+    """The text is not a document of plain values; the error has one mistake with its place."""
 
     def __init__(self, place: Place, value: str, expected: str) -> None:
         self.place, self.value, self.expected = place, value, expected
@@ -72,7 +72,7 @@ def read_document(text: str) -> tuple[Node, list[Repeated]]:
     Raises
     ------
     DocumentError
-        where the text is not YAML, or leaves the bounds above.
+        The text is not YAML, or exceeds the bounds above.
     """
     if len(text) > MAX_CHARACTERS:
         raise DocumentError((1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
@@ -90,12 +90,12 @@ def _events(text: str) -> Iterator[Any]:
         mark = failure.problem_mark or failure.context_mark
         place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         raise DocumentError(place, "(not YAML)", f"valid YAML: {failure.problem or failure}") from failure
-    except (YAMLError, ValueError, OverflowError) as failure:  # a character that YAML has not: no mark, only text
+    except (YAMLError, ValueError, OverflowError) as failure:  # a character that YAML forbids: the error has no mark
         raise DocumentError((1, 1), "(not YAML)", f"valid YAML: {' '.join(str(failure).split())}") from failure
 
 
 class _Builder:
-    """Builds nodes from events; one event is taken at a time, so that a bound stops the reader early."""
+    """Builds nodes from events, one event at a time, so that a bound stops the reader early."""
 
     def __init__(self, events: Iterator[Any]) -> None:
         self.events = events
@@ -141,7 +141,7 @@ class _Builder:
         return node
 
     def alias(self, event: Any) -> Node:
-        """Return the node that an alias stands for."""
+        """Return the node that an alias refers to."""
         node = self.anchors.get(event.anchor)
         if node is None:
             known = event.anchor in self.anchors
@@ -194,7 +194,7 @@ def scalar(text: str) -> Any:
 
 
 def block_lines(fields: dict[str, Any], indent: str = "") -> Iterator[str]:
-    """Yield the lines of a mapping; a list or mapping of nothing but plain values stands on one line."""
+    """Yield the lines of a mapping; a list or mapping without nested ones is written on one line."""
     for name, value in fields.items():
         if not any(isinstance(item, dict | list) for item in (value.values() if isinstance(value, dict) else
                                                               value if isinstance(value, list) else ())):
@@ -211,7 +211,7 @@ def block_lines(fields: dict[str, Any], indent: str = "") -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """A value on one line."""
+    """Return a value written on one line."""
     if isinstance(value, list):
         return f"[{', '.join(map(_flow, value))}]"
     if isinstance(value, dict):
@@ -222,5 +222,5 @@ def _flow(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text between double quotes; what cannot be printed by its code."""
+    """Return a text in double quotes, with codes for quotes, backslashes and characters that cannot be printed."""
     return '"' + "".join(f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in text) + '"'

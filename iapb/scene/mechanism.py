@@ -1,7 +1,7 @@
-"""A scene as the engine's mechanism, shapes and candidate pairs, with restitution and friction of each pair.
+"""Turn a scene into the engine's mechanism, shapes and candidate pairs, with restitution and friction of each pair.
 
-The bodies of a planar scene lie in the plane z = 0 of the spatial engine. No BLAS here: its last bits depend on the
-processor.
+The bodies of a planar scene lie in the plane z = 0 of the spatial engine. BLAS is not used here, because its last bits
+depend on the processor.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ Floats = NDArray[np.float64]
 
 _MECHANICAL = ("name", "parent", "joint", "axis", "origin", "angle", "rpy", "center_of_mass", "mass", "inertia")
 _KEPT = 8
-_MECHANISMS: dict[str, Mechanism] = {}  # by what the bodies say of it
+_MECHANISMS: dict[str, Mechanism] = {}  # by the bodies' mechanical fields as text
 
-UNSTATED = 2.0  # larger than any restitution, so that the smaller of two is the one that is given
+UNSTATED = 2.0  # larger than any restitution, so that the minimum of two is a given one
 
 
 def mechanism_of(scene: Scene) -> Mechanism:
-    """Return the scene's bodies as a mechanism, in the scene's order; q is their positions in a row.
+    """Return the scene's bodies as a mechanism, in the scene's order; q concatenates their positions.
 
-    A planar moment of inertia I about z becomes diag(I/2, I/2, I): the inertia of a flat body, so that the
-    spatial engine sees a physical one. Only its zz entry ever moves in the plane. Scenes whose bodies say the same of
-    it, to the last bit, have the same mechanism: nothing of it ever changes.
+    A planar moment of inertia I about z becomes diag(I/2, I/2, I), the inertia of a flat body, so that the spatial
+    engine gets a physical inertia. Motion in the plane depends on its zz entry alone. Scenes with identical bodies
+    share one mechanism, because a mechanism never changes.
     """
     said = repr([[getattr(body, name, None) for name in _MECHANICAL] for body in scene.bodies])
     return kept(_MECHANISMS, said, lambda: Mechanism(_body_in_space(body) for body in scene.bodies))
@@ -49,7 +49,7 @@ Made = TypeVar("Made")
 
 
 def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
-    """Return what a store keeps under a key, made where it is not there; it keeps the few that were asked for last."""
+    """Return the value of a key in a cache, made if it is absent; the cache keeps the last `_KEPT` used values."""
     found = store.pop(key, None)
     store[key] = found = make() if found is None else found
     while len(store) > _KEPT:
@@ -58,7 +58,7 @@ def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:
-    """Return the scene's first configuration q (nq,) and velocity v (nv,)."""
+    """Return the scene's start: configuration q (nq,) and velocity v (nv,)."""
     q = [x for body in scene.bodies for x in body.position]
     v = [x for body in scene.bodies for x in body.velocity]
     return np.array(q, np.float64), np.array(v, np.float64)
@@ -67,7 +67,7 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
 def shapes_of(scene: Scene) -> Shapes:
     """Return the scene's shapes: those of the bodies in order, then the walls.
 
-    A shape of a body that nothing moves (fixed to the world through and through) is static, like a wall.
+    A shape of a body that cannot move (all joints between it and the world are fixed) is static, like a wall.
     """
     frames = _frames(scene)
     described = [_described(shape, frames[owner]) for owner, shape in _owned_shapes(scene)]
@@ -77,10 +77,10 @@ def shapes_of(scene: Scene) -> Shapes:
 
 
 def pairs_of(scene: Scene, shapes: Shapes) -> NDArray[np.int32]:
-    """Return the candidate pairs (k, 2) among the scene's shapes (`shapes_of`), the first of a moving body.
+    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of a moving body.
 
-    Bodies of one tree are paired only where ``contact.self_collisions`` asks for it, and never when they are
-    rigidly connected or neighbours across one joint: these touch by construction.
+    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies and neighbours across
+    one joint are never paired, because they touch by construction.
     """
     owners = [owner for owner, _ in _owned_shapes(scene)]
     links = _Links(scene)
@@ -89,13 +89,13 @@ def pairs_of(scene: Scene, shapes: Shapes) -> NDArray[np.int32]:
 
 
 class _Links:
-    """Which bodies hang together: by a weld (one rigid part), across one joint, or in one tree."""
+    """Connections of bodies: in one rigid part, across one joint, or in one tree."""
 
     def __init__(self, scene: Scene) -> None:
         self.self_collisions = scene.contact.self_collisions
-        self.root: list[int] = []  # of each body: the first body of its tree
-        self.part: list[int] = []  # of each body: the first body of its rigid part
-        self.carrier: dict[int, int] = {}  # of each part: the part that its joint sits on, -1 = the world
+        self.root: list[int] = []  # body -> first body of its tree
+        self.part: list[int] = []  # body -> first body of its rigid part
+        self.carrier: dict[int, int] = {}  # rigid part -> rigid part that carries its joint, -1 = the world
         for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
             welded = body.joint == "fixed" and parent >= 0
             self.root.append(i if parent < 0 else self.root[parent])
@@ -125,7 +125,7 @@ def _owned_shapes(scene: Scene) -> list[tuple[int, Any]]:
 
 
 def _turn(placed: Any) -> Floats:
-    """Return the rotation of something with a placement: (3, 3) in space, (2, 2) in the plane."""
+    """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
     if hasattr(placed, "rpy"):
         return rotation_of(placed.rpy)
     sin, cos = sine_cosine(float(placed.angle))
@@ -149,7 +149,7 @@ def _body_in_space(body: Any) -> Body:
 
 
 class _Frame(NamedTuple):
-    """Where a shape's numbers are written: the body that carries it (-1 = static), turn and shift to its frame."""
+    """Frame of a shape's coordinates: its body (-1 = static), and the rotation and shift into the body's frame."""
 
     body: int
     rotation: Floats
@@ -157,7 +157,7 @@ class _Frame(NamedTuple):
 
 
 def _frames(scene: Scene) -> list[_Frame]:
-    """Return the frame of each body's shapes, and last that of the walls; what nothing moves is in world axes."""
+    """Return the frame of each body's shapes, and last that of the walls; static bodies get world axes."""
     n = 3 if isinstance(scene, SpatialScene) else 2
     parents = _parents(scene)
     frames = []
@@ -172,7 +172,7 @@ def _frames(scene: Scene) -> list[_Frame]:
 
 
 def _described(shape: Any, frame: _Frame) -> Any:
-    """Return a shape of the scene as the narrow phase describes it."""
+    """Return a shape of the scene as the narrow phase's class of shape."""
     if shape.kind == "half_plane":
         return geometry.HalfPlane(shape.point, shape.normal)
     if shape.kind == "half_space":
@@ -194,24 +194,23 @@ def _box_corners(width: float, height: float) -> Floats:
 
 
 class Stop(NamedTuple):
-    """One end of a joint's range, as a contact between the joint's body and its parent.
+    """One limit of a joint, as a contact between the joint's body and its parent.
 
-    The gap is arm · sign · (position − bound) [m]: the way to the bound of a point that the joint carries on that arm.
+    The gap is arm · sign · (position − bound) [m]: the distance to the bound of a point on that arm.
     """
 
     body: int
     parent: int  # −1 = the world
     sign: float  # 1 for the least position, −1 for the largest
     bound: float  # [rad, m]
-    arm: float  # [m]; of a prismatic joint 1
+    arm: float  # [m]; 1 for a prismatic joint
 
 
 def stops_of(scene: Scene, mechanism: Mechanism) -> tuple[Stop, ...]:
-    """Return the ends of the joints' ranges, two for each joint with limits.
+    """Return the limits of the joints as stops, two for each joint with limits.
 
-    A revolute joint stops on the radius of gyration about its axis of all that it carries, placed as at the start. So
-    what hangs on it meets the stop with its whole mass, and the contact section's numbers mean what they mean at a
-    contact.
+    The arm of a revolute joint is the radius of gyration, about its axis, of all bodies that it carries, in the pose of
+    the start. The effective mass at the stop is then their whole mass, and stiffness and damping act as at a contact.
     """
     if not _stop_count(scene):
         return ()
@@ -234,14 +233,14 @@ def _stop_count(scene: Scene) -> int:
 
 
 def _stopping_arm(inertia: float, mass: float) -> float:
-    """Radius of gyration [m]; 1 where there is no mass."""
+    """Return the radius of gyration [m]; 1 without mass or inertia."""
     return math.sqrt(inertia / mass) if inertia > 0.0 and mass > 0.0 else 1.0
 
 
 def restitution_by_shape(scene: Scene) -> Floats:
-    """Return what the body or wall of each shape gives (n,), UNSTATED where none; in the order of `shapes_of`.
+    """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives none.
 
-    The joints' stops follow, which give none.
+    The shapes have the order of `shapes_of`. The stops of the joints follow; they give no restitution.
     """
     given = [body.restitution for body in scene.bodies for _ in body.shapes]
     given += [wall.restitution for wall in scene.walls]
@@ -252,9 +251,9 @@ def restitution_by_shape(scene: Scene) -> Floats:
 def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
     """Return e of each candidate pair (k, 2) of shapes.
 
-    The rule is the smaller of the two values given; a body or wall that gives none takes the other's, and where
-    neither gives one `contact.restitution` holds. So equal values stay what they are to the last bit, and a soft
-    thing is soft against everything.
+    The smaller of the two given values counts. If only one of the two gives a value, that value counts; if neither
+    does, `contact.restitution` counts. So equal values are kept to the last bit, and a soft body is soft against
+    everything.
     """
     own = restitution_by_shape(scene)
     smaller = np.minimum(own[pairs[:, 0]], own[pairs[:, 1]])
@@ -262,24 +261,24 @@ def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
 
 
 def restitutions_of(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
-    """Return the different values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
+    """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
     stops = [scene.contact.restitution] if _stop_count(scene) else []
     return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
 
 
 class Frictions(NamedTuple):
-    """Coefficients of friction by classes of shapes that are alike: table (k, k), and the class (n,) of each shape."""
+    """Coefficients of friction by class of shape: a table (k, k) for two classes, and the class (n,) of each shape."""
 
     class_of_shape: NDArray[np.int64]
     table: Floats
 
 
 def frictions_of(scene: Scene) -> Frictions:
-    """Return mu of any two shapes, in the order of `shapes_of`; the joints' stops follow, which have none.
+    """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with mu = 0.
 
-    What `contact.friction_pairs` says of two things comes first. Else it is the geometric mean of the two values given,
-    as for the roughness of two surfaces; a body or wall that gives none takes the other's, and where neither gives one
-    `contact.friction` holds. So equal values stay what they are, and on ice everything slides.
+    A value of `contact.friction_pairs` comes first. Otherwise mu is the geometric mean of the two given values. If only
+    one of the two gives a value, that value counts; if neither does, `contact.friction` counts. So equal values are
+    kept to the last bit, and everything slides on a body with mu = 0.
     """
     owners = [(body.name, body.friction) for body in scene.bodies for _ in body.shapes]
     owners += [(wall.name, wall.friction) for wall in scene.walls]
@@ -314,7 +313,7 @@ def friction_of_pairs(frictions: Frictions, pairs: NDArray[np.int32]) -> Floats:
 
 
 def largest_friction(scene: Scene) -> float:
-    """Return the largest mu that any two things of the scene can have."""
+    """Return the largest mu among all values that the scene gives."""
     things = (*scene.bodies, *scene.walls)
     return max([scene.contact.friction, *(pair.friction for pair in scene.contact.friction_pairs),
                 *(thing.friction for thing in things if thing.friction is not None)])
@@ -327,12 +326,12 @@ def joint_damping_of(scene: Scene) -> Floats:
 
 
 def one_restitution(scene: Scene, pairs: NDArray[np.int32]) -> float:
-    """Return e where all pairs have the same one; for laws that know no other case.
+    """Return the common e of all pairs, for laws that need one value.
 
     Raises
     ------
     ArgumentError
-        Pairs differ.
+        The pairs have different values.
     """
     values = restitutions_of(scene, pairs)
     if len(values) > 1:

@@ -1,6 +1,6 @@
-"""Scene: everything a scene file may say, in the plane and in space. A scene never names a contact law.
+"""Scene: the fields of a scene file, in the plane and in space. A scene never names a contact law.
 
-A file with ``dimensions: 3`` is a scene in space: its vectors have three numbers, everything else is as in the plane.
+A file with ``dimensions: 3`` is a scene in space. Its vectors have three numbers; everything else is as in the plane.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ from iapb.scene.robots import Robot
 MAX_BODIES = 2000
 MAX_WALLS = 2000
 MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
-MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a slip of the pen, and would not end
-MAX_PAIRS = 1000  # of things with a friction of their own
-MAX_ROWS = 100_000  # of a hand's force over time
-MAX_DELAY = 1000  # steps; a longer delay is a broken line
-AUTO = ("stiffness", "damping", "coherence_distance")  # of a contact: what `auto` chooses where it is not given
+MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a mistake
+MAX_PAIRS = 1000  # pairs with their own friction
+MAX_ROWS = 100_000  # rows of a hand's force over time
+MAX_DELAY = 1000  # steps
+AUTO = ("stiffness", "damping", "coherence_distance")  # contact fields that `auto` chooses if they are not given
 PerCoordinate = tuple[NonNegative, ...]
 
 
 class FrictionPair(Part):
-    """The friction of two things, whatever each gives by itself."""
+    """The friction of one pair of things; it replaces the values that each of them gives."""
 
     between: tuple[Name, Name] = Field(description="names of two bodies, or of a body and a wall")
     friction: NonNegative = Field(description="coefficient mu [1] where these two touch")
 
 
 class Contact(Part):
-    """How contacts behave. The defaults are the paper's where it gives a number, ours where it does not."""
+    """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
 
     auto: Annotated[bool, Field(strict=True)] = Field(
         False,
@@ -108,9 +108,9 @@ class Contact(Part):
 
 
 class Hand(Part):
-    """The hand: a force on one body; a constant one is the worst case for stability (paper, section VI).
+    """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).
 
-    What `force`, `force_table` and `force_function` give is added. Each step has the force of its beginning.
+    The force is the sum of `force`, `force_table` and `force_function`, evaluated at the start of each step.
     """
 
     body: Name = Field(description="the body that the hand holds")
@@ -158,7 +158,7 @@ class Hand(Part):
         Raises
         ------
         IapbError
-            An expression has no finite value there.
+            An expression has no finite value at one of the times.
         """
         functions = [function_of(text) for text in self.force_function]
         found = []
@@ -170,13 +170,13 @@ class Hand(Part):
         return found
 
     def largest_force(self) -> float:
-        """Return the length of the largest force [N] of force and table, and that of the functions at the start."""
+        """Return the magnitude of the largest force [N] at t = 0 and at the times of the table's rows."""
         times = [0.0, *(row[0] for row in self.force_table)]
         return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in self.forces(times))
 
 
 def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
-    """Return the row at a time, linear between two."""
+    """Return the force at a time, by linear interpolation between the rows."""
     k = bisect.bisect_right(rows, time, key=lambda row: row[0])
     if k == 0 or k == len(rows):
         return list(rows[0 if k == 0 else -1][1:])
@@ -198,7 +198,7 @@ Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"
 
 
 class Device(Part):
-    """The haptic device: kinematically the tool's equal, so its lists have one number per tool coordinate."""
+    """The haptic device. It has the tool's kinematics, so its lists have one number per tool coordinate."""
 
     force_limit: tuple[Positive, ...] | None = Field(
         None, description="largest force per coordinate [N, N m]; default: no limit"
@@ -225,7 +225,7 @@ class Gains(Part):
 
 
 class Couplings(Part):
-    """Gains of the couplings that the scene can be held with; which one is used, the caller says."""
+    """Gains of the couplings; the caller chooses which coupling is used."""
 
     four_channel: Gains | None = Field(None, description="K_coord and B_coord of Table I")
     unilateral: Gains | None = Field(None, description="K_cpl and B_cpl of Table I")
@@ -258,8 +258,8 @@ class Scene(Part):
     )
 
     _source_text: str = PrivateAttr("")
-    _remark: str = PrivateAttr("")  # of a text that is not written yet
-    _file: str = PrivateAttr("")  # whose text that is, where it was read from one
+    _remark: str = PrivateAttr("")  # comment for a text that is not written yet
+    _file: str = PrivateAttr("")  # file that the text was read from, if any
 
     @field_validator("contact", mode="before")
     @classmethod
@@ -290,17 +290,17 @@ class Scene(Part):
 
     @property
     def source_text(self) -> str:
-        """The YAML text that gives this scene."""
+        """The YAML text of this scene."""
         if self._remark:
             self._source_text, self._remark = scene_text(self, self._remark), ""
         return self._source_text
 
     def __eq__(self, other: Any) -> bool:
-        """Whether kind, values and text are the same."""
+        """Return whether kind, values and text are the same."""
         return isinstance(other, Scene) and self.source_text == other.source_text and super().__eq__(other)
 
     def place_of(self, *path: str | int) -> str:
-        """Return where a field stands: "file:line:column: " if the scene was read from a file, else empty."""
+        """Return the place of a field as "file:line:column: "; empty if the scene was not read from a file."""
         if not self._file:
             return ""
         line, column = read_document(self._source_text)[0].stands_at(path)
@@ -309,7 +309,7 @@ class Scene(Part):
     def resolved(self) -> dict[str, Any]:
         """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings.
 
-        What `contact.auto` is to choose has no value yet, and is left out.
+        Fields that `contact.auto` will choose have no value yet and are left out.
         """
         plain = self.model_dump(mode="json")
         for name in AUTO if self.contact.auto else ():
@@ -329,9 +329,9 @@ class Scene(Part):
         Raises
         ------
         ArgumentError
-            a path that leads nowhere.
+            a path does not exist.
         SceneError
-            values that a scene cannot take; all of them, each with its path.
+            values are invalid; the error lists all of them with their paths.
         """
         plain = self.resolved()
         for path, value in values.items():
@@ -345,21 +345,21 @@ class Scene(Part):
 
 
     def with_hand_force(self, function: Callable[[float], Any]) -> Self:
-        """Return a copy whose hand pushes with function(t), t [s] at the start of each step, in place of its force.
+        """Return a copy whose hand pushes with function(t) in place of its force, at the start t [s] of each step.
 
-        The values stand in the copy as `hand.force_table`, so that a run records what was done.
+        The copy has the values in `hand.force_table`, so that a run records them.
 
         Parameters
         ----------
         function
-            from the time to three numbers in the plane, six in space, as `hand.force`.
+            maps the time [s] to three numbers in the plane or six in space, as in `hand.force`.
 
         Raises
         ------
         ArgumentError
-            a scene without a hand, or of more than MAX_ROWS steps; a function that returns no list of numbers.
+            the scene has no hand or more than MAX_ROWS steps, or the function does not return a list of numbers.
         SceneError
-            values that are no forces.
+            the values are not valid forces.
         """
         if self.hand is None or self.steps > MAX_ROWS:
             raise ArgumentError("scene", self.name, f"a scene with a hand and at most {MAX_ROWS:,} steps")
@@ -374,7 +374,7 @@ class Scene(Part):
 
 
 class SpatialScene(Scene):
-    """A world in space: as `Scene`, with three numbers for vectors."""
+    """A scene in space: like `Scene`, but vectors have three numbers."""
 
     dimensions: Literal[3] = Field(description="3: a scene in space; a scene without this field is planar")
     gravity: Vector3 | None = Field(None, description="acceleration [m/s2], world axes; default: none")  # type: ignore[assignment]
@@ -388,17 +388,17 @@ class SpatialScene(Scene):
 
 
 def scene_kind(given: Any) -> type[Scene]:
-    """Return which kind of scene plain values describe."""
+    """Return the class of scene that plain values describe: `SpatialScene` or `Scene`."""
     return SpatialScene if isinstance(given, dict) and "dimensions" in given else Scene
 
 
 def scene_text(scene: Scene, comment: str = "") -> str:
-    """Return YAML text that reads back as this scene, exact to the last bit."""
+    """Return the YAML text of this scene; reading it gives the same values to the last bit."""
     return "\n".join([*([f"# {comment}"] if comment else []), *block_lines(scene.resolved()), ""])
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
-    """Put a value at a dotted path of a resolved scene, unchecked; a section that is absent is made."""
+    """Set a value at a dotted path of a resolved scene, without checks; missing sections are added."""
     if not isinstance(path, str) or not path:
         raise ArgumentError("values", path, "dotted paths as keys, such as contact.friction")
     steps = path.split(".")
@@ -406,7 +406,7 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
     for i, step in enumerate(steps):
         key = _key(place, step, path)
         if i == len(steps) - 1:
-            if key == "density" and isinstance(place, dict):  # what it gives is computed anew
+            if key == "density" and isinstance(place, dict):  # mass, centre of mass and inertia follow from it
                 for name in INERTIAL:
                     place.pop(name, None)
             place[key] = _plain(value)
@@ -417,12 +417,12 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value of the caller's own: a copy, numpy arrays and numbers as plain ones."""
+    """Return a copy of a value, with numpy arrays and numbers as plain lists and numbers."""
     return value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
 
 
 def _key(place: Any, step: str, path: str) -> str | int:
-    """Return the key or index that a step of a path means in this place."""
+    """Return the dictionary key or list index that one step of a dotted path refers to."""
     if isinstance(place, dict):
         return step
     if not isinstance(place, list):
@@ -444,9 +444,9 @@ _HERE = "#/$defs/"
 
 
 def scene_schema() -> dict[str, Any]:
-    """Return the JSON Schema of scene files; every default stands in its field's description.
+    """Return the JSON Schema of scene files; the description of each field gives its default.
 
-    A file with the field `dimensions` is judged as a scene in space, any other as a planar one, as the reader does.
+    As in the reader, a file with the field `dimensions` is a scene in space, any other file a planar scene.
     """
     _, schema = models_json_schema([(model, "validation") for model in (Scene, SpatialScene, Robot)])
     parts = schema["$defs"]
@@ -465,7 +465,7 @@ def scene_schema() -> dict[str, Any]:
 def _with_robots(space: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of scenes in space with the field `robots`, which the reader turns into bodies.
 
-    A scene needs a body or a robot; where there are robots, `bodies` may be empty or left out.
+    A scene needs a body or a robot. With robots, `bodies` may be empty or left out.
     """
     robots = {"type": "array", "items": {"$ref": f"{_HERE}Robot"},
               "description": "URDF files that become bodies; default: none"}

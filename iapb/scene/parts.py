@@ -1,4 +1,4 @@
-"""What all parts of a scene share: finite bounded numbers, names, and mistakes in the words of a scene's author."""
+"""Common base of all parts of a scene: bounded numbers, names, and mistakes in terms of the scene file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from iapb.errors import Mistake, shown
 from iapb.names import nearest
 
-LARGEST_NUMBER = 1e9  # SI units; products of four such numbers stay far inside double precision
-SMALLEST_POSITIVE = 1e-12  # what must be positive is divided by; its inverse square still is an ordinary number
+LARGEST_NUMBER = 1e9  # SI units; products of four such numbers are far below the double overflow limit
+SMALLEST_POSITIVE = 1e-12  # positive values may be divisors; their inverse square must not overflow
 
 _FINITE = {"strict": True, "allow_inf_nan": False}
 Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE)]
@@ -36,33 +36,33 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=Tr
 Text = Annotated[str, Field(max_length=2000, strict=True)]
 
 
-OURS, MISSING = "scene", "scene_missing"  # types of our errors: their message is what was expected
+OURS, MISSING = "scene", "scene_missing"  # error types of this project; their message says what was expected
 
 
 def expectation(expected: str, kind: str = OURS) -> PydanticCustomError:
-    """Return the error of a field that breaks a rule of ours; its message is what was expected."""
+    """Return the error for a field that breaks a rule of this project; its message says what was expected."""
     return PydanticCustomError(kind, "{expected}", {"expected": expected})
 
 
 def located(where: tuple[str | int, ...], value: Any, expected: str, kind: str = OURS) -> InitErrorDetails:
-    """Return one mistake at a path, for a check that looks at several fields at once."""
+    """Return one mistake at a path, for a check across several fields."""
     return InitErrorDetails(type=expectation(expected, kind), loc=where, input=value)
 
 
 class Part(BaseModel):
-    """A mapping of the scene file: immutable, no field but those declared."""
+    """A mapping of the scene file; it is immutable and has only the declared fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
     @classmethod
     def across_fields(cls, given: Any) -> list[InitErrorDetails]:
-        """Return the mistakes that only show when several parts are seen together."""
+        """Return the mistakes that concern several fields together."""
         return []
 
     @model_validator(mode="wrap")
     @classmethod
     def _all_at_once(cls, given: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
-        """Report field mistakes and those across fields together; an unknown field hears the known ones."""
+        """Report mistakes of single fields and across fields together; for an unknown field, list the known ones."""
         mistakes: list[InitErrorDetails] = []
         try:
             part = validate(given)
@@ -79,7 +79,7 @@ class Part(BaseModel):
 
     @classmethod
     def _readable(cls, error: Any) -> InitErrorDetails:
-        """Turn pydantic's error into one of ours, whose message says what was expected."""
+        """Turn pydantic's error into one whose message says what was expected."""
         where, kind, value, expected = error["loc"], error["type"], error["input"], error["msg"]
         if kind not in (OURS, MISSING):
             expected = expected_of(error)
@@ -124,7 +124,7 @@ _EXPECTED = {
 
 
 def expected_of(error: Any) -> str:
-    """Return what was expected, in the words of a scene's author."""
+    """Return what was expected, in terms of the scene file."""
     template = _EXPECTED.get(error["type"])
     if template is None:
         return str(error["msg"])
@@ -132,7 +132,7 @@ def expected_of(error: Any) -> str:
 
 
 def _guess(error: Any) -> str:
-    """The word that was meant, where one of a few was expected and a given one is much like it."""
+    """Return a hint with the similar word, if one of a few words was expected and one is similar."""
     words = error.get("ctx", {})
     listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
     near = nearest(words.get("tag", error["input"]), listed) if listed else ""
@@ -140,7 +140,7 @@ def _guess(error: Any) -> str:
 
 
 def _follows_from_others(error: Any) -> bool:
-    """Return whether a list is called too short only because its wrong items were left out."""
+    """Return whether a list counts as too short only because its invalid items were left out."""
     given = error["input"]
     return error["type"] == "too_short" and len(given) >= error["ctx"]["min_length"]
 
@@ -152,7 +152,7 @@ StandsAt = Callable[[Place, bool], tuple[int, int]]  # path, whether its key is 
 
 
 def mistakes_of(failure: ValidationError, file: str, read: Any, stands_at: StandsAt | None = None) -> list[Mistake]:
-    """Return pydantic's errors about the values `read` as mistakes; line 0 where nothing tells their place."""
+    """Return pydantic's errors about the values `read` as mistakes; the line is 0 without `stands_at`."""
     return [_mistake(error, file, read, stands_at) for error in failure.errors(include_url=False)]
 
 
@@ -165,7 +165,7 @@ def _mistake(error: Any, file: str, read: Any, stands_at: StandsAt | None) -> Mi
 
 
 def _field_path(where: Place, read: Any) -> tuple[Place, bool]:
-    """Return the path in the file, without the shape kinds that pydantic puts in, and whether it exists there."""
+    """Return the path in the file, without the shape kinds that pydantic inserts, and whether it exists there."""
     path: list[str | int] = []
     exists = True
     for key in where:

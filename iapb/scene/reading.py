@@ -1,4 +1,4 @@
-"""Find and read scene files; report every mistake, each with file, line, column, field path and expectation."""
+"""Find and read scene files; report every mistake with file, line, column, field path and expected value."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def scene_folder() -> Path:
     Returns
     -------
     Path
-        inside an installed package, or in the checkout.
+        in the installed package, or in the checkout.
     """
     package = Path(__file__).resolve().parents[1]
     installed = package / "scenes"
@@ -33,7 +33,7 @@ def scene_names() -> tuple[str, ...]:
 
 
 def find_scene(name: str | Path) -> Path:
-    """Return the scene file that `name` means: a path, or the name of a scene that comes with the project.
+    """Return the scene file for `name`, which is a path or the name of a scene of the project.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ def find_scene(name: str | Path) -> Path:
     Returns
     -------
     Path
-        of a file that exists.
+        path of an existing file.
 
     Raises
     ------
     ArgumentError
-        If there is neither such a file nor such a scene; the message lists the scenes there are.
+        There is neither such a file nor such a scene; the message lists the scenes of the project.
     """
     path = Path(name)
     if path.is_file():
@@ -67,19 +67,19 @@ def load_scene(path: str | Path) -> Scene:
 
     Parameters
     ----------
-    path : of the file; the URDF files that it names lie in its folder or below
+    path : path of the file; its URDF files must be in the same folder or below
 
     Returns
     -------
     Scene
-        checked whole, every default filled in.
+        checked, with all defaults filled in.
 
     Raises
     ------
     ArgumentError
         the file cannot be opened.
     SceneError
-        the file is not a scene; carries all of its mistakes.
+        the file is not a valid scene; the error lists all mistakes.
     """
     try:
         with open(path, "rb") as file:
@@ -96,16 +96,16 @@ def load_scene(path: str | Path) -> Scene:
     return scene_from_text(text, str(path))
 
 
-_TEXT = "(text)"  # name of what stands in no file
+_TEXT = "(text)"  # file name of a text without a file
 
 
 def scene_from_text(text: str, file: str = _TEXT) -> Scene:
-    """Read a scene from YAML text; `file` is the name that mistakes are reported under.
+    """Read a scene from YAML text; `file` is the file name in the messages of mistakes.
 
     Raises
     ------
     SceneError
-        the text is not a scene; carries all of its mistakes.
+        the text is not a valid scene; the error lists all mistakes.
     """
     root, mistakes = read_values(text, file)
     given, wrong = with_robots(root.value, file, root.stands_at)
@@ -122,12 +122,12 @@ def scene_from_text(text: str, file: str = _TEXT) -> Scene:
 
 
 def read_values(text: str, file: str, what: str = "scene") -> tuple[Node, list[Mistake]]:
-    """Return the values of a YAML text with their places, and its repeated fields as mistakes.
+    """Return the values of a YAML text with their places, and a mistake for each repeated field.
 
     Raises
     ------
     SceneError
-        the text is no document of plain values; `what` it should be, in words.
+        the text is not a document of plain values; `what` names the expected kind of file.
     """
     try:
         root, repeated = read_document(text)

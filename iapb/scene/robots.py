@@ -1,15 +1,15 @@
-"""Robots of a spatial scene: a URDF file beside the scene becomes bodies of it.
+"""Robots of a spatial scene: a URDF file becomes bodies of the scene.
 
     robots:
       - {name: arm, urdf: robots/six_axis_arm.urdf, shapes: {forearm: [{kind: sphere, radius: 0.05}]},
          position: {upper_arm: [0.3]}}
 
-What can touch is nothing, until `shapes` says what, link by link, or ``collisions: urdf`` takes the boxes and spheres
-of the file's <collision> elements. `shapes` of a link replace those of the file: so a link drawn as a cylinder,
-capsule or mesh, which the scene cannot hold, gets boxes and spheres instead, or ``[]``.
+By default no link can touch anything. `shapes` gives shapes link by link; ``collisions: urdf`` takes the boxes and
+spheres of the file's <collision> elements. `shapes` of a link replace those of the file. A scene has no cylinders,
+capsules or meshes, so a link with one of them needs boxes and spheres, or ``[]``, under `shapes`.
 
-Each link becomes the body ``<robot>_<link>``, dots and blanks as ``_``. After reading the scene holds the bodies
-themselves: its text and its runs need the URDF no more. Paths are relative to the scene file and do not lead out of
+Each link becomes the body ``<robot>_<link>``, with ``_`` for dots and blanks. After reading, the scene has the bodies
+themselves, so its text and its runs do not need the URDF file. Paths are relative to the scene file and must stay in
 its folder.
 """
 
@@ -29,8 +29,8 @@ from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, SpatialShape
 from iapb.scene.parts import Name, Number, Part, Place, Text, Vector3, written
 
-HELD = ("box", "sphere")  # of the URDF's geometries, those that the compiled narrow phase knows
-MAX_ROBOTS = 100  # in one scene: each is a file to read
+HELD = ("box", "sphere")  # URDF geometries that the compiled narrow phase supports
+MAX_ROBOTS = 100  # in one scene; each one is a file to read
 
 
 class Robot(Part):
@@ -62,8 +62,8 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
     Raises
     ------
     ArgumentError
-        The path leads out of the folder, the file is no URDF robot, a link that is named does not exist, or a
-        link's <collision> is no box or sphere.
+        The path leads out of the folder, the file is not a URDF robot, a named link does not exist, or the
+        <collision> of a link is neither box nor sphere.
     """
     from iapb.mechanics.urdf import read_urdf  # brings numba along
 
@@ -82,7 +82,7 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
 
 
 def _collisions_of(robot: Robot, path: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the URDF file's collision shapes by link, for the links that `shapes` says nothing about."""
+    """Return the URDF file's collision shapes by link, for the links without an entry in `shapes`."""
     from iapb.mechanics.urdf import read_collisions
 
     read = {link: shapes for link, shapes in read_collisions(path).items() if link not in robot.shapes}
@@ -103,7 +103,7 @@ def _plain_shape(shape: Any) -> dict[str, Any]:
 
 
 def urdf_path(text: str, folder: Path) -> Path:
-    """Return the file that a relative path means; it must lie in the folder, links followed."""
+    """Return the file at a relative path; after following symbolic links it must be inside the folder."""
     path, root = Path(text), folder.resolve()
     leads_out = "\0" in text or path.is_absolute() or ".." in path.parts
     if leads_out or not (root / path).resolve().is_relative_to(root):
@@ -138,12 +138,12 @@ def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[s
 
 
 def body_name(robot: str, link: str) -> str:
-    """Return the name of a link's body: <robot>_<link>, with _ for what names of scenes do not hold (link_3.0)."""
+    """Return the name of a link's body: <robot>_<link>, with _ for characters that are not allowed (link_3.0)."""
     return re.sub(r"[^A-Za-z0-9_-]", "_", f"{robot}_{link}")
 
 
 def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, int]]) -> tuple[Any, list[Mistake]]:
-    """Return plain values of a scene with its robots turned into bodies, and what is wrong with them.
+    """Return the plain values of a scene with its robots turned into bodies, and the mistakes found.
 
     `stands_at` gives line and column of a path such as ("robots", 0, "urdf") in the file.
     """
