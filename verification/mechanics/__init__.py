@@ -1,1 +1,1 @@
-"""Studies of the mechanics of linkages and free bodies; `mechanics.mechanics` is the finding of them all."""
+"""Studies of the mechanics of linkages and free bodies; `mechanics.mechanics` returns their common Finding."""

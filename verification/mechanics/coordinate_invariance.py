@@ -1,7 +1,8 @@
-"""C06 on an arm: the same impact in joint angles, in absolute angles, and in the hand's place up to the singular pose.
+"""C06 on an arm: the same impact in joint angles, absolute angles, and hand positions, up to the singular pose.
 
-With q = f(r), T = df/dr and v_q = T v_r, the outcome in r is brought back by T. In exact arithmetic nothing depends on
-f; in doubles M' = T^T M T is worse conditioned by up to kappa(T)^2, and nearly dependent rows amplify by 1/sigma_min.
+With q = f(r), T = df/dr and v_q = T v_r, T maps the velocity found in r back to q. In exact arithmetic the result does
+not depend on f. In doubles the condition number of M' = T^T M T grows by up to kappa(T)^2, and nearly dependent rows
+amplify errors by 1/sigma_min.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ CONSTANT = 10.0  # C of the bound, times d: a Cholesky factor, two solves and a 
 SEED = 20050606
 
 ARM = PlanarArm((1.0, 1.0, 0.6), (1.0, 1.0, 0.5))
-# Angle of the second joint [rad]. At 0, the singular pose, the hand's place is no coordinate: only angles go through.
+# Angle of the second joint [rad]. At 0, the singular pose, the hand's position is no valid coordinate, but angles are.
 ELBOWS = (*(10.0**-k for k in range(13)), 0.0)
 POSES = {"quick": 4, "full": 40}  # random other angles and velocities for each elbow
 RESTITUTIONS = (0.0, 0.7, 1.0)
@@ -54,7 +55,7 @@ CONTACTS = {
     ),
     "one, pressed from both sides": (Contact(2, 0.4, ACROSS), Contact(2, 0.4, ACROSS - np.pi)),
 }
-# two contacts on one link, ever closer: nearly dependent rows
+# two contacts on one link at decreasing distance: nearly dependent rows
 CLOSE = {f"two, {gap:g} m apart": (Contact(1, 0.7, ACROSS), Contact(1, 0.7 + gap, ACROSS))
          for gap in (1e-2, 1e-4, 1e-6, 1e-8)}  # fmt: skip
 
@@ -85,7 +86,7 @@ class Impact(NamedTuple):
 def coordinate_invariance(
     depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
 ) -> Table:
-    """Solve impacts in two kinds of coordinates, from a bent elbow to 1e-12 rad before the singular pose."""
+    """Resolve impacts in two sets of coordinates, from a bent elbow to 1e-12 rad before the singular pose."""
     check_depth(depth)
     statement = "An impact has one outcome, whatever the coordinates it is solved in."
     tolerance = (
@@ -121,7 +122,7 @@ def _impacts(
 
 
 def compare(mechanism: Mechanism, impact: Impact, coordinates: str) -> dict[str, Any]:
-    """Return error, bound and condition numbers of one impact; `refused` 1 where the other solve was refused."""
+    """Return error, bound and condition numbers of one impact; `refused` is 1 if the other coordinates are refused."""
     q, v, e = impact.q, impact.velocity, impact.restitution
     mass, rows = mechanism.mass_matrix(q), ARM.joint_rows(mechanism, q, impact.contacts)
     here = resolve_impact(mass, rows, v, e)
@@ -152,14 +153,14 @@ def _transformed(mechanism: Mechanism, impact: Impact, coordinates: str) -> tupl
 
 
 def _separation(mass: Floats, rows: Floats, rank: int) -> float:
-    """Least singular value that counts, of J L^-T with rows of unit length."""
+    """Smallest singular value within the rank, of J L^-T with rows of unit length."""
     whitened = np.linalg.solve(np.linalg.cholesky(mass), rows.T)
     values = np.linalg.svd(whitened / np.linalg.norm(whitened, axis=0), compute_uv=False)
     return float(values[rank - 1])
 
 
 def _worst(found: list[dict[str, Any]]) -> dict[str, Any]:
-    """The impact that comes closest to its tolerance, and how many were refused."""
+    """Return the impact with the largest error / tolerance, and the number of refused impacts."""
     rows = [row | {"tolerance": tolerance_of(row)} for row in found]
     solved = [row for row in rows if row["error"] is not None]
     worst = max(solved or rows, key=lambda row: (row["error"] or 0.0) / row["tolerance"])
@@ -167,19 +168,19 @@ def _worst(found: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def tolerance_of(row: Row) -> float:
-    """1e-10 where the conditions are moderate, else the bound."""
+    """Return 1e-10 if the condition numbers are moderate, else the rounding bound."""
     moderate = row["κ(M)"] <= MODERATE and row["κ(∂f/∂r)²"] <= MODERATE and row["σ_min"] >= SEPARATED
     return AGREEMENT if moderate else float(row["bound"])
 
 
 def judged(table: Table) -> Table:
-    """Rows whose bound exceeds 1 cannot tell; a solve refused where it does not is a failure."""
+    """Judge each row: a tolerance of 1 or more gives no outcome; otherwise a refused impact is a failure."""
     return table.judged(lambda row: None if row["tolerance"] >= 1.0 else
                         row["refused"] == 0 and row["error"] <= row["tolerance"])  # fmt: skip
 
 
 def invariance(table: Table) -> Part:
-    """C06: the error where the conditions are moderate, and where only the bound holds."""
+    """Return the part on C06: the error for moderate condition numbers, and for the other cases."""
     rows = [(row, held) for row, held in zip(table.records(), table.holds, strict=True)]
     moderate = [row["error"] for row, _ in rows if row["tolerance"] == AGREEMENT]
     beyond = [row["error"] / row["bound"] for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]

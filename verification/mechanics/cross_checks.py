@@ -1,4 +1,4 @@
-"""The engine against independent answers: Pinocchio and complementarity solvers."""
+"""Comparison of the engine with independent references: Pinocchio and complementarity solvers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ COLUMNS = (
 
 
 def cross_checks(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Compare mass matrices and Jacobians, impacts of independent rows, one contact by an LCP; `run` is not asked."""
+    """Compare mass matrices, Jacobians, impacts of independent rows, and one contact by an LCP; `run` is unused."""
     rng, failures = np.random.default_rng(1), list[Failure]()
     checks = [
         *of_each(_SCENES, lambda name: _mechanism(name, rng), failures),
@@ -49,7 +49,7 @@ def cross_checks(run: Callable[..., Run], depth: str, progress: Callable[[int, i
 
 
 def finding(checks: list[dict[str, Any]], failures: list[Failure]) -> Finding:
-    """Return one part per comparison."""
+    """Return the Finding with one part per comparison."""
     table = table_of(COLUMNS, checks, digits=2).judged(_agrees)
     parts = [
         Part(f"{row['quantity'][:1].upper()}{row['quantity'][1:]}, compared with {row['against']}: the largest "

@@ -1,4 +1,4 @@
-"""How far the engine and the references are apart: mechanics quantity by quantity, and the contacts of a scene."""
+"""Differences between the engine and the references: each quantity of the mechanics, and the contacts of a scene."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ EARTH = (0.0, 0.0, -9.81)  # [m/s^2]
 
 @dataclass(frozen=True)
 class SceneDifference:
-    """Engine against reference over the configurations of a scene; the mechanics relative, contacts absolute.
+    """Differences between engine and reference over configurations of a scene; relative for mechanics, else absolute.
 
-    configurations : how many; apart : those whose contacts differ in number or by more than SAME, as where two faces
-        tie and each side takes another one
+    configurations : number of configurations
+    apart : number of configurations whose contacts differ in number or by more than SAME, for instance because two
+        faces are equally close and each side takes another one
     mass_matrix, inner_forces, placement, frame_jacobian : largest difference, relative to the largest entry
-    contacts : how many were compared; point, normal, gap, row : their largest difference [m, 1, m, m or 1]
+    contacts : number of compared contacts; point, normal, gap, row : their largest difference [m, 1, m, m or 1]
     """
 
     scene: str
@@ -44,13 +45,13 @@ class SceneDifference:
     row: float
 
 
-SAME = 1e-9  # contacts that differ by more are other contacts: sums of a dozen products differ by 1e-14
+SAME = 1e-9  # contacts that differ by more are different contacts; rounding of a dozen products is about 1e-14
 
 
 def scene_difference(scene: Scene, configurations: int = 50, seed: int = 0) -> SceneDifference:
     """Compare the engine's mechanics and narrow phase with Pinocchio and `contact_finding`.
 
-    The configurations are the scene's start and random ones around it, moved by 1e-6 to 1 [m, rad].
+    The configurations are the initial one of the scene and random ones around it, displaced by 1e-6 to 1 [m, rad].
     """
     system, rng = System(scene), np.random.default_rng(seed)
     m, start = system.mechanism, system.make_state().q
@@ -89,7 +90,7 @@ def _mechanics_apart(system: System, q: Floats, v: Floats) -> list[float]:
 
 
 def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
-    """How many contacts, and their largest differences (4,) of point, normal, gap, row; None where they are others."""
+    """Number of contacts, and largest differences (4,) of point, normal, gap, row; None if these are other contacts."""
     axes, origins, frames = mechanics_of(system).bodies(q)
     theirs = find_contacts(system.shapes, system.pairs, axes, origins, np.inf)
     found = system.contacts_at(q, np.inf)
@@ -118,10 +119,11 @@ def compare(
 ) -> dict[str, float]:
     """Return the largest difference of each quantity, relative to the reference's largest entry.
 
-    The potential energy, whose zero is a convention, is taken relative to the sum of m |g| |c|; a bias that nearly
-    vanishes (a centre of mass almost on its axis, a body that hardly turns) relative to the size of the terms that
-    it sums: m |c| w^2, w the fastest turn, since world positions c are rounded and with them every lever arm; and
-    v x m v, which is zero but is computed, of the size of twice the kinetic energy.
+    Some quantities use another scale. The potential energy, whose zero is a convention, is relative to the sum of
+    m |g| |c|. A bias may nearly vanish (a centre of mass almost on its axis, a body that hardly turns), so its scale is
+    at least the size of the terms in its sum. These are m |c| w^2 with the fastest rate w, because the rounding of the
+    world positions c affects every lever arm, and v x m v, which is zero but is computed from terms of the size of
+    twice the kinetic energy.
 
     Quantities: mass_matrix, bias, gravity, inverse_dynamics, kinetic_energy, potential_energy, momentum,
     and, over all bodies, placement, point_jacobian (at a point one metre off the origin) and frame_jacobian.
@@ -142,12 +144,12 @@ def compare(
 
 
 def _lifted(mechanism: Mechanism, q: Floats, gravity: ArrayLike) -> float:
-    """Sum of m |g| |c| [J]: the size of the terms of a potential energy that may itself be near zero."""
+    """Sum of m |g| |c| [J]: the size of the terms of the potential energy, whose sum may be near zero."""
     return float(np.linalg.norm(gravity)) * _spread(mechanism, q)
 
 
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
-    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias that may itself be near zero."""
+    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias, whose sum may be near zero."""
     fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
     return max(fastest**2 * _spread(mechanism, q), 2.0 * mechanism.kinetic_energy(q, v))
 
@@ -173,7 +175,7 @@ def _compare_bodies(mechanism: Mechanism, reference: PinocchioMechanism, q: Floa
 
 
 def relative_difference(pairs: list[tuple[Any, Any]], floor: float = 0.0) -> float:
-    """Return the largest |ours - theirs| of all pairs over the largest |theirs|, or over the floor if it is more."""
+    """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the largest |theirs|."""
     scale = max((float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs), default=0.0)
     scale = max(scale, floor)
     gap = max((float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs), default=0.0)

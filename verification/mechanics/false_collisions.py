@@ -1,7 +1,7 @@
-"""C18: a ball rolls in a faceted socket; its false collisions, with and without the two filters.
+"""C18: false collisions of a ball that rolls in a faceted socket, with and without the two filters.
 
-In the round socket that the facets stand for, the ball would touch once and never collide again. So every collision
-after the first contact is false, and every contact beyond one per step is doubled.
+The facets approximate a round socket, in which the ball would collide only once. Every collision after the first
+contact is therefore false, and every contact beyond one per step is a duplicate.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from verification.finding import MIXED, REFUTED, REPRODUCED, Failure, Part, Table, of_each, titled
 
-DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: from a ball that bounces at edges to one that does not
+DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: with the smallest the ball bounces at edges, with the largest not
 SCENE = "faceted_socket"
 BALL_RADIUS, FACET_ANGLE = 0.02, math.radians(10.0)  # [m], [rad] of the scene
-# Distance [m] of the ball's two contacts at an edge: how far a contact jumps from facet to facet.
+# Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from facet to facet.
 EDGE_JUMP = 2.0 * BALL_RADIUS * math.sin(0.5 * FACET_ANGLE)
 SETTINGS = {
     "no filter": (False, False), "coherence alone": (False, True),
@@ -35,14 +35,17 @@ Simulate = Callable[[Scene], Run]
 
 @dataclass(frozen=True)
 class FalseCollisions:
-    """One run of the socket.
+    """Counts and losses in one run of the socket.
 
-    clustering, coherence : whether the filter is on; damping : B [N s/m]
-    collisions : impacts after the first contact; new_contacts : contacts taken as new, the first left out
-    doubled : contacts beyond one per step; lifted : steps off the facets, after the first contact
-    energy_lost : [J] in those collisions; potential_drop : [J] from the start to the lowest point, to compare with
-    largest_speed : [m/s] of the ball's centre
-    times, losses : when each false collision happened [s], and what was lost in it [J]
+    clustering, coherence : whether each filter is on; damping : B [N s/m]
+    collisions : number of impacts after the first contact
+    new_contacts : number of contacts classified as new, without the first
+    doubled : number of contacts beyond one per step
+    lifted : number of steps without contact, after the first contact
+    energy_lost : energy [J] lost in the false collisions
+    potential_drop : drop [J] of the potential energy from the start to the lowest point, for comparison
+    largest_speed : largest speed of the ball's centre [m/s]
+    times, losses : time [s] of each false collision, and energy [J] lost in it
     """
 
     clustering: bool
@@ -68,7 +71,7 @@ class FalseCollisions:
 def study_false_collisions(
     dampings: Sequence[float] = DAMPINGS, simulate: Simulate = simulate, failures: list[Failure] | None = None
 ) -> tuple[FalseCollisions, ...]:
-    """Return the counts for each damping and each of the four settings of the filters, at the scene's distances."""
+    """Return the counts for each damping and each of the four filter settings, with the scene's filter distances."""
 
     def found(case: tuple[float, str]) -> list[FalseCollisions]:
         damping, setting = case
@@ -83,7 +86,7 @@ def _switched_off(filters: tuple[bool, bool]) -> dict[str, float]:
 
 
 def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
-    """The scene with some of its contact's values changed, and its rate [Hz]."""
+    """Return the scene with some contact values changed, and perhaps another rate [Hz]."""
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
     return _shipped().with_values(values if rate is None else values | {"rate": rate})
 
@@ -94,7 +97,7 @@ def _shipped() -> Scene:
 
 
 def count_false(scene: Scene, simulate: Simulate = simulate) -> FalseCollisions:
-    """Simulate the socket and count."""
+    """Simulate the socket and count its false collisions."""
     run, contact = simulate(scene), scene.contact
     per_step = np.diff(run.contacts.offsets)
     first = int(np.flatnonzero(per_step)[0])
@@ -114,7 +117,7 @@ def count_false(scene: Scene, simulate: Simulate = simulate) -> FalseCollisions:
 
 
 def filters_table(found: Sequence[FalseCollisions]) -> Table:
-    """One row per run of the socket."""
+    """Return a table with one row per run of the socket."""
     columns = ("filters", "damping [N s/m]", "false collisions", "contacts taken as new", "doubled contacts",
                "steps off the facets", "energy lost [J]", "lost, of the fall")  # fmt: skip
     rows = [(f.setting, f.damping, f.collisions, f.new_contacts, f.doubled, f.lifted, f.energy_lost,
@@ -124,7 +127,7 @@ def filters_table(found: Sequence[FalseCollisions]) -> Table:
 
 
 def times_table(found: Sequence[FalseCollisions]) -> Table:
-    """One row per false collision, in time."""
+    """Return a table with one row per false collision, in order of time."""
     rows = [
         (f.setting, f.damping, time, count, sum(f.losses[:count]) / f.potential_drop)
         for f in found for count, time in enumerate(f.times, start=1)
@@ -134,7 +137,7 @@ def times_table(found: Sequence[FalseCollisions]) -> Table:
 
 
 def filters(found: Sequence[FalseCollisions]) -> Part:
-    """C18 at the scene's own distances: with both filters, then each alone."""
+    """Return the part on C18 with the scene's filter distances: with both filters, and with each alone."""
     of: dict[str, dict[float, FalseCollisions]] = {}
     for run in found:
         of.setdefault(run.setting, {})[run.damping] = run

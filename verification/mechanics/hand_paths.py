@@ -1,6 +1,6 @@
-"""Where a hand goes that leads an arm by one of its points: paths through the arm's singular poses.
+"""Paths of a hand that leads an arm by one point, through the arm's singular poses.
 
-A path is a function of the way gone s [m], from the place where the hand starts; it ends at `length`.
+A path gives the hand's position as a function of the arc length s [m] from its start; it ends at `length`.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-BEYOND = 1.15  # the hand is pulled this much further than the arm reaches
+BEYOND = 1.15  # largest distance of the hand from the base, relative to the arm's reach
 
 
 class Path(NamedTuple):
-    """Place (2,) [m] after the way s [m]; its length [m]."""
+    """Position (2,) [m] at the arc length s [m], and the length [m] of the path."""
 
     place: Callable[[float], Floats]
     length: float
 
 
 def stretch(start: Floats, reach: float) -> Path:
-    """Straight away from the base, beyond the arm's reach, and back: the straight arm, twice."""
+    """Return a line away from the base, beyond the arm's reach, and back: the arm is straight twice."""
     out = BEYOND * reach * start / np.linalg.norm(start)
     return along([start, out, start])
 
 
 def across(start: Floats, reach: float) -> Path:
-    """Straight through the base to the other side and back: the folded arm, and the base itself."""
+    """Return a line through the base to the other side and back: the arm folds, and its hand passes the base."""
     return along([start, -0.9 * reach * start / np.linalg.norm(start), start])
 
 
 def whirl(start: Floats, reach: float) -> Path:
-    """Out to the full reach and once around the base: the straight arm all the while."""
+    """Return a path out to the full reach and once around the base: the arm stays straight on the circle."""
     direction = start / np.linalg.norm(start)
     way_out = abs(reach - float(np.linalg.norm(start)))
     first = float(np.arctan2(direction[1], direction[0]))
@@ -53,7 +53,7 @@ PATHS: dict[str, Callable[[Floats, float], Path]] = {"stretch": stretch, "across
 
 
 def along(corners: list[Floats]) -> Path:
-    """The polyline through the corners."""
+    """Return the polyline through the corners."""
     points = np.array(corners)
     ways = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 

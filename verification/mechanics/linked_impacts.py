@@ -1,11 +1,11 @@
-"""Newton's cradle and Bernoulli's three balls: energy and momentum do not decide, the rows do.
+"""Newton's cradle and Bernoulli's three balls: the outcome depends on the rows, not only on energy and momentum.
 
-The same elastic impact is resolved by the engine's map (21) on different sets of rows, each stated, and one contact
-after the other by the exact event-driven reference. With relative rows (12) every one of these outcomes keeps energy
-and momentum; the paper's per-body rows (13)-(14) keep the energy and lose momentum (erratum 3).
+The engine's map (21) resolves the same elastic impact with different sets of rows; the exact event-driven reference
+resolves it one contact after the other. With relative rows (12) all these outcomes conserve energy and momentum. The
+paper's per-body rows (13)-(14) conserve energy but not momentum (erratum 3).
 
-    cradle     n balls in line, the first arrives with v = 1 m/s, the others rest and touch
-    Bernoulli  a ball arrives along x between two that touch, their centres at ±30° from its path
+    cradle     n balls in a line: the first arrives with v = 1 m/s, the others rest and touch
+    Bernoulli  a ball arrives along x between two touching balls, whose centres are at ±30° from its path
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ ALL, APPROACHING = "all touching contacts", "approaching contacts"
 
 @dataclass(frozen=True)
 class LinkedBalls:
-    """Equal frictionless discs of 1 kg that touch, d = 2 n velocities (x, y of each).
+    """Equal frictionless discs of 1 kg that touch; d = 2 n velocities (x, y of each disc).
 
-    contacts : pairs (a, b), the normal points from b into a; normals : (c, 2)
+    contacts : pairs (a, b) whose normal points from b to a; normals : (c, 2)
     velocity : (n, 2) before the impact [m/s]
     """
 
@@ -63,16 +63,16 @@ class LinkedBalls:
         return rows.reshape(2 * len(chosen), -1)
 
     def approaching(self) -> tuple[int, ...]:
-        """The contacts with v_n < 0."""
+        """Indices of the contacts with v_n < 0."""
         every = range(len(self.contacts))
         return tuple(np.flatnonzero(self.relative_rows(every) @ self.velocity.ravel() < 0.0).tolist())
 
 
 @dataclass(frozen=True)
 class LinkedOutcome:
-    """One treatment of one problem.
+    """Outcome of one treatment of one problem.
 
-    rows : which rows were taken, in words; velocity : (n, 2) after [m/s]
+    rows : the rows or the order, in words; before, velocity : (n, 2) before and after the impact [m/s]
     """
 
     problem: str
@@ -88,7 +88,7 @@ class LinkedOutcome:
 
     @property
     def momentum_change(self) -> float:
-        """Length of the change of momentum over the momentum before."""
+        """Magnitude of the change of momentum, relative to the momentum before."""
         before = self.before.sum(axis=0)
         return float(np.linalg.norm(self.velocity.sum(axis=0) - before) / np.linalg.norm(before))
 
@@ -111,7 +111,7 @@ def bernoulli(degrees: float = 30.0) -> LinkedBalls:
 
 
 def outcomes(balls: LinkedBalls) -> tuple[LinkedOutcome, ...]:
-    """Return the elastic outcomes of every treatment, side by side."""
+    """Return the elastic outcomes of every treatment."""
     chosen = {ALL: tuple(range(len(balls.contacts))), APPROACHING: balls.approaching()}
     rows_of = {RELATIVE: balls.relative_rows, PER_BODY: balls.per_body_rows}
     found = [_mapped(balls, treatment, words, rows(contacts))
@@ -126,7 +126,7 @@ def _mapped(balls: LinkedBalls, treatment: str, rows_in_words: str, rows: Floats
 
 
 def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
-    """Event-driven outcomes: all at once by Newton's LCP, then in the orders in which contacts may close."""
+    """Yield event-driven outcomes: all contacts at once by Newton's LCP, then each order in which contacts may close."""
     c = len(balls.contacts)
     yield _event_driven(balls, "all at once, Newton's LCP", np.zeros(c))
     if balls.name.startswith("cradle"):
@@ -154,7 +154,7 @@ def study_linked_impacts(failures: list[Failure] | None = None) -> tuple[LinkedO
 
 
 def linked_table(found: Sequence[LinkedOutcome]) -> Table:
-    """One row per ball of each outcome."""
+    """Return a table with one row per ball of each outcome."""
     columns = ("problem", "treatment", "rows or order", "ball", "v_x before [m/s]", "v_x after [m/s]",
                "v_y after [m/s]", "energy change", "momentum change")  # fmt: skip
     rows = [
@@ -167,12 +167,12 @@ def linked_table(found: Sequence[LinkedOutcome]) -> Table:
 
 
 def _changes(found: Sequence[LinkedOutcome]) -> tuple[float, float]:
-    """The largest change of energy and of momentum."""
+    """Return the largest change of energy and of momentum."""
     return max(abs(o.energy_change) for o in found), max(o.momentum_change for o in found)
 
 
 def conserved(found: Sequence[LinkedOutcome]) -> Part:
-    """What relative rows and sequences change."""
+    """Return the part on relative rows and sequences: their changes of energy and momentum."""
     energy, momentum = _changes([o for o in found if o.treatment != PER_BODY])
     return Part(
         f"Newton's cradles of 2 to 7 balls and Bernoulli's three balls ({len({o.problem for o in found})} problems): "
@@ -182,7 +182,7 @@ def conserved(found: Sequence[LinkedOutcome]) -> Part:
 
 
 def per_body(found: Sequence[LinkedOutcome]) -> Part:
-    """Erratum 3: what the paper's per-body rows change."""
+    """Return the part on erratum 3: the change of momentum with the paper's per-body rows."""
     lost = [o for o in found if o.treatment == PER_BODY]
     energy, least = _changes(lost)[0], min(o.momentum_change for o in lost)
     return Part(
@@ -192,7 +192,7 @@ def per_body(found: Sequence[LinkedOutcome]) -> Part:
 
 
 def rows_decide(found: Sequence[LinkedOutcome]) -> Part:
-    """The cradle of five by three choices of rows that all conserve everything."""
+    """Return the part on the cradle of five: three choices of rows conserve energy and momentum, but differ."""
     five = {(o.treatment, o.rows): o.velocity[:, 0] for o in found if o.problem == "cradle of 5"}
     after = {"all touching rows": five[RELATIVE, ALL], "the approaching row": five[RELATIVE, APPROACHING],
              "one after the other": next(v for (_, rows), v in five.items() if "one after" in rows)}  # fmt: skip
@@ -206,7 +206,7 @@ def rows_decide(found: Sequence[LinkedOutcome]) -> Part:
 
 
 def linked_in_short(found: Sequence[LinkedOutcome]) -> str:
-    """The words of the first page."""
+    """Return the sentence for the first page."""
     kept = max(_changes([o for o in found if o.treatment != PER_BODY]))
     least = min(o.momentum_change for o in found if o.treatment == PER_BODY)
     return (f"Impacts between touching balls conserve energy and momentum to {kept:.1e} with relative rows (12), while "

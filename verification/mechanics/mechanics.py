@@ -1,6 +1,6 @@
-"""Linkages and free bodies against Pinocchio, closed forms and laws of conservation: the finding.
+"""Finding on linkages and free bodies, compared with Pinocchio, closed forms and conservation laws.
 
-Timing (`robot_timing.time_robots`) stands apart: its figures belong to a machine.
+Timing (`robot_timing.time_robots`) is a separate study, because its results depend on the machine.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ QUESTION = (
     "between touching balls, the same impact in other coordinates, an arm led through its singular poses, and a ball "
     "in a faceted socket."
 )
-# name: its study(depth, failures), which returns a Table with the outcome of every row
+# name: study(depth, failures), which returns a Table with the outcome of every row
 AGAINST_PINOCCHIO: dict[str, Callable[..., Table]] = {
     "random trees": compare_trees, "joint kinds": compare_kinds, "scenes": compare_scenes,
     "URDF texts": compare_written, "robots": compare_robots,
 }  # fmt: skip
-# and what is said of the table
+# and the function that makes a Part from the table
 STUDIES: dict[str, tuple[Callable[..., Table], Callable[[Table], Part]]] = {
     "positive definite": (positive_definite, definiteness), "power balance": (power_balance, orders),
     "tumbling": (tumbling, convergence), "coordinate invariance": (coordinate_invariance, invariance),
@@ -52,7 +52,7 @@ STUDIES: dict[str, tuple[Callable[..., Table], Callable[[Table], Part]]] = {
 
 
 def mechanics(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Run every study of the mechanics and say what each found.
+    """Run every study of the mechanics and return the Finding with one part for each.
 
     Parameters
     ----------

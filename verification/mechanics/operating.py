@@ -1,9 +1,9 @@
 """Operating a linkage: a hand holds any link at any point and leads the arm through its singular poses.
 
-The hand is a spring and a damper to a place that moves along a path at a given speed; its force reaches the arm
-through `Simulation.step(hand_force=...)`. The compiled step uses J_h^T alone, never its inverse: nothing there can blow
-up where J_h loses rank. The force is constant over a step, so that its work on the arm is F . dx exactly, and what the
-balance lacks is the integrator's.
+A spring and a damper connect the hand to a target that moves along a path at a given speed; the force acts on the arm
+through `Simulation.step(hand_force=...)`. The compiled step uses only J_h^T, never its inverse, so it stays finite if
+J_h loses rank. The force is constant over a step, so its work on the arm is exactly F . dx, and the residual of the
+energy balance is the error of the integrator.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ Floats = NDArray[np.float64]
 SCENE = "held_arm"
 LENGTHS = {"upper_arm": 0.3, "forearm": 0.25, "hand_link": 0.15}  # [m] of the scene's links
 STIFFNESS, DAMPING = 400.0, 30.0  # of the hand [N/m, N s/m]
-AFTER = 0.3  # [s] that the hand stays at the end of its path
+AFTER = 0.3  # [s] for which the hand stays at the end of its path
 HOLDS = {"quick": (0.5, 1.0), "full": (0.2, 0.5, 0.8, 1.0)}  # fractions of the held link
 SPEEDS = {"quick": (0.5, 4.0), "full": (0.1, 0.5, 1.0, 4.0, 8.0)}  # [m/s]
 RATES = {"quick": (1000.0,), "full": (1000.0, 2000.0, 4000.0)}  # [Hz]
-NOTHING = 1e-12  # [J] less energy than this is none: a link pulled along itself does not move at all
-ROUNDING = 1e-12  # relative, where hardly anything turns
-# σ_min / σ_max of the hand's Jacobian: the arm within about a degree of straight or folded.
+NOTHING = 1e-12  # [J] smaller energies count as zero: a link that is pulled along itself does not move
+ROUNDING = 1e-12  # relative tolerance if hardly any joint turns
+# σ_min / σ_max of the hand's Jacobian below which the arm is within about a degree of straight or folded.
 SINGULAR = 0.02
 
 COLUMNS = (
@@ -55,20 +55,20 @@ COLUMNS = (
 
 
 class Grip(NamedTuple):
-    """Held body, and the point [m] along it."""
+    """The held body, and the distance [m] of the held point along it."""
 
     body: str
     distance: float
 
     @property
     def reach(self) -> float:
-        """How far from the base the held point can be [m]."""
+        """Largest distance of the held point from the base [m]."""
         links = list(LENGTHS)
         return sum(LENGTHS[link] for link in links[: links.index(self.body)]) + self.distance
 
 
 def operating(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Lead the arm by every link and point along every path at every speed."""
+    """Lead the arm by every link and point along every path, at every speed."""
     check_depth(depth)
     statement = (
         "Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy."
@@ -94,7 +94,7 @@ def _rows(depth: str, failures: list[Failure] | None) -> Iterator[dict[str, Any]
 
 
 def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> dict[str, Any]:
-    """Lead the arm along one path and return what was largest on the way."""
+    """Lead the arm along one path and return the largest values and the energy balance."""
     held = {
         "hand.body": grip.body,
         "hand.point": [grip.distance, 0.0],
@@ -112,7 +112,7 @@ def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> d
 
 
 class Led:
-    """An arm that the hand leads, and what has been measured so far."""
+    """An arm that the hand leads, and the measurements so far."""
 
     def __init__(self, simulation: Simulation, grip: Grip) -> None:
         self.simulation, self.mechanism, self.grip = simulation, simulation.system.mechanism, grip
@@ -122,13 +122,13 @@ class Led:
         self.here = self.place()
 
     def place(self) -> Floats:
-        """Where the held point is (2,) [m]."""
+        """Position (2,) [m] of the held point."""
         rotations, positions = self.mechanism.placements(self.simulation.state.q)
         b = self.mechanism.index(self.grip.body)
         return (positions[b] + self.grip.distance * rotations[b][:, 0])[:2]
 
     def follow(self, path: Path, way: float, next_way: float) -> None:
-        """One step with the hand on its path, from `way` to `next_way` [m]."""
+        """Take one step while the target moves along its path from `way` to `next_way` [m]."""
         state, dt = self.simulation.state, self.simulation.system.dt
         here, target, next_target = self.here, path.place(way), path.place(next_way)
         jacobian = self.mechanism.point_jacobian(state.q, self.grip.body, [*here, 0.0])[:2]
@@ -143,7 +143,7 @@ class Led:
         self.largest = max(self.largest, stored)
 
     def _account(self, force: Floats, moved: Floats, led: Floats, jacobian: Floats) -> None:
-        """Add up the work of one step, and keep what is largest."""
+        """Add the work of one step and update the largest values."""
         work = float(force @ moved)
         self.work += work
         self.exchanged += abs(work)
@@ -154,7 +154,7 @@ class Led:
         self.ratios.append(float(values[1] / values[0]) if values[0] > 0.0 else 0.0)
 
     def measured(self) -> dict[str, Any]:
-        """The figures of the table."""
+        """Return the values of the table row."""
         state = self.simulation.state
         kinetic, whole = self.mechanism.kinetic_energy(state.q, state.v), max(self.exchanged, NOTHING)
         return {
@@ -168,7 +168,7 @@ class Led:
 
 
 def judged(table: Table) -> Table:
-    """Finite, without a fault, and with an energy balance that closes."""
+    """Judge each row: the run must be finite, without a fault, and its energy balance must close."""
     return table.judged(_holds)
 
 
@@ -181,7 +181,7 @@ def _holds(row: dict[str, Any]) -> bool:
 
 
 def led(table: Table) -> Part:
-    """How near to singular, how fast, and how well the balance closes."""
+    """Return the part on led arms: distance to singular poses, joint speeds and energy residual."""
     rows = table.records()
     whole = [row for row in rows if not row["fault"]]
     share = max(abs(row["residual"]) / row["tolerance"] for row in whole)

@@ -1,7 +1,7 @@
-"""A planar arm in three kinds of coordinates: joint angles (by the engine), absolute angles, and the hand's place.
+"""A planar arm in three kinds of coordinates: joint angles (by the engine), absolute angles, and the hand's position.
 
-Absolute angles r_i against the x axis are written down independently of the engine: a point at distance s along
-link k is at sum_(i<k) l_i u(r_i) + s u(r_k), u = (cos, sin), so that M'_ij = mu_ij cos(r_i - r_j).
+The equations in absolute angles r_i, measured from the x axis, are independent of the engine: a point at distance s
+along link k is at sum_(i<k) l_i u(r_i) + s u(r_k) with u = (cos, sin), so that M'_ij = mu_ij cos(r_i - r_j).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 class Contact(NamedTuple):
-    """A contact on the arm: link, distance [m] along it from its joint, angle [rad] of the normal to the link."""
+    """A contact on the arm: link, distance [m] from the link's joint along it, angle [rad] from link to normal."""
 
     link: int
     distance: float
@@ -32,11 +32,11 @@ class PlanarArm(NamedTuple):
 
     @property
     def links(self) -> int:
-        """Number of links, and of coordinates."""
+        """Number of links, equal to the number of coordinates."""
         return len(self.lengths)
 
     def mechanism(self) -> Mechanism:
-        """The arm for the engine, turning about z."""
+        """Return the arm as a mechanism of the engine, with joints about z."""
         bodies = []
         for k, (length, mass) in enumerate(zip(self.lengths, self.masses, strict=True)):
             parent, start = (f"link {k - 1}", self.lengths[k - 1]) if k else (None, 0.0)
@@ -60,7 +60,7 @@ class PlanarArm(NamedTuple):
         return arms * np.sin(normal - r)  # n . (-sin r_i, cos r_i)
 
     def joint_rows(self, mechanism: Mechanism, q: Floats, contacts: tuple[Contact, ...]) -> Floats:
-        """n^T J (c, d) of the contacts in joint angles, by the engine."""
+        """n^T J (c, d) of the contacts in joint angles, computed by the engine."""
         rotations, positions = mechanism.placements(q)
         rows = []
         for contact in contacts:
@@ -71,13 +71,13 @@ class PlanarArm(NamedTuple):
         return np.array(rows)
 
     def hand_jacobian(self, mechanism: Mechanism, q: Floats) -> Floats:
-        """d(hand)/dq (d, d): the place (x, y) of the last joint's far end, for three links also its angle."""
+        """d(hand)/dq (d, d): position (x, y) of the second link's end and, for three links, the sum of the angles."""
         rotations, positions = mechanism.placements(q)
-        last = 1  # the two links that reach; a third one only turns
+        last = 1  # two links determine the position; a third one only rotates
         tip = positions[last] + self.lengths[last] * rotations[last][:, 0]
         rows = mechanism.point_jacobian(q, last, tip)[:2]
         return np.vstack([rows, np.ones((self.links - 2, self.links))])
 
     def _arms(self, link: int, distance: float) -> Floats:
-        """How far (d,) [m] each link reaches towards the point."""
+        """Length (d,) [m] that each link contributes to the position of the point."""
         return np.array([*self.lengths[:link], distance, *[0.0] * (self.links - link - 1)])

@@ -1,8 +1,8 @@
-"""d(KE + PE)/dt = tau . v on random trees, to the order of each integrator; and M positive definite.
+"""Power balance d(KE + PE)/dt = tau . v of random trees, to the order of each integrator; and definiteness of M.
 
-Over one step of dt the energy changes by the work of tau, integrated by Simpson's rule from the velocities at start,
-half and end. What is missing, per dt, falls as dt^order if M, B, G and the energies belong together; with any term
-wrong it stays.
+Over one step dt the energy changes by the work of tau, integrated by Simpson's rule from the velocities at the start,
+the middle and the end. The defect of this balance, divided by dt, falls as dt^order if M, B, G and the energies are
+consistent; if any term is wrong, the defect does not fall.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ HALVINGS = 14
 SMALL = 0.02
 NEGLIGIBLE = 1e-10  # a relative defect below this would soon meet rounding
 SPEED = 0.3  # [m/s, rad/s]: the motion is smooth over such a step
-ORDER_TOLERANCE = 0.25  # of the median over trees: next error terms, larger in long chains
-# Of M scaled to a unit diagonal: beyond it rounding decides the sign of an eigenvalue.
+ORDER_TOLERANCE = 0.25  # of the median over trees, for the next error terms, which are larger in long chains
+# Condition number of M scaled to a unit diagonal, above which rounding determines the sign of the least eigenvalue.
 LARGEST_CONDITION = 1e12
-LEAST_SHARE = 0.5  # of the trees must show an order: where a term is missing none does
+LEAST_SHARE = 0.5  # share of the trees that must show an order; if a term is missing, no tree does
 SEED = 20050603
 
 COLUMNS = (
@@ -100,7 +100,7 @@ def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) 
 def order_of(
     mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: Floats
 ) -> list[tuple[float, float, float]]:
-    """Return (step, defect, order) at the longest step whose defect is small; nothing where there is none."""
+    """Return [(step, defect, order)] at the longest step whose defect is small; empty if there is none."""
     coarse = np.inf
     for k in range(HALVINGS):
         dt = LONGEST * 0.5**k
@@ -112,7 +112,7 @@ def order_of(
 
 
 def defect(mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: Floats, dt: float) -> float:
-    """Energy that one step of dt makes up, relative to |tau| . |v| dt."""
+    """Energy that one step dt creates or loses, relative to |tau| . |v| dt."""
 
     def acceleration(q: Floats, v: Floats) -> Floats:
         force = tau - mechanism.bias(q, v) - mechanism.gravity(q, FIELD)
@@ -128,7 +128,7 @@ def defect(mechanism: Mechanism, method: Integrator, q: Floats, v: Floats, tau: 
 
 
 def _scaled(mass: Floats) -> Floats:
-    """M with a diagonal of ones: the units of the coordinates taken out."""
+    """M scaled to a unit diagonal, which removes the units of the coordinates."""
     scale = 1.0 / np.sqrt(np.diag(mass))
     return mass * np.outer(scale, scale)
 
@@ -138,7 +138,7 @@ def _condition(mass: Floats) -> float:
 
 
 def judged(table: Table) -> Table:
-    """The median order must be the declared one, and most trees must show one at all."""
+    """Judge each row: the median order must be the declared one, and a share LEAST_SHARE of the trees must show one."""
     return table.judged(_holds)
 
 
@@ -175,7 +175,7 @@ def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
 
 
 def orders(table: Table) -> Part:
-    """The orders found for each integrator."""
+    """Return the part on the power balance: the measured orders of each integrator."""
     found = "; ".join(
         f"{words(name)} {span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
         for (name,), rows in by(table.records(), "integrator").items()
@@ -185,7 +185,7 @@ def orders(table: Table) -> Part:
 
 
 def definiteness(table: Table) -> Part:
-    """How many matrices, and how near to zero."""
+    """Return the part on definiteness: the number of matrices and their least eigenvalue."""
     rows = table.records()
     judged = sum(row["judged, condition ≤ 1e12"] for row in rows)
     least = min(row["least eigenvalue × condition"] for row in rows)
@@ -200,7 +200,7 @@ def definiteness(table: Table) -> Part:
 
 
 def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
-    """Rows by the values of some columns."""
+    """Group the rows by the values of the named columns."""
     found: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
         found.setdefault(tuple(row[name] for name in names), []).append(row)
@@ -208,12 +208,12 @@ def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
 
 
 def span(values: Sequence[float]) -> str:
-    """The least and the largest, in words."""
+    """Return the smallest and the largest value in words."""
     low, high = f"{min(values):.2f}", f"{max(values):.2f}"
     return low if low == high else f"{low} to {high}"
 
 
 def words(name: str) -> str:
-    """An integrator's name for people."""
+    """Return the printed name of an integrator."""
     return {"semi_implicit_euler": "semi-implicit Euler", "runge_kutta_4": "Runge-Kutta 4",
             "commutator_free_4": "commutator-free Runge-Kutta 4"}.get(name, name)  # fmt: skip

@@ -1,6 +1,7 @@
-"""URDF texts of random robots: every joint type, turned inertias, names out of order. What a reader must read right.
+"""URDF texts of random robots, to test URDF readers: every joint type, rotated inertias, names out of order.
 
-Only what both readers define alike is written: a planar joint lies across z, as Pinocchio takes no other.
+The texts use only features that both readers define alike. For example, the axis of a planar joint is z, since
+Pinocchio supports no other.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 
 def random_urdf(rng: np.random.Generator, links: int, types: tuple[str, ...] = TYPES) -> str:
-    """Return a robot of one base and `links` moving links, each on a random earlier one."""
+    """Return a robot with a base and `links` further links, each attached to a random earlier link."""
     names = [f"link_{k}" for k in rng.permutation(links + 1)]
-    joints = [f"joint_{k}" for k in rng.permutation(links)]  # siblings are ordered by these, not by their lines
+    joints = [f"joint_{k}" for k in rng.permutation(links)]  # these names order siblings, not the lines of the text
     parts = [_link(rng, name) for name in names]
     for k, joint in enumerate(joints, start=1):
         kind = types[k % len(types)]

@@ -1,7 +1,7 @@
-"""Time of mass matrix and bias per call, against Pinocchio called from Python; and of many states in one call.
+"""Time of the mass matrix and the bias, per call and for many states in one call, compared with Pinocchio in Python.
 
-Pinocchio is called in its cheapest form, a bound function whose result is thrown away. Both take turns: a slow minute
-of the machine slows both, and the ratio of each round is what counts.
+Pinocchio is called in its fastest form, a bound function whose result is discarded. Both sides take turns, so that a
+slow phase of the machine affects both; the study compares the ratio of each round.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from verification.mechanics.robots import SEED, robot_files
 
 Floats = NDArray[np.float64]
 
-LARGEST_RATIO = 3.0  # of one call; a batch must be faster than Pinocchio: 1
+LARGEST_RATIO = 3.0  # limit for one call; for a batch the limit is 1
 STATES = 200  # random states, one call each, in one round
 ROUNDS = {"quick": 25, "full": 200}
 COLUMNS = (
@@ -74,7 +74,7 @@ def _rows(path: Path, rounds: int) -> Iterator[dict[str, Any]]:
 def _contests(
     mechanism: Mechanism, path: Path, states: list[tuple[Floats, Floats]]
 ) -> Iterator[tuple[str, str, Callable[[], object], Callable[[], object]]]:
-    """Quantity, form, and both sides' work on all states."""
+    """Yield the quantity, the form of the call, and the two functions that do the work on all states."""
     qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
     their_mass, their_bias = model_from_urdf(path).calls()
 

@@ -1,7 +1,8 @@
-"""Mechanisms against Pinocchio: how far apart, over many random states.
+"""Differences between the engine's mechanisms and Pinocchio's over many random states.
 
-Random trees, joint kinds alone, the scenes, the project's robots and random URDF texts need nothing else; the robots of
-others need a folder that is not part of the project. A URDF text is read twice, by the engine and by Pinocchio.
+The mechanisms are random trees, trees with one kind of joint, the scenes, the project's robots and random URDF texts.
+Robots of other projects need a folder that is not part of this project. The engine and Pinocchio each read the URDF
+texts themselves.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ from verification.finding import (
 from verification.mechanics.engine_differences import compare
 from verification.mechanics.random_urdf import random_urdf
 
-# Relative to the largest entry; two algorithms over chains of 30 links, each exact to some 1e-14.
+# Relative to the largest entry. For chains of 30 links each algorithm is accurate to about 1e-14.
 AGREEMENT = 1e-11
 STATES = 100
 TREE_SIZES = (1, 2, 4, 8, 16, 30)
-TREES = {"quick": 3, "full": 50}  # of each size
+TREES = {"quick": 3, "full": 50}  # trees of each size
 SEED = 20050602
 ROBOTS = Path(__file__).parents[3] / "shared" / "robots"
 SHIPPED = Path(__file__).parents[2] / "scenes"
-KIND_SIZES = (1, 6)  # joints of a tree that has one kind only
+KIND_SIZES = (1, 6)  # number of joints of a tree with one kind of joint
 WRITTEN = {"quick": 4, "full": 40}  # URDF texts of each size
 WRITTEN_SIZES = (3, 8, 20)
 Reader = Callable[[Path, bool], PinocchioMechanism]
@@ -71,7 +72,7 @@ TOLERANCE = (
 def compare_trees(
     depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
 ) -> Table:
-    """Compare random trees of every joint kind, nearly singular inertias among them, at 100 states each."""
+    """Compare random trees of every joint kind, some with nearly singular inertias, at 100 states each."""
     check_depth(depth)
     rows = of_each(TREE_SIZES, lambda joints: [_trees(joints, TREES[depth], seed)], failures,
                    lambda joints: f"trees of {joints}")  # fmt: skip
@@ -97,8 +98,8 @@ def compare_robots(
 
     Parameters
     ----------
-    folder : default `shared/robots` beside the checkout; where it is absent the finding says that it was skipped
-    depth : both depths are the same here
+    folder : default `shared/robots` beside the checkout; if it is absent, the finding says that it was skipped
+    depth : has no effect here
     """
     check_depth(depth)
     files, skipped = robot_files(folder)
@@ -109,7 +110,7 @@ def compare_robots(
 
 
 def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
-    """Return the URDF files of a folder, and why there are none where there are none."""
+    """Return the URDF files of a folder, and "" or, if there are no files, the reason."""
     place = ROBOTS if folder is None else Path(folder)
     files = sorted(place.glob("*.urdf"))
     return files, "" if files else f"no URDF files in {place.name}/, which is not part of the project"
@@ -124,13 +125,13 @@ def _robot(path: Path, floating: bool, seed: int) -> dict[str, Any]:
 
 
 def worst_of(mechanism: Mechanism, model: PinocchioMechanism, rng: np.random.Generator) -> dict[str, float]:
-    """The largest difference of each quantity over random states."""
+    """Return the largest difference of each quantity over random states."""
     found = [compare(mechanism, model, *random_state(rng, mechanism)) for _ in range(STATES)]
     return {name: max(differences[name] for differences in found) for name in found[0]}
 
 
 def largest_of(found: list[dict[str, float]]) -> dict[str, float]:
-    """The largest difference of each quantity over mechanisms, and the worst of them all."""
+    """Return the largest difference of each quantity over mechanisms, and the largest of all."""
     largest: dict[str, float] = {}
     for differences in found:
         for name, value in differences.items():
@@ -139,14 +140,14 @@ def largest_of(found: list[dict[str, float]]) -> dict[str, float]:
 
 
 def judged(table: Table) -> Table:
-    """Every quantity within AGREEMENT."""
+    """Judge each row: every difference must be at most AGREEMENT."""
     return table.judged(lambda row: bool(row["worst"] <= AGREEMENT))
 
 
 def compare_kinds(
     depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
 ) -> Table:
-    """Compare trees that have one kind of joint only."""
+    """Compare trees with one kind of joint."""
     check_depth(depth)
     rows = of_each(product(KINDS, KIND_SIZES), lambda case: _kind(*case, seed), failures)
     statement = "Each kind of joint, alone and in a tree of its own kind, is that of Pinocchio."
@@ -155,7 +156,7 @@ def compare_kinds(
 
 def _kind(kind: str, joints: int, seed: int) -> Iterator[dict[str, Any]]:
     rng = np.random.default_rng([seed, joints])
-    kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree that is fixed has nothing to compare
+    kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree of fixed joints alone has nothing to compare
     tree = random_mechanism(rng, joints, kinds)
     if tree.nv:
         yield _row(f"{joints} {kind}", "random", [(tree, model_of(tree))], rng)
@@ -177,7 +178,7 @@ def compare_scenes(
 
 
 def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
-    """Yield the scenes that have something moving."""
+    """Yield name and mechanism of each scene with at least one degree of freedom."""
     for path in sorted(SHIPPED.glob("*.yaml")):
         mechanism = mechanism_of(load_scene(path))
         if mechanism.nv:
@@ -236,7 +237,7 @@ _SETS = {
 
 
 def agreement(name: str, compared: Table) -> Part:
-    """How far one set of mechanisms is from Pinocchio."""
+    """Return the part on one set of mechanisms: their largest difference from Pinocchio."""
     rows = compared.records()
     if not rows:
         sentence = f"Robots of other projects are not compared: {compared.note}."
@@ -252,7 +253,7 @@ def agreement(name: str, compared: Table) -> Part:
 
 
 def pinocchio_table(compared: Mapping[str, Table]) -> Table:
-    """One row per mechanism of every set: the largest relative difference of each quantity."""
+    """Return one row per mechanism of every set: the largest relative difference of each quantity."""
     merged = {"placements and Jacobians": ("placement", "frame_jacobian", "point_jacobian"),
               "energies": ("kinetic_energy", "potential_energy")}  # fmt: skip
     columns = ("set", "mechanism", "base", "velocities", "states", "mass matrix", "placements and Jacobians", "bias",

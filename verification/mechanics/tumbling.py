@@ -1,6 +1,6 @@
-"""A free body tumbles: each integrator against the closed form, its drifts, and its order measured.
+"""Tumbling of a free body: errors of each integrator against the closed form, its drifts, and its measured order.
 
-The compiled step of the simulation by every integrator, and the method of fourth order that only Python has.
+The study covers every integrator of the compiled simulation, and the fourth-order method that exists only in Python.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 MASS = 0.3  # [kg]
 DRIFT = (0.2, -0.1, 0.3)  # velocity of the centre of mass [m/s]
 DURATION = 2.0  # [s], about one period
-# A gentle wobble; and close to the unstable middle axis, where the body turns over again and again.
+# A gentle wobble, and a rotation close to the unstable middle axis, in which the body flips periodically.
 MOTIONS = {
     "wobbling": TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 1.0, 3.0),
     "turning over": TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 4.0, 2.8),
@@ -41,7 +41,7 @@ COARSEST = {
 }  # steps: small enough to show the order
 HALVINGS = {"quick": 4, "full": 6}
 ORDER_TOLERANCE = 0.15  # what the next error term adds at these steps
-ROUNDING = 1e-10  # errors below this feel the rounding of some thousand steps (1e-12): no order shows there
+ROUNDING = 1e-10  # smaller errors contain the rounding of some thousand steps (1e-12) and show no order
 
 COLUMNS = (
     Column("motion", condition=True),
@@ -62,9 +62,9 @@ ORDERS = ("order", *DRIFT_ORDERS)
 
 
 class Tumble(NamedTuple):
-    """Attitude (3, 3), rate (3,) [rad/s] in body axes, place (3,) [m] and velocity (3,) [m/s] in body axes.
+    """Attitude (3, 3), rate (3,) [rad/s] in body axes, position (3,) [m] and velocity (3,) [m/s] in body axes.
 
-    A path of n states has each of them with n in front.
+    For a path of n states, each array has n as its first dimension.
     """
 
     axes: Floats
@@ -74,7 +74,7 @@ class Tumble(NamedTuple):
 
 
 def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Measure every integrator on both motions, over a row of halved steps."""
+    """Measure every integrator on both motions, with repeatedly halved steps."""
     check_depth(depth)
 
     def rows_of(case: tuple[str, Integrator]) -> Iterator[dict[str, Any]]:
@@ -94,19 +94,19 @@ def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Tab
 
 
 def exact(body: TorqueFreeBody, time: float) -> Tumble:
-    """The closed form; the world's axes are the body's at the start, and the centre of mass starts at the origin."""
+    """Return the closed-form state; at time 0 the world axes are the body axes, and the centre of mass is the origin."""
     axes = body.axes(0.0).T @ body.axes(time)
     drift = np.array(DRIFT)
     return Tumble(axes, body.rates(time), drift * time, axes.T @ drift)
 
 
 def mechanism_of(body: TorqueFreeBody) -> Mechanism:
-    """The body on a free flyer."""
+    """Return the mechanism of the body with a free-flyer joint."""
     return Mechanism([Body("body", None, Joint("free_flyer"), mass=MASS, inertia=np.diag(body.moments))])
 
 
 def path_by_python(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumble:
-    """The states over DURATION by `Integrator.step`."""
+    """Return the states over DURATION, computed by `Integrator.step`."""
     mechanism = mechanism_of(body)
 
     def acceleration(q: Floats, v: Floats) -> Floats:
@@ -119,7 +119,7 @@ def path_by_python(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumb
 
 
 def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumble:
-    """The states over DURATION by the simulation."""
+    """Return the states over DURATION, computed by the simulation."""
     start = [float(x) for x in (*DRIFT, *body.rates(0.0))]
     values = {"rate": steps / DURATION, "duration": DURATION, "bodies.tennis_racket.mass": MASS,
               "bodies.tennis_racket.inertia": list(body.moments), "bodies.tennis_racket.velocity": start}  # fmt: skip
@@ -155,7 +155,7 @@ def _halved(
 
 
 def errors(path: Tumble, truth: Tumble, body: TorqueFreeBody) -> dict[str, float]:
-    """Return the errors at the end, and the largest drifts of energy and angular momentum on the way."""
+    """Return the errors at the end, and the largest drifts of energy and angular momentum along the path."""
     moments = np.array(body.moments)
     energy = 0.5 * (path.rate**2 @ moments + MASS * np.sum(path.velocity**2, axis=1))
     spin = np.einsum("nij,nj->ni", path.axes, moments * path.rate)
@@ -169,7 +169,7 @@ def errors(path: Tumble, truth: Tumble, body: TorqueFreeBody) -> dict[str, float
 
 
 def judged(table: Table) -> Table:
-    """The last orders that show in each series are those that must be the declared one, or for a drift no less."""
+    """Judge the last measurable order of each series: it must be the declared one; drifts may have a higher order."""
     series: dict[Any, list[int]] = {}
     records = table.records()
     for k, row in enumerate(records):
@@ -184,14 +184,14 @@ def judged(table: Table) -> Table:
 
 
 def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
-    """The error with the declared order; a drift may fall faster, or be rounding and show none."""
+    """Whether the error has the declared order and each drift at least that order, or no order due to rounding."""
     drifts = [shown[name][-1] for name in DRIFT_ORDERS if shown[name]]
     equal = abs(shown["order"][-1] - declared) <= ORDER_TOLERANCE
     return bool(equal and all(order >= declared - ORDER_TOLERANCE for order in drifts))
 
 
 def convergence(table: Table) -> Part:
-    """The orders found for each integrator."""
+    """Return the part on convergence: the measured orders of each integrator."""
     judges = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
     series = "; ".join(
         f"{words(name)}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
