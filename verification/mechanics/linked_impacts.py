@@ -24,7 +24,7 @@ from verification.finding import REFUTED, REPRODUCED, Failure, Part, Table, of_e
 
 Floats = NDArray[np.float64]
 
-# Start gaps that put contacts in an order for the event-driven reference, where gaps are linear: any size will do.
+# Initial gaps that order the contacts for the event-driven reference; its gaps change linearly, so any size works.
 _GAP = 1e-3
 # Relative change of energy or momentum that is rounding: some thousand roundings of numbers of order one.
 CONSERVED = 1e-12
@@ -126,7 +126,7 @@ def _mapped(balls: LinkedBalls, treatment: str, rows_in_words: str, rows: Floats
 
 
 def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
-    """Yield event-driven outcomes: all contacts at once by Newton's LCP, then each order in which contacts may close."""
+    """Yield event-driven outcomes: all contacts at once by Newton's LCP, then each order in which they may close."""
     c = len(balls.contacts)
     yield _event_driven(balls, "all at once, Newton's LCP", np.zeros(c))
     if balls.name.startswith("cradle"):

@@ -35,10 +35,10 @@ FIELD = np.array([0.5, -9.81, 2.0])  # [m/s^2], along no axis
 METHODS = (INTEGRATORS["semi_implicit_euler"], INTEGRATORS["midpoint"], COMMUTATOR_FREE_4)
 SIZES = (1, 3, 10, 30)  # joints
 TREES = {"quick": 15, "full": 200}
-LONGEST = 2e-2  # [s]; halved until the defect is below SMALL^order, where the leading error term rules
+LONGEST = 2e-2  # [s]; halved until the defect is below SMALL^order, where the leading error term dominates
 HALVINGS = 14
 SMALL = 0.02
-NEGLIGIBLE = 1e-10  # a relative defect below this would soon meet rounding
+NEGLIGIBLE = 1e-10  # smaller relative defects are close to rounding
 SPEED = 0.3  # [m/s, rad/s]: the motion is smooth over such a step
 ORDER_TOLERANCE = 0.25  # of the median over trees, for the next error terms, which are larger in long chains
 # Condition number of M scaled to a unit diagonal, above which rounding determines the sign of the least eigenvalue.

@@ -94,7 +94,7 @@ def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Tab
 
 
 def exact(body: TorqueFreeBody, time: float) -> Tumble:
-    """Return the closed-form state; at time 0 the world axes are the body axes, and the centre of mass is the origin."""
+    """Return the closed-form state; at time 0 the world frame is the body frame at the centre of mass."""
     axes = body.axes(0.0).T @ body.axes(time)
     drift = np.array(DRIFT)
     return Tumble(axes, body.rates(time), drift * time, axes.T @ drift)

@@ -1,1 +1,1 @@
-"""Scenes: what the runs of the scenes that come with the project hold, lose and leave open."""
+"""Scenes: the energy balance of the runs of the project's scenes, with losses and residuals."""

@@ -1,11 +1,11 @@
-"""The energy books of a run: what it held, was given and lost, and what the steps in time leave open, by size.
+"""The energy balance of a run: stored energy, work, losses, and the residual of the time integration.
 
-The normal force (5) of a contact is a spring K s and a damper −B v_n, together never pulling. The spring's energy is
-K s² / 2; the damper's work is its force, held over the step, times the distance that the touching points moved apart.
+The normal force (5) of a contact is a spring K s and a damper −B v_n; their sum never pulls. The spring stores
+K s² / 2. The damper's work is its force, held over the step, times the distance by which the touching points separate.
 
-A force held over a step does not do the work of the force that changes within it. That error is the integrator's, and
-falls with its declared order; anything in the books that does not fall is a fault. It has two channels, the motion and
-the contact springs, which may have opposite signs: their sizes are added, so that one cannot hide the other.
+A force held over a step does other work than a force that changes within the step. This error belongs to the integrator
+and falls with its declared order; any residual that does not fall is a fault. The residual has two channels, the motion
+and the contact springs. The two may have opposite signs, so their absolute values are added.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from iapb.scene.mechanism import mechanism_of
 Floats = NDArray[np.float64]
 Book = Mapping[str, float]
 
-REFINEMENTS = (1, 2, 4)  # steps of the scene's length, of half and of a quarter of it
-ROUNDING = 1e-12  # share of all energy in the books: some thousand sums in double precision stay below
-ORDER_SLACK = 0.25  # by which a measured order may fall short: collisions come at other instants at another step
+REFINEMENTS = (1, 2, 4)  # divisors of the scene's step
+ROUNDING = 1e-12  # share of the total energy that bounds the rounding of some thousand sums in double precision
+ORDER_SLACK = 0.25  # tolerance below the declared order, because collision times change with the step
 BOOK = (
     "kinetic, start [J]", "potential, start [J]", "in contact springs, start [J]", "kinetic, end [J]",
     "potential, end [J]", "in contact springs, end [J]", "work of the hand [J]", "work of the coupling [J]",
@@ -42,7 +42,7 @@ _HELD = ("kinetic", "potential", "in contact springs")
 
 @dataclass(frozen=True)
 class EnergySeries:
-    """The books at every instant (n + 1,) [J]: what is held, what was put in so far, what was lost so far."""
+    """Energies at every instant (n + 1,) [J]: stored energies, and work and losses accumulated so far."""
 
     kinetic: Floats
     potential: Floats
@@ -54,7 +54,7 @@ class EnergySeries:
 
 
 def energy_series(run: Run) -> EnergySeries:
-    """Return the books of a run over time."""
+    """Return the energies of a run over time."""
     ledger, (springs, damping_work) = run.energy, contact_energy(run, scene_of(run))
 
     def so_far(sums: Floats) -> Floats:
@@ -67,15 +67,16 @@ def energy_series(run: Run) -> EnergySeries:
 
 
 def scene_of(run: Run) -> Scene:
-    """Return the scene that the run carries with it."""
+    """Return the scene that is stored in the run."""
     return scene_from_text(json.dumps(run.scene_resolved))
 
 
 def energy_book(run: Run) -> dict[str, float]:
-    """Close the books of a run: the quantities of BOOK by their keys.
+    """Return the energy balance of a run: the quantities of BOOK by key.
 
-    The ledger (`iapb.mechanics.energy`) has the work of the penalties in one sum; here it is split into what the
-    springs hold at the end, what the dampers took, and the rest, which a spring felt only once a step makes up.
+    `iapb.mechanics.energy` records the work of the penalties as one sum. This function splits it into the energy in the
+    springs at the end, the work of the dampers, and the remainder, which is the error of one spring evaluation per
+    step.
     """
     series, ledger, turned = energy_series(run), run.energy, turned_over(run)
     parts = dict(zip(_HELD, (series.kinetic, series.potential, series.springs), strict=True))
@@ -97,7 +98,8 @@ def energy_book(run: Run) -> dict[str, float]:
 
 
 def turned_over(run: Run) -> float:
-    """Return the largest of: kinetic energy at any time, range of the potential, work of hand and of coupling [J]."""
+    """Return the energy exchanged [J]: the largest of kinetic energy, range of the potential, work of hand or coupling.
+    """
     ledger = run.energy
     candidates = [ledger["kinetic"].max(), np.ptp(ledger["potential"])]
     candidates += [np.abs(ledger[name]).max(initial=0.0) for name in ("hand_work", "coupling_work")]
@@ -105,32 +107,33 @@ def turned_over(run: Run) -> float:
 
 
 def share(part: float, whole: float) -> float:
-    """Return part / whole; nothing of nothing is no share."""
+    """Return part / whole, or 0 if whole is 0."""
     return part / whole if whole > 0.0 else 0.0
 
 
 def left_open(book: Book) -> float:
-    """Return the size [J] of what the motion and the springs make up, added without signs."""
+    """Return the energy residual [J]: the sum of the absolute residuals of motion and springs."""
     return abs(book["open: motion"]) + abs(book["open: springs"])
 
 
 def total(book: Book, when: str) -> float:
-    """Return all energy [J] that is held at the "start" or the "end"."""
+    """Return the total stored energy [J] at the "start" or the "end"."""
     return sum(book[f"{name}, {when}"] for name in _HELD)
 
 
 def is_rounding(book: Book) -> bool:
-    """Tell whether what is open is no more than rounding of the energies in the books."""
+    """Whether the energy residual is at most the rounding of the energies."""
     scale = max(abs(total(book, "start")), abs(total(book, "end")), book["energy turned over"])
     return left_open(book) <= ROUNDING * scale
 
 
 @dataclass(frozen=True)
 class OpenBooks:
-    """What a scene leaves open at shorter steps.
+    """Energy residuals of a scene at decreasing steps.
 
-    step : the scene's own [s]; refinements : by which it was divided
-    open_shares : at each refinement, by size, of the energy turned over; order : None where all is rounding
+    step : the scene's own step [s]; refinements : divisors of this step
+    open_shares : energy residual at each refinement, as a share of the energy exchanged
+    order : measured order of the residual; None if the residual is rounding
     """
 
     scene: str
@@ -142,11 +145,12 @@ class OpenBooks:
 
     @property
     def falls_as_declared(self) -> bool:
-        """Whether what is open is rounding, or falls at least with the declared order."""
+        """Whether the residual is rounding or falls at least with the declared order."""
         return self.order is None or self.order >= self.declared_order - ORDER_SLACK
 
     def step_for(self, wanted: float) -> float | None:
-        """Return the step [s] at which a share `wanted` is left open: the tried one, else by the measured order."""
+        """Return a step [s] whose residual is at most the share `wanted`: a tested step or one from the measured order.
+        """
         for factor, found in zip(self.refinements, self.open_shares, strict=True):
             if found <= wanted:
                 return self.step / factor
@@ -156,16 +160,16 @@ class OpenBooks:
 
 
 def measured_order(first: float, last: float, refinement: float) -> float:
-    """Return p of an error that falls as step^p from `first` to `last`, over a refinement of the step."""
+    """Return p if the error falls as step^p from `first` to `last` when the step is divided by `refinement`."""
     return math.log(first / last) / math.log(refinement) if last > 0.0 else math.inf
 
 
 def open_books(
     scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequence[int] = REFINEMENTS
 ) -> OpenBooks:
-    """Run a scene at shorter and shorter steps and return what its books leave open.
+    """Run a scene at decreasing steps and return its energy residuals.
 
-    simulate : returns the run of a scene, in whatever world
+    simulate : returns the run of a scene in any world
     """
     books: list[dict[str, float]] = []
     for factor in refinements:
@@ -185,8 +189,8 @@ def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats]:
     step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))
     overlap = np.maximum(-contacts.gap, 0.0)
     spring = scene.contact.stiffness * overlap
-    # Spring and damper act where they push, or where the damper cancels the spring. In a group that collides
-    # neither acts: the impulse does. Where the damper would pull more than the spring pushes it is cut.
+    # Spring and damper act if they push, or if the damper cancels the spring. In a colliding group the impulse acts
+    # instead of both. The damper is limited if it would pull more than the spring pushes.
     cancelled = spring <= scene.contact.damping * contacts.normal_velocity
     acts = (contacts.normal_force != 0.0) | cancelled
     damper = np.where(acts, contacts.normal_force - spring, 0.0)
@@ -196,7 +200,8 @@ def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats]:
 
 
 def separations(run: Run, scene: Scene, step: NDArray[np.int64]) -> Floats:
-    """Return how far (m,) [m] the touching points of each contact moved apart along its normal during its step."""
+    """Return the distance (m,) [m] by which the touching points of each contact separate along its normal in its step.
+    """
     contacts = run.contacts
     if not len(step):
         return np.zeros(0)

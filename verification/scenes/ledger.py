@@ -1,4 +1,4 @@
-"""The scenes that come with the project, in the world IAPB: how deep, where the energy went, how long a step takes."""
+"""The project's scenes in the world IAPB: penetration, energy balance, and the energy residual at shorter steps."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ QUESTION = (
 )
 WORLD = "IAPB"
 REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
-INSTANTS = 90  # of the books over time: as many as a strip of the figure can show
+INSTANTS = 90  # instants of the energy balance over time: as many as a strip of the figure can show
 
-AT_REST = 1e-3  # share of the largest kinetic energy below which a scene is said to have come to rest
-NEVER_MOVED = 1e-9  # share of the energy turned over: a kinetic energy below it is rounding and settling springs
-LAST_PART = 0.1  # share of the run in which it has to be so
+AT_REST = 1e-3  # a scene is at rest if its kinetic energy is below this share of its largest kinetic energy
+NEVER_MOVED = 1e-9  # share of the energy exchanged; a smaller kinetic energy is rounding or due to settling springs
+LAST_PART = 0.1  # share of the run, at its end, in which the scene must be at rest
 RESTS, SETTLES, MOVES, STOPPED = "stays at rest", "comes to rest", "keeps moving", "stopped: "
 
-DEEP = 0.5  # share of the thinnest moving shape from where a contact would be pushed out on the wrong side
-WORTH_NAMING = 1.0  # [%] of the energy turned over from which open books are named one by one
-WIDE = 2.0  # [%] from which the sentence gives both channels; the table has them for every scene
+DEEP = 0.5  # penetration, as a share of the thinnest moving shape, from which contacts push to the wrong side
+WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes with a larger energy residual are listed
+WIDE = 2.0  # [%] of the energy exchanged, above which the sentence gives both channels; the table always gives them
 
 CONTACTS = titled((
     "scene", "dimensions", "steps", "step [ms]", "most penetration [mm]", "thinnest moving shape [mm]", "impacts",
@@ -72,11 +72,11 @@ _SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_dam
 
 
 def scene_ledger(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Run every scene, at shorter steps too, and keep the books of each.
+    """Run every scene, also at shorter steps, and compute the energy balance of each.
 
     Parameters
     ----------
-    run : (scene, world, keep=True) -> Run; what need not be kept is asked for with keep=False
+    run : (scene, world, keep=True) -> Run; runs that need not be stored use keep=False
     """
     names, failures = scene_names(), list[Failure]()
     done = iter(range(len(names)))
@@ -97,7 +97,7 @@ def scene_ledger(run: Callable[..., Run], depth: str, progress: Callable[[int, i
 def finding(
     measures: Sequence[Measure], books: Sequence[OpenBooks], series: Sequence[Table], failures: Sequence[Failure] = ()
 ) -> Finding:
-    """Return what these records say."""
+    """Return the Finding made from these records."""
     judges = {
         "overlap": partial(_penetration, measures), "impacts": partial(_impacts, measures),
         "order": partial(_order, books), "open books": partial(_open, measures, books),
@@ -134,7 +134,7 @@ def measure(run: Run) -> dict[str, Any]:
 
 
 def ending(run: Run, turned: float) -> str:
-    """Return in words how the scene stands in the last tenth of the run."""
+    """Return in words whether the scene rests or moves in the last tenth of the run."""
     if not run.complete:
         return STOPPED + run.stopped
     kinetic = run.energy["kinetic"]
@@ -145,7 +145,7 @@ def ending(run: Run, turned: float) -> str:
 
 
 def thinnest(run: Run) -> float | None:
-    """Return the smallest thickness [mm] of a moving shape; None where there is no shape."""
+    """Return the smallest thickness [mm] of a moving shape; None if there is no shape."""
     shapes = [shape for body in run.scene_resolved["bodies"] for shape in body["shapes"]]
     return 1e3 * min(map(_thickness, shapes)) if shapes else None
 
@@ -157,12 +157,12 @@ def _thickness(shape: Mapping[str, Any]) -> float:
 
 
 def contacts(measures: Sequence[Measure]) -> Table:
-    """How deep, how many collisions, how it ends."""
+    """Return the table of penetrations, numbers of collisions, and final states."""
     return table_of(CONTACTS, measures, digits=3)
 
 
 def ledger(measures: Sequence[Measure]) -> Table:
-    """Every joule of each run."""
+    """Return the table with the energy balance of each run."""
     note = (
         "End − start = work of hand and coupling − losses + open. Open is the residual: energy that time stepping "
         "created (> 0) or lost (< 0). Its part in the motion comes from forces held constant over a step, its part in "
@@ -175,7 +175,7 @@ def ledger(measures: Sequence[Measure]) -> Table:
 
 
 def left_open_table(books: Sequence[OpenBooks]) -> Table:
-    """What is open at shorter and shorter steps, the order at which it falls, and the step where it is gone."""
+    """Return the energy residuals at decreasing steps, their order, and the step at which they fall to WORTH_NAMING."""
     refinements: tuple[int, ...] = max((each.refinements for each in books), key=len, default=())
     headings = ["open at the scene's step [%]" if k == 1 else f"at 1/{k} of it [%]" for k in refinements]
     rows = [
@@ -198,7 +198,7 @@ def _milliseconds(books: OpenBooks) -> float | None:
 
 
 def over_time(runs: Sequence[Run]) -> Table:
-    """The books of each run at some instants, with the impacts since the instant before."""
+    """Return the energies of each run at some instants, with the number of impacts since the previous instant."""
     rows: list[tuple[object, ...]] = []
     for run in runs:
         series = energy_series(run)
@@ -256,7 +256,7 @@ def _order(books: Sequence[OpenBooks]) -> Part:
 
 
 def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
-    """By size: where the two channels have opposite signs, their sum would hide both."""
+    """Return the part on energy residuals. It adds the sizes of both channels, because opposite signs would cancel."""
     wide = sorted((m for m in measures if _open_share(m) > WORTH_NAMING), key=_open_share, reverse=True)
     if not wide:
         return Part(f"No residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged at the scene's own time step.",
@@ -275,7 +275,7 @@ def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
 
 
 def _channels(m: Measure) -> str:
-    """Both channels of the widest books in words, in joules with their signs."""
+    """Return both channels of a large energy residual in words, in joules with their signs; "" for a small one."""
     if _open_share(m) <= WIDE:
         return ""
     found = ((name, float(m[f"open: {name}"])) for name in ("motion", "springs"))
@@ -307,7 +307,7 @@ def _gains(measures: Sequence[Measure]) -> Part:
 
 
 def _floor(m: Measure) -> float:
-    """Rounding of all that is held, as a share of the energy turned over."""
+    """Return the rounding error of the total energy as a share of the energy exchanged."""
     held = max(abs(total(m, "start")), abs(total(m, "end")))
     return ROUNDING * held / m["energy turned over"] if m["energy turned over"] else np.inf
 

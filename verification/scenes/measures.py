@@ -1,4 +1,4 @@
-"""What the trajectory claims measure, each from one or two traces. Lengths in metres, angles in radians."""
+"""Quantities of the trajectory claims, computed from one or two traces. Lengths in metres, angles in radians."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from verification.scenes.trace import HALF_SIZE, Trace
 
 Floats = NDArray[np.float64]
 
-# Slower than this in every coordinate is settled: 1 mm/s and 0.01 rad/s are below a hundredth of the peg's speed at
-# contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
+# The device has settled if it is slower than this in every coordinate: 1 mm/s and 0.01 rad/s are below a hundredth of
+# the peg's speed at contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
 SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
 
-# A corner has left its wall where it is further away than this [m]: a twentieth of the
-# static sink F_h / K, above the flicker of resting contacts
+# A corner has left its wall if it is further away than this [m]: a twentieth of the
+# static penetration F_h / K, above the jitter of resting contacts
 LIFTED = 1e-5
-TOUCHING = 1e-6  # and touches it again below this [m]: rigid worlds keep contacts at zero up to rounding
+TOUCHING = 1e-6  # a corner touches the wall again below this [m]; rigid worlds keep contacts at zero up to rounding
 
 
 def settled_at(trace: Trace) -> int:
-    """Return the state from which on the device is slower than SETTLED_SPEED; len(time) where it never is."""
+    """Return the index of the state after which the device stays slower than SETTLED_SPEED; len(time) if never."""
     moving = np.flatnonzero(np.any(np.abs(trace.device_velocity) > SETTLED_SPEED, axis=1))
     return int(moving[-1]) + 1 if len(moving) else 0
 
 
 def settling_time(trace: Trace) -> float | None:
-    """Return when the device came to rest, counted from its first contact [s]; None where it has not yet."""
+    """Return the time [s] from the first contact until the device settles; None if it does not settle."""
     state = settled_at(trace)
     if state >= len(trace.time):
         return None
@@ -36,27 +36,27 @@ def settling_time(trace: Trace) -> float | None:
 
 
 def comparison_window(traces: Sequence[Trace]) -> slice:
-    """States from the first contact in any of the worlds until all have settled, or to the end of the runs."""
+    """Return the states from the first contact in any world until all worlds have settled, or until the runs end."""
     length = len(traces[0].time)
     start = min(min(trace.first_contact for trace in traces), length - 2)
     return slice(start, max(start + 2, min(max(map(settled_at, traces)) + 1, length)))
 
 
 def root_mean_square(trace: Trace, ideal: Trace, window: slice) -> Floats:
-    """Return the RMS distance of the two device trajectories per coordinate (3,)."""
+    """Return the RMS distance between the two device trajectories per coordinate (3,)."""
     return np.sqrt(np.mean((trace.device[window] - ideal.device[window]) ** 2, axis=0))
 
 
 def largest_distance(trace: Trace, ideal: Trace, window: slice) -> Floats:
-    """Return the largest distance of the two device trajectories per coordinate (3,)."""
+    """Return the largest distance between the two device trajectories per coordinate (3,)."""
     return np.max(np.abs(trace.device[window] - ideal.device[window]), axis=0)
 
 
 def momentum_distance(trace: Trace, ideal: Trace, window: slice) -> Floats:
-    """Return the RMS distance of the momenta that the actuators have given so far, per coordinate [N s, N m s].
+    """Return the RMS distance between the accumulated impulses of the actuators, per coordinate [N s, N m s].
 
-    Forces are compared through their time integral: a spike of one step that comes one step later is then a small
-    difference, where the force itself differs by all of its height.
+    Forces are compared through their time integral. If a force peak of one step comes one step later, the integrals
+    differ little, while the forces differ by the whole peak.
     """
     given = np.cumsum(trace.device_force - ideal.device_force, axis=0) * ideal.dt
     return np.sqrt(np.mean(given[window] ** 2, axis=0))
@@ -68,7 +68,7 @@ def peak_force(trace: Trace) -> Floats:
 
 
 def resting_force(trace: Trace) -> Floats | None:
-    """Return the mean actuator force after settling (3,) [N, N m]; None where the device has not settled."""
+    """Return the mean actuator force after settling (3,) [N, N m]; None if the device does not settle."""
     state = settled_at(trace)
     return None if state >= len(trace.device_force) else np.mean(trace.device_force[state:], axis=0)
 
@@ -84,7 +84,7 @@ def largest_separation(trace: Trace) -> Floats:
 
 
 def bounces(trace: Trace) -> int:
-    """Return how often a corner of the device's peg leaves a wall that it has touched."""
+    """Return the number of times that a corner of the device's peg leaves a wall after touching it."""
     return sum(_departures(gap) for gap in corner_gaps(trace.device))
 
 
@@ -101,12 +101,12 @@ def corner_gaps(positions: Floats) -> list[Floats]:
 
 
 def _departures(gap: Floats) -> int:
-    """Times the gap goes above LIFTED after having been below TOUCHING."""
+    """Return the number of times that the gap exceeds LIFTED after it was at most TOUCHING."""
     events = np.where(gap <= TOUCHING, 1, np.where(gap > LIFTED, -1, 0))
     events = events[events != 0]
     return int(np.sum((events[:-1] == 1) & (events[1:] == -1)))
 
 
 def share_limited(trace: Trace) -> float:
-    """Return the share of the impacts that the device's limits cut."""
+    """Return the share of the impacts that the device's limits reduce."""
     return float(np.mean(trace.impact_scale < 1.0)) if len(trace.impact_scale) else 0.0

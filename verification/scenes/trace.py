@@ -1,4 +1,4 @@
-"""Trace: the part of a run of the peg that the claims measure. Small, so that hundreds can be kept, and plain, so
+"""Trace: the part of a run of the peg that the claims use. It is small, so that hundreds fit in memory, and plain, so
 that a test can write one by hand."""
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class Trace:
     ----------
     time : (n + 1,) [s]
     device, tool : (n + 1, 3) positions [m, rad]; device_velocity : (n + 1, 3)
-    device_force : (n, 3) what the device's actuators apply [N, N m]
+    device_force : (n, 3) force of the device's actuators [N, N m]
     hand_force : (n, 3) [N, N m]
-    penetration : (n,) deepest overlap in the step [m], zero without one
+    penetration : (n,) deepest overlap in the step [m], zero without overlap
     new_contact : (n,) whether a contact began in the step
     impact_step : (k,) steps with a collision; energy_lost : (k,) [J]; impact_scale : (k,) share of the impulse
     kinetic_energy : (n + 1,) of the tool [J]
@@ -53,7 +53,7 @@ class Trace:
 
     @property
     def first_contact(self) -> int:
-        """Step of the first contact; the number of steps where there is none."""
+        """Index of the step with the first contact; the number of steps if there is no contact."""
         steps = np.flatnonzero(self.new_contact)
         return int(steps[0]) if len(steps) else len(self.new_contact)
 

@@ -1,2 +1,2 @@
-"""Stability of sampled contact (C20, C21): a mass on a wall with exact physics between the samples, the peg of the
-engine, and how hard a wall feels. Plain records, no files written."""
+"""Stability of sampled contact (C20, C21): a mass at a wall with exact motion between the samples, the peg in the
+engine, and the rate-hardness of a wall. The studies return plain records and write no files."""

@@ -1,4 +1,4 @@
-"""How stable sampled contact is, with penalties and with impulses (C20, C21), and how hard it feels: the finding."""
+"""Finding on the stability of sampled contact with penalties and impulses (C20, C21), and on its rate-hardness."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ Maps = Sequence[StabilityMap]
 
 
 def contact_stability(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Map the sampled wall, and put the peg under the same laws.
+    """Compute the stability maps of the sampled wall, and run the peg under the same laws.
 
     Parameters
     ----------
-    run : (scene, world, keep, partial) -> Run; nothing is kept, and a run that gives up is taken as it is
+    run : (scene, world, keep, partial) -> Run; no run is stored, and incomplete runs are used
     """
     failures: list[Failure] = []
     maps = stability_maps(depth, failures)
@@ -76,7 +76,7 @@ def _pairs(maps: Maps) -> list[tuple[StabilityMap, StabilityMap]]:
 
 
 def maps_table(maps: Maps) -> Table:
-    """A row per loop and stiffness; outcomes as one mark for each damping."""
+    """Return a table with one row per loop and stiffness, and one mark per damping for its outcome."""
     rows = []
     for penalty, impulses in _pairs(maps):
         size = len(penalty.stiffness)
@@ -98,7 +98,7 @@ def _loop(one: StabilityMap) -> tuple[float, str, float]:
 
 
 def held(maps: Maps) -> Part:
-    """How many walls each law holds."""
+    """Return the part on the number of walls that are stable under each law."""
     theirs, ours = (np.array([pair[law].contact.settled for pair in _pairs(maps)]) for law in (0, 1))
     more, lost = ours.sum(axis=1) / theirs.sum(axis=1), int((theirs & ~ours).sum())
     return Part(
@@ -110,7 +110,7 @@ def held(maps: Maps) -> Part:
 
 
 def beyond(maps: Maps) -> Part:
-    """Whether the condition holds; it speaks of ideal sensors and penalties."""
+    """Return the part on the condition b >= KT/2 + |B|, which applies to ideal sensors and penalties."""
     chosen = [one for one in maps if one.passive.any() and one.law == "penalty" and not one.loop.delay]
     passive = np.stack([one.passive for one in chosen])
     grown, settled = (np.array([getattr(one.contact, name) for one in chosen]) for name in ("grown", "settled"))
@@ -123,7 +123,7 @@ def beyond(maps: Maps) -> Part:
 
 
 def undamped(maps: Maps) -> Part:
-    """What a device without damping holds."""
+    """Return the part on the stable walls of a device without damping."""
     bare = [one for one in maps if one.loop.device_damping == 0.0 and not one.loop.delay and one.law == "penalty"]
     shares = ", ".join(f"{100 * one.settled_share:.0f} % at {one.loop.rate:.0f} Hz" for one in bare)
     return Part(
@@ -132,7 +132,7 @@ def undamped(maps: Maps) -> Part:
 
 
 def hard(maps: Maps) -> Part:
-    """How hard an impulse feels, and how deep it lets the hand, beside penalties."""
+    """Return the part on rate-hardness and penetration of impulses, relative to penalties."""
     pairs = [(theirs.contact, ours.contact, rows) for theirs, ours, rows in _at_paper(maps)]
     harder, deeper = (
         [float(np.median(getattr(ours, name)[rows] / getattr(theirs, name)[rows])) for theirs, ours, rows in pairs]
@@ -147,7 +147,7 @@ def hard(maps: Maps) -> Part:
 
 
 def _at_paper(maps: Maps) -> list[tuple[StabilityMap, StabilityMap, slice]]:
-    """Both maps of each loop, and where the paper's damping is in them."""
+    """Return both maps of each loop, and the slice of the paper's damping in them."""
     found = []
     for theirs, ours in _pairs(maps):
         size, row = len(theirs.stiffness), int(np.flatnonzero(theirs.damping == PAPER_DAMPING)[0])
@@ -156,7 +156,7 @@ def _at_paper(maps: Maps) -> list[tuple[StabilityMap, StabilityMap, slice]]:
 
 
 def hardness(maps: Maps) -> Table:
-    """A row per loop, law and stiffness at the paper's damping."""
+    """Return a table with one row per loop, law and stiffness at the paper's damping."""
     rows = []
     for theirs, ours, at in _at_paper(maps):
         for one in (theirs, ours):

@@ -1,18 +1,18 @@
 """The hand's port of a whole device scene: sensors, coupling, tool, contact law and actuators in the engine's loop.
 
-A hand moves the device along prescribed positions x_k, one per step; what the loop makes of them are forces F_k that
-the actuators hold until the next sample. As at the bare wall (`verification.laws.engine_laws.hand_port`), of all
-motions through the same positions the straight one loses least in the physical damping b, and the device's inertia
-stores energy and makes none, so the hand has put in at least
+A hand moves the device along prescribed positions x_k, one per step. The loop answers with forces F_k, which the
+actuators hold until the next sample. As for the wall alone (`verification.laws.engine_laws.hand_port`), uniform motion
+between the positions dissipates least in the physical damping b, and the device's inertia only stores energy. The hand
+therefore supplies at least
 
     E_n = Σ −F_k Δx_k + b Δx_k²/T,       and needed(n) = Σ F_k Δx_k / Σ Δx_k²/T
 
-is the least b with E_n >= 0. In the world CBuc with e = 0 and ideal sensors, a tool that rests on the wall makes the
-coupler that wall of stiffness K_cpl and damping B_cpl: b >= K_cpl T/2 + B_cpl is enough. With the four-channel
-controller the tool moves by itself, and wall, coordination and the tool's inertia answer the hand together: no such
-bound is proved, K and B are the wall's, and what b the loop needs is measured.
+is the least b with E_n >= 0. In the world CBuc with e = 0 and ideal sensors, if the tool rests on the wall, the coupler
+acts as a wall of stiffness K_cpl and damping B_cpl, so b >= K_cpl T/2 + B_cpl is sufficient. With the four-channel
+controller the tool moves, and the force depends on wall, coordination and the tool's inertia. No such bound is proved
+for this case; K and B are then the wall's constants, and the study measures the b that the loop needs.
 
-The hand's force is not told to the tool (a force channel needs a sensor): the position channels and F_env work.
+The tool does not receive the hand's force, since a force channel needs a sensor; the position channels and F_env act.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from reference.worlds import find_world
 Floats = NDArray[np.float64]
 
 COUPLER_WORLD = "CBuc"
-RADIUS = 0.01  # [m] of the tool, a disc on a slide; the wall is at 0
+RADIUS = 0.01  # [m] of the tool, a disc that slides along x; the wall is at 0
 COORDINATION = (100.0, 70.0)  # Table I: K_coord [N/m], B_coord [N s/m]
 
 
 @dataclass(frozen=True)
 class DeviceLoop:
-    """A device before a wall (SI units).
+    """A device and a tool in front of a wall (SI units).
 
-    stiffness, damping : of the wall in the four-channel worlds, of the coupler in CBuc
-    dt : T; mass, clearance : of the tool, and its distance from the wall at the start
-    delay : steps that readings and forces take, each; resolution : of the position sensor
+    stiffness, damping : constants of the wall in the four-channel worlds, of the coupler in CBuc
+    dt : the step T; mass, clearance : mass of the tool, and its initial distance from the wall
+    delay : delay of the readings and of the forces [steps each]; resolution : of the position sensor
     """
 
     world: str
@@ -55,18 +55,18 @@ class DeviceLoop:
 
     @property
     def bound(self) -> float:
-        """KT/2 + |B|: Colgate's and Schenkel's condition on b [N s/m]."""
+        """KT/2 + |B|: the lower bound on b in Colgate and Schenkel's condition [N s/m]."""
         return 0.5 * self.stiffness * self.dt + abs(self.damping)
 
     @property
     def bound_with_coordination(self) -> float:
-        """The same with the gains of the coordination added to the wall's, where there is one [N s/m]."""
+        """KT/2 + |B| with the gains of the coordination, if there is one, added to those of the wall [N s/m]."""
         if self.world == COUPLER_WORLD:
             return self.bound
         return self.bound + 0.5 * COORDINATION[0] * self.dt + COORDINATION[1]
 
     def scene(self) -> Scene:
-        """Tool, wall and gains; e = 0."""
+        """Return the scene with tool, wall and gains; e = 0."""
         own, gains = [self.stiffness, self.damping], COORDINATION
         wall = {"stiffness": own[0], "damping": own[1]} if self.world != COUPLER_WORLD else {}
         couplings = {"four_channel": {"stiffness": [gains[0]], "damping": [gains[1]]},
@@ -82,7 +82,8 @@ class DeviceLoop:
 
 
 class MovedDevice:
-    """A device that a hand moves along positions (n + 1,), read through sensors; it keeps what it is told."""
+    """A device that a hand moves along positions (n + 1,), read through sensors; it records the forces applied to it.
+    """
 
     def __init__(self, positions: Floats, loop: DeviceLoop) -> None:
         step = loop.resolution
@@ -93,23 +94,24 @@ class MovedDevice:
         self._forces: list[float] = []
 
     def read(self) -> DeviceReading:
-        """Return position and velocity, quantised and late; the velocity is their difference over one step."""
+        """Return the quantised, delayed position, and its difference over one step as the velocity."""
         k = len(self._forces)
         return DeviceReading(self._q[k : k + 1].copy(), self._v[k : k + 1].copy())
 
     def apply(self, force: ArrayLike) -> None:
-        """Take the force; the hand moves on."""
+        """Record the force and advance the hand by one step."""
         self._forces.append(float(np.asarray(force)[0]))
 
     def held_forces(self, delay: int) -> Floats:
-        """What the actuators gave in each step, `delay` steps after it was asked for; nothing before."""
+        """Return the actuator force of each step: the command of `delay` steps before, and 0 in the first steps."""
         return np.array([0.0] * delay + self._forces)[: len(self._forces)]
 
 
 def actuator_forces(loop: DeviceLoop, positions: Floats) -> Floats:
-    """Force (n,) [N] of the actuators in each step, for positions (n + 1,) [m], 0 where the tool touches the wall.
+    """Return the actuator forces (n,) [N] of the steps for positions (n + 1,) [m].
 
-    Positive into the wall. The tool starts at its clearance before the wall, at rest; so should the device.
+    Position 0 is where the tool touches the wall; positive is into the wall. The tool starts at rest at its clearance
+    from the wall; the positions should start there, too.
     """
     scene, world = loop.scene(), find_world(loop.world)
     device = MovedDevice(positions - RADIUS, loop)
@@ -120,13 +122,13 @@ def actuator_forces(loop: DeviceLoop, positions: Floats) -> Floats:
 
 
 def entered_energy(positions: Floats, forces: Floats, device_damping: float, dt: float) -> Floats:
-    """Least energy (n,) [J] that the hand has put in by the end of each step."""
+    """Return the least energy (n,) [J] that the hand has supplied by the end of each step."""
     change = np.diff(positions)
     return np.asarray(np.cumsum(-forces * change + device_damping * change**2 / dt))
 
 
 def needed_damping(positions: Floats, forces: Floats, dt: float) -> float:
-    """Least b [N s/m] with which no energy comes out on this motion."""
+    """Return the least b [N s/m] for which the hand extracts no energy on this motion."""
     change = np.diff(positions)
     got_out, moved = np.cumsum(forces * change), np.cumsum(change**2) / dt
     shares = np.divide(got_out, moved, out=np.zeros_like(moved), where=moved > 0.0)

@@ -1,7 +1,7 @@
-"""How much energy whole device loops leak at the hand's port: coupling, delay and sensors, beside b >= KT/2 + |B|.
+"""Energy leaks of whole device loops at the hand's port, with coupling, delay and sensors, relative to b = KT/2 + |B|.
 
-A hand moves the device to and fro by half a millimetre, at several shares of half the sampling rate: so deep that a
-coupler always presses, or across the surface of the wall, in and out of contact.
+A hand moves the device back and forth by half a millimetre, at several shares of half the sampling rate. The motion is
+either so deep that the coupler always presses, or crosses the surface of the wall, in and out of contact.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from verification.stability.device_loop import (
     needed_damping,
 )
 
-HALF = 5e-4  # [m] to and fro
-# (world, K [N/m], B [N s/m]): the paper's coupler and walls, each without damping too; a wall 16 times as stiff
+HALF = 5e-4  # [m] amplitude of the motion
+# (world, K [N/m], B [N s/m]): the paper's coupler and walls, also without damping; and a wall 16 times as stiff
 WALLS = {
     "quick": (("CBuc", 1e3, 0.0), ("CBuc", 1e3, 50.0), ("PB", 1e3, 0.0), ("PB", 1e3, 50.0), ("PB", 16e3, 0.0),
               ("IAPB", 1e3, 50.0)),
     "full": tuple((world, K, B) for world in ("CBuc", "PB", "IAPB") for K in (1e3, 4e3, 16e3) for B in (0.0, 50.0)),
 }  # fmt: skip
 SPEEDS = {"quick": (0.05, 0.3, 1.0), "full": (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)}  # of half the sampling rate
-# name: (delay of readings and of forces [steps each], resolution [m]); late and coarse as in the report's device runs
+# name: (delay of readings and of forces [steps each], resolution [m]), as in the report's device runs
 SENSORS = {"ideal": (0, 0.0), "late": (1, 0.0), "coarse": (0, 1e-5), "late and coarse": (1, 1e-5)}
 PRESSES, CROSSES = "presses", "crosses"
 MOTIONS = (PRESSES, CROSSES)
@@ -63,7 +63,7 @@ def device_port_leaks(depth: str = "quick", failures: list[Failure] | None = Non
 
 
 def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...]) -> dict[str, Any]:
-    """The least damping without a leak, and at b = KT/2 + |B| the most energy that came out, over the speeds."""
+    """Return the least damping without a leak, and the largest leak at b = KT/2 + |B|, over all speeds."""
     needed, leak, turned_over = 0.0, 0.0, 0.0
     for share in speeds:
         x = hand_positions(loop, kind, share)
@@ -81,7 +81,7 @@ def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...])
 
 
 def coupled(ports: Table) -> Part:
-    """Whether the coupler on a rigid wall leaks nothing from its bound on, and what asks for more."""
+    """Return the part on the coupler at a rigid wall: whether its bound prevents leaks, and which cases need more."""
     rows = [row for row in ports.records() if row["world"] == COUPLER_WORLD]
 
     def most(motion: str, ideal: bool) -> float:
@@ -98,7 +98,7 @@ def coupled(ports: Table) -> Part:
 
 
 def coordinated(ports: Table) -> Part:
-    """How much more the four-channel controller needs."""
+    """Return the part on the additional damping that the four-channel controller needs."""
     rows = [row for row in ports.records() if row["world"] != COUPLER_WORLD]
     needed = [row["damping needed"] for row in rows]
     whole = max(row["damping needed"] / row["with the coordination's gains"] for row in rows)
@@ -112,7 +112,7 @@ def coordinated(ports: Table) -> Part:
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
-    """Positions (n + 1,) [m]: slowly to the middle of the motion, then to and fro at a share of half the rate."""
+    """Return positions (n + 1,) [m]: a slow entry, then a cosine at the given share of half the sampling rate."""
     swing = HALF * np.cos(np.pi * share * np.arange(_STEPS))
     quickest = float(np.max(np.abs(np.diff(swing)))) / loop.dt
     middle = HALF + loop.damping / loop.stiffness * quickest if kind == PRESSES else 0.0

@@ -1,4 +1,4 @@
-"""Stability maps: which walls a sampled loop can hold, over stiffness and damping, by penalties and by impulses."""
+"""Stability maps: the walls that are stable in a sampled loop, over stiffness and damping, by penalties and impulses."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from verification.stability.sampled_wall import LAWS, Contact, Floats, Loop, tou
 
 SETTLES, BOUNCES_ON, GROWS = "settles", "bounces on", "grows"
 
-# Resolution of the emulated encoder, 1 µm, and one sample late each way: what the report's device runs assume too.
+# Emulated encoder with a resolution of 1 µm, and a delay of one sample each way, as in the report's device runs.
 LATE = (1, 1e-6)  # delay [samples], resolution [m]
 GRIDS = {"quick": (17, 14), "full": (49, 40)}  # stiffnesses, dampings
 
 
 @dataclass(frozen=True)
 class StabilityMap:
-    """One map: walls on a grid under one loop and law.
+    """One map: the outcomes of a grid of walls for one loop and one law.
 
     stiffness : (k,) [N/m]; damping : (m,) [N s/m], 0 first
-    contact : outcomes, each array (m k,), damping outermost
+    contact : outcomes; each array has shape (m k,), and the stiffness varies fastest
     """
 
     loop: Loop
@@ -38,12 +38,12 @@ class StabilityMap:
 
     @property
     def settled_share(self) -> float:
-        """Share of the walls that the loop holds."""
+        """Share of the walls at which the mass settles."""
         return float(np.mean(self.contact.settled))
 
     @property
     def passive(self) -> np.ndarray:
-        """Which walls (m k,) the condition b >= KT/2 + |B| allows."""
+        """Whether each wall (m k,) satisfies the condition b >= KT/2 + |B|."""
         K, B = walls(self.stiffness, self.damping)
         return np.asarray(self.loop.passive_damping(K) >= B)
 
@@ -56,20 +56,23 @@ class StabilityMap:
 
 
 def walls(stiffness: Floats, damping: Floats) -> tuple[Floats, Floats]:
-    """All pairs, each (m k,), damping outermost."""
+    """Return stiffness and damping of all pairs, each (m k,); the stiffness varies fastest."""
     B, K = np.meshgrid(damping, stiffness, indexing="ij")
     return K.ravel(), B.ravel()
 
 
 def loops() -> tuple[Loop, ...]:
-    """The loops: 512 Hz and 1 kHz, ideal and late sensors, without physical damping (the paper's device) and with."""
+    """Return the loops: 512 Hz and 1 kHz, ideal and delayed sensors, with and without physical damping.
+
+    The paper's device has no physical damping.
+    """
     kinds = [(rate, late, b) for rate in (512.0, 1000.0) for late in (False, True) for b in (0.0, 5.0)]
     return tuple(Loop(rate=rate, device_damping=b, delay=LATE[0] if late else 0, resolution=LATE[1] if late else 0.0)
                  for rate, late, b in kinds)  # fmt: skip
 
 
 def grid(depth: str) -> tuple[Floats, Floats]:
-    """Stiffnesses of 0.1 to 1000 kN/m, and dampings of 0 and of 1 to 3000 N s/m, the paper's 50 among them."""
+    """Return stiffnesses of 0.1 to 1000 kN/m, and dampings of 0 and 1 to 3000 N s/m, including the paper's 50."""
     stiffnesses, dampings = GRIDS[depth]
     damping = np.concatenate([[0.0], np.geomspace(1.0, 3e3, dampings - 2), [PAPER_DAMPING]])
     return np.geomspace(1e2, 1e6, stiffnesses), np.sort(damping)
@@ -79,7 +82,8 @@ PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 
 def stability_maps(depth: str = "quick", failures: list[Failure] | None = None) -> tuple[StabilityMap, ...]:
-    """Every loop under both laws, in turn, on the same walls; a loop that raises under one is left out."""
+    """Return the maps of every loop under both laws, on the same walls; omit a loop if one of its maps raises an error.
+    """
     stiffness, damping = grid(depth)
     K, B = walls(stiffness, damping)
 

@@ -1,4 +1,4 @@
-"""The peg of Fig. 4 in the engine's own loop with its device: against many walls, and under every waveform."""
+"""The peg of Fig. 4 in the engine's loop with a device: at many walls, and with every waveform of the impulses."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SCENE = "peg_corner"
 STIFFNESSES = {"quick": (500.0, 1000.0, 4000.0, 16000.0), "full": (250.0, 500.0, 1e3, 2e3, 4e3, 8e3, 16e3, 32e3)}
 DAMPINGS = {"quick": (0.0, 50.0, 200.0), "full": (0.0, 12.5, 25.0, 50.0, 100.0, 200.0, 400.0)}
 WORLDS = ("PB", "IAPB")
-# name: (rate [Hz], device): as the paper's experiments are emulated in the report's device runs
+# name: (rate [Hz], device), which emulate the paper's experiments as in the report's device runs
 LATE: dict[str, Any] = {"device.delay": 1, "device.position_resolution": [1e-6, 1e-6, 1e-5]}
 DEVICES: dict[str, tuple[float, dict[str, Any]]] = {
     "512 Hz": (512.0, {}),
@@ -50,11 +50,11 @@ def peg_contacts(
     run: Callable[..., Run], depth: str = "quick", progress: Callable[[int, int], None] | None = None,
     failures: list[Failure] | None = None,
 ) -> Table:  # fmt: skip
-    """Run every device and wall in both worlds in turn; a wall that raises in one is left out.
+    """Run every device and wall in both worlds; omit a wall if one of its runs raises an error.
 
     Parameters
     ----------
-    run : (scene, world, keep=False, partial=True) -> Run, complete or not
+    run : (scene, world, keep=False, partial=True) -> Run, which may be incomplete
     """
     scene = load_scene(find_scene(SCENE))
     chosen, done = list(product(DEVICES, STIFFNESSES[depth], DAMPINGS[depth])), count()
@@ -80,7 +80,10 @@ def _contact(device: str, stiffness: float, damping: float, run: Run) -> dict[st
 
 
 def peg(pegs: Table) -> Part:
-    """Whether the peg rests no later with impulses; a wall where it rests under neither law cannot tell."""
+    """Return the part on whether the peg comes to rest no later with impulses than with penalties.
+
+    A wall at which the peg rests under neither law gives no outcome.
+    """
     rows = pegs.records()
     pairs = list(zip(rows[::2], rows[1::2], strict=True))
     times = [tuple(np.inf if row["settles after"] is None else row["settles after"] for row in pair) for pair in pairs]
@@ -93,7 +96,7 @@ def peg(pegs: Table) -> Part:
 
 
 def waveforms(run: Callable[..., Run], failures: list[Failure] | None = None) -> Table:
-    """Run the peg in the world IAPB at WAVEFORM_RATE, the impulse given by its device in every waveform."""
+    """Run the peg in the world IAPB at WAVEFORM_RATE; its device renders the impulses with each waveform."""
     scene = load_scene(find_scene(SCENE))
 
     def under(name: str) -> list[dict[str, Any]]:
@@ -108,7 +111,7 @@ def waveforms(run: Callable[..., Run], failures: list[Failure] | None = None) ->
 
 
 def _pulse(name: str, run: Run) -> dict[str, Any]:
-    """What a hand feels; rate-hardness: the first rise of the force over one step per speed on touching."""
+    """Return what the hand feels. Rate-hardness is the first rise of the force in one step over the approach speed."""
     trace = trace_of(run)
     pulse = run.environment_force - run.penalty_force - run.friction_force
     mean = 0.5 * (run.device_v[1:] + run.device_v[:-1])
@@ -127,7 +130,7 @@ def _pulse(name: str, run: Run) -> dict[str, Any]:
 
 
 def pulses(table: Table) -> Part:
-    """Whether every waveform gives the momentum and no more energy than the collisions took."""
+    """Return the part on whether every waveform gives the momentum, and no more energy than the collisions lose."""
     rows = table.records()
     most = max(row["given to the hand"] - row["lost in collisions"] for row in rows)
     forces = {row["waveform"]: row["peak force"] for row in rows}

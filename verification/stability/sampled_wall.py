@@ -1,10 +1,10 @@
-"""A mass in the hand against a sampled wall: exact motion between the samples, many walls at once.
+"""A mass that a hand pushes against a sampled wall: exact motion between the samples, many walls at once.
 
     m ẍ = F_h − F_k − b ẋ      x > 0 inside the wall; F_k held from sample k to k + 1 (integrated exactly)
 
-The wall knows readings of the position, quantised and late, and their difference over one step as velocity. Under the
-law "penalty" it answers with (5), clamped; under "impulses" the first reading inside the wall answers with the
-impulse (20), p = (1 + e) m γ⁻, given as the force p/T over one step, and the next ones with (5).
+The wall gets quantised and delayed readings of the position; their difference over one step is the velocity. Under the
+law "penalty" its force is (5), clamped. Under "impulses" the first reading inside the wall causes the impulse (20),
+p = (1 + e) m γ⁻, applied as the force p/T over one step; the following readings cause (5).
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ PENALTY, IMPULSES = "penalty", "impulses"
 LAWS = (PENALTY, IMPULSES)
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
-GROWN = 1.05  # speeds above this multiple of the first one cannot come from rounding or from the hand alone
-_SMALL = 1e-4  # below it T − φ cancels, and three terms of the series are exact to c³/6 < 2e-13
+GROWN = 1.05  # neither rounding nor the hand alone explains speeds above this multiple of the initial speed
+_SMALL = 1e-4  # for smaller c, T − φ suffers from cancellation, and three terms of the series err by c³/6 < 2e-13
 _LAST = 0.25  # share of the time, at its end, in which a settled mass must be still
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Everything but the walls; SI units.
+    """All parameters except those of the walls; SI units.
 
-    rate [Hz], mass [kg], device_damping b [N s/m], push of the hand [N], speed at which it starts and its distance
-    from the wall, delay of readings and of forces [samples each], resolution of the sensor [m], restitution
+    rate [Hz], mass [kg], device_damping b [N s/m], push of the hand [N], initial speed and distance from the wall,
+    delay of readings and of forces [samples each], resolution of the sensor [m], restitution
     """
 
     rate: float = 512.0
@@ -53,18 +53,20 @@ class Loop:
         return 1.0 / self.rate
 
     def passive_damping(self, stiffness: Floats) -> Floats:
-        """Largest virtual damping B that Colgate's and Schenkel's condition b >= KT/2 + |B| allows; negative: none."""
+        """Largest virtual damping B that Colgate and Schenkel's condition b >= KT/2 + |B| allows; if negative, none."""
         return self.device_damping - 0.5 * stiffness * self.step
 
 
 @dataclass(frozen=True)
 class Contact:
-    """What became of each wall (one entry per wall).
+    """Outcome at each wall (one entry per wall).
 
-    settled : still at the end; settling_time from first contact [s], infinite where it never settles
-    grown : faster than at the start at some time after its first second; bounces : times it left the wall
-    penetration : deepest [m]; rate_hardness : first rate of force over first speed [N/m] (Lawrence et al. 2000)
-    peak_force : largest [N]
+    settled : whether the mass is still at the end
+    settling_time : time from the first contact [s], infinite if the mass never settles
+    grown : whether the mass is faster than at the start at some time after the first second
+    bounces : number of times that the mass leaves the wall
+    penetration : largest penetration [m]; peak_force : largest force [N]
+    rate_hardness : first rate of the force over the first speed [N/m] (Lawrence et al. 2000)
     """
 
     settled: NDArray[np.bool_]
@@ -77,7 +79,7 @@ class Contact:
 
 
 def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Contact:
-    """Drive the mass into each wall (n,) and watch.
+    """Push the mass into each wall (n,) and return the outcomes.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
 
 
 def _held_force(loop: Loop) -> tuple[float, float, float]:
-    """Exact response over one step: v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E = exp(−c)."""
+    """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E = exp(−c)."""
     T, c = loop.step, loop.device_damping * loop.step / loop.mass
     if c < _SMALL:
         return 1.0 - c + 0.5 * c * c, T * (1.0 - c / 2.0 + c * c / 6.0), T * T * (0.5 - c / 6.0 + c * c / 24.0)
@@ -116,7 +118,7 @@ def _held_force(loop: Loop) -> tuple[float, float, float]:
 
 
 class _Wall:
-    """The sampled side: sensor, delays, law. Keeps the readings and commands that are on their way."""
+    """The sampled side: sensor, delays, law. It stores the readings and commands that are delayed."""
 
     def __init__(self, loop: Loop, stiffness: Floats, damping: Floats, law: str, start: Floats) -> None:
         self.loop, self.K, self.B, self.law = loop, stiffness, damping, law
@@ -129,7 +131,7 @@ class _Wall:
         return np.round(x / r) * r if r > 0.0 else x.copy()
 
     def answer(self, x: Floats) -> Floats:
-        """The force that the actuator gives from this sample to the next."""
+        """Return the actuator's force from this sample to the next."""
         self.readings = [*self.readings[1:], self._sense(x)]
         before, now = self.readings[0], self.readings[1]
         rate = (now - before) / self.loop.step

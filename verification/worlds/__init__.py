@@ -1,1 +1,1 @@
-"""One scene in several worlds: how far apart they move, what each does with energy, and its impacts as problems."""
+"""One scene in several worlds: distances between their motions, their energies, and the impacts as solver problems."""

@@ -1,15 +1,15 @@
-"""A scene in several worlds, beside one of them: distances over time, energy, penetration, time per step.
+"""Comparison of a scene in several worlds with one of them: distances over time, energy, penetration, time per step.
 
-Three distances, each in the kinetic metric M(q) of the reference world's configuration and for the scene's whole mass
-m, so that joints and free bodies, metres and radians count alike:
+There are three distances. Each uses the kinetic metric M(q) at the reference world's configuration and the scene's
+total mass m, so that joints and free bodies, metres and radians have comparable weights:
 
-    configuration  √(Δqᵀ M Δq / m)   [m]     root mean square over all mass of how far it is displaced (to first order)
-    velocity       √(Δvᵀ M Δv / m)   [m/s]   the same of its velocity
-    impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   of P, all that contacts have given so far, not contact by contact, which
-                                             is not unique: their resultant where M is constant; else the sum of
+    configuration  √(Δqᵀ M Δq / m)   [m]     root mean square displacement over all mass (to first order)
+    velocity       √(Δvᵀ M Δv / m)   [m/s]   root mean square velocity difference over all mass
+    impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   P is the sum of all contact impulses so far, since single contacts need not
+                                             be unique: their resultant if M is constant; otherwise the sum of
                                              generalized impulses, each with the Jacobian of its own pose
 
-The scene's impacts in IAPB are then problems for every complementarity solver, judged by recomputed residuals.
+Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the answers.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from verification.worlds.impacts import compare_impacts
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-INSTANTS = 1000  # of the motion, at most, at which worlds are compared
+INSTANTS = 1000  # largest number of instants at which worlds are compared
 QUESTION = (
     "The scene is simulated in each world. Distances from the reference world are in the kinetic metric, for the whole "
     "mass: root mean square displacement and velocity of its particles, and the impulse of all contacts so far. "
@@ -61,14 +61,14 @@ _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}
 
 @dataclass(frozen=True)
 class WorldRun:
-    """A run of one world, and the processor time of a step [s], without set-up; NaN where the run was too short."""
+    """A run in one world, and the CPU time per step [s] without setup; NaN if the run was too short."""
 
     run: Run
     seconds: float
 
 
 def default_worlds(scene: Scene) -> tuple[str, ...]:
-    """Return the worlds that tell something about a scene: with friction where it has some, CBuc where it has gains."""
+    """Return the default worlds of a scene: those with friction only if it has friction, CBuc only if it has gains."""
     rough = largest_friction(scene) > 0.0
     coupled = scene.hand is not None and scene.couplings.unilateral is not None
     return ("IAPB", "PB", *(["IAPB-friction"] if rough else []), "ideal", *(["ideal-friction"] if rough else []),
@@ -83,23 +83,23 @@ def compare_worlds(
 
     Parameters
     ----------
-    scene : a checked scene, the path of a scene file, or the name of a scene that comes with the project
-    worlds : names of `reference.worlds.WORLDS`; default: IAPB, PB and ideal, where the scene has friction IAPB-friction
-        and ideal-friction too, and CBuc where the scene gives its gains
-    against : the world that the others are compared with; default: ideal, or ideal-friction with friction
-    impacts : most impacts that are given to all solvers, spread over the motion; 0 for none
+    scene : a validated scene, the path of a scene file, or the name of a scene that comes with the project
+    worlds : names of `reference.worlds.WORLDS`; default: IAPB, PB and ideal; if the scene has friction, also
+        IAPB-friction and ideal-friction; if the scene gives gains of the unilateral coupler, also CBuc
+    against : the reference world of the comparison; default: ideal, or ideal-friction if the scene has friction
+    impacts : largest number of impacts, spread over the motion, for all solvers; 0 for none
     progress : called as progress(stage, done, total)
 
     Returns
     -------
     Finding
-        with the tables "worlds" (a row for each), "over time", and, if there are impacts, "solvers" and "problems";
-        the answer ranks the worlds whose runs are complete and trustworthy, and names the others with the reason
+        Its tables are "worlds" (one row per world), "over time", and, if there are impacts, "solvers" and "problems".
+        The answer ranks the worlds whose runs are complete and trustworthy, and names the others with the reason.
 
     Raises
     ------
     ArgumentError, SceneError
-        There is no such world or scene, or the reference world cannot be simulated.
+        The world or scene does not exist, or the reference world cannot be simulated.
     """
     if not isinstance(scene, Scene):
         scene = load_scene(find_scene(scene))
@@ -130,7 +130,7 @@ def compare_worlds(
 
 
 def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> tuple[tuple[str, ...], str]:
-    """The worlds in order, each once, the reference world among them; and its name."""
+    """Return the worlds in order, each once and including the reference world, and the name of the reference world."""
     if isinstance(worlds, str):
         worlds = worlds.split(",")
     names = tuple(dict.fromkeys(name.strip() for name in worlds)) if worlds else default_worlds(scene)
@@ -144,7 +144,7 @@ def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> 
 
 
 def _run(scene: Scene, world: str, say: Progress) -> WorldRun:
-    """Simulate; the clock is read as chunks end, so that the first one's set-up does not count."""
+    """Simulate the scene; the clock is read at the end of each chunk, which excludes the setup of the first chunk."""
     clock: list[tuple[int, float]] = []
 
     def progress(done: int, total: int) -> None:
@@ -157,11 +157,11 @@ def _run(scene: Scene, world: str, say: Progress) -> WorldRun:
         raise KeyboardInterrupt
     if len(clock) > 1:
         return WorldRun(run, (clock[-1][1] - clock[0][1]) / (clock[-1][0] - clock[0][0]))
-    return WorldRun(run, float(run.chunk_seconds.sum()) / run.steps)  # one chunk: by the clock on the wall
+    return WorldRun(run, float(run.chunk_seconds.sum()) / run.steps)  # one chunk: wall-clock time
 
 
 def _series(mechanism: Mechanism, run: Run, reference: Run) -> dict[str, Floats]:
-    """Everything over time, at the instants that both runs have."""
+    """Return all compared quantities over time, at the instants that both runs have."""
     at = _instants(reference)
     at = at[at <= run.steps]
     q, v = reference.q[at], reference.v[at]
@@ -186,12 +186,12 @@ def _form(matrices: Floats, vectors: Floats) -> Floats:
 
 
 def _given(run: Run) -> Floats:
-    """The generalized impulse (n + 1, d) of all contacts since the start."""
+    """Return the generalized impulse (n + 1, d) of all contacts since the start."""
     return np.vstack([np.zeros(run.v.shape[1]), np.cumsum(run.environment_force, axis=0) * run.dt])
 
 
 def _deepest_until(run: Run, at: NDArray[np.int64]) -> Floats:
-    """Deepest overlap in the steps between an instant and the one before it [m]."""
+    """Return the deepest overlap [m] in the steps between each instant and the previous one."""
     depth = np.zeros(run.steps + 1)
     steps = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
     np.maximum.at(depth, steps + 1, -run.contacts.gap)
@@ -225,9 +225,9 @@ def _sizes(values: Floats) -> tuple[float, float, float]:
 
 
 def _energies(run: Run) -> tuple[float | None, ...]:
-    """Kinetic energy at the end, work done, energy lost, and the most that was there above start and work."""
+    """Return final kinetic energy, work done, energy lost, and the largest excess of energy over start plus work."""
     total = run.energy["kinetic"] + run.energy["potential"]
-    if run.coupling == "unilateral":  # its ledger has no balance of the tool, which is carried at times
+    if run.coupling == "unilateral":  # there is no energy balance of the tool, which the coupler moves at times
         return float(run.energy["kinetic"][-1]), None, None, None
     work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy["coupling_work"]])
     above = total - total[0] - work
@@ -242,14 +242,14 @@ def _series_table(series: dict[str, dict[str, Floats]]) -> Table:
 
 
 def _unfit(scene: Scene, run: Run) -> str:
-    """Why a run says nothing about its world; empty where it ran to the end and is to be trusted."""
+    """Return why a run is unfit for the comparison; empty if it is complete and trustworthy."""
     if not run.complete or run.steps < scene.steps:
         return f"stopped after {run.time[-1]:g} s" + (f": {run.stopped}" if run.stopped else "")
     return f"not to be trusted: {'; '.join(run.distrust)}" if run.distrust else ""
 
 
 def _part_of_runs(scene: Scene, runs: dict[str, WorldRun], unfit: dict[str, str]) -> Part:
-    """Whether every world ran to the end, and is to be trusted."""
+    """Return the part on whether every world's run is complete and trustworthy."""
     fit = len(runs) - len(unfit)
     said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
@@ -259,7 +259,8 @@ def _part_of_runs(scene: Scene, runs: dict[str, WorldRun], unfit: dict[str, str]
 def _answer(
     runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, unfit: dict[str, str]
 ) -> str:
-    """Which world is closest to the reference, and how far it is; only worlds that are fit to be ranked."""
+    """Return the answer: the closest world to the reference and its distance, among the worlds fit for the comparison.
+    """
     if len(series) == 1:
         return f"Only {against} was simulated."
     if against in unfit:

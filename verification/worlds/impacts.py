@@ -1,4 +1,4 @@
-"""The impacts of a scene as complementarity problems, with and without its friction, for every solver."""
+"""The impacts of a scene as complementarity problems, with and without friction, for every solver."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part,
 
 Progress = Callable[[str, int, int], None]
 
-LONGEST = 0.4  # [s] a solver that is slower than this on one impact is not asked for larger ones
-CASES = 200  # impacts, at most, on which IAPB's motion is compared with that of the Newton LCP
+LONGEST = 0.4  # [s] a solver that takes longer on one impact skips larger ones
+CASES = 200  # largest number of impacts for which IAPB's motion is compared with that of the Newton LCP
 
 
 def compare_impacts(
     run: Run, scene: Scene, most: int, progress: Progress, failures: list[Failure]
 ) -> tuple[list[Part], dict[str, Table]]:
-    """Return what the impacts of an IAPB run say: parts, and the tables "solvers" and "problems"."""
+    """Return the parts on the impacts of an IAPB run, and the tables "solvers" and "problems"."""
     problems, left_out = problems_of_run(run, scene, most)
     if not problems:
         why = f"{left_out} impacts follow another law than (21)" if left_out else "nothing collides"
@@ -37,7 +37,7 @@ def compare_impacts(
 
 
 def _motion(run: Run, scene: Scene, failures: list[Failure]) -> Part:
-    """Whether IAPB's impacts are those of the Newton LCP: they are where all contacts push."""
+    """Return the part on whether IAPB's impacts equal those of the Newton LCP, as they do if all contacts push."""
     compared = compare_cases(impacts_of_run(run, scene).cases[:CASES], failures=failures)
     agree, push = sum(one.agrees for one in compared), sum(one.pushes for one in compared)
     sentence = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
@@ -47,7 +47,7 @@ def _motion(run: Run, scene: Scene, failures: list[Failure]) -> Part:
 
 
 def _solved(study: ProblemStudy) -> Part:
-    """How many answers are solutions, and whose are not; a refusal or an error is no answer."""
+    """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is no answer."""
     solved = [row for row in study.rows if row.verdict == "solved"]
     wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
     answers = len(solved) + wrong.total()
@@ -61,7 +61,7 @@ def _solved(study: ProblemStudy) -> Part:
 
 
 def _solvers(study: ProblemStudy) -> Table:
-    """A row per solver."""
+    """Return a table with one row per solver."""
     rows = []
     for solver in study.solvers:
         mine = [row for row in study.rows if row.solver == solver]
@@ -78,7 +78,7 @@ def _solvers(study: ProblemStudy) -> Table:
 
 
 def _problems(study: ProblemStudy) -> Table:
-    """A row per solver and problem."""
+    """Return a table with one row per solver and problem."""
     size = {line.problem: line for line in study.lines}
     rows = [(row.problem, size[row.problem].unknowns, size[row.problem].rank, row.solver, row.verdict,
              _known(row.residuals.worst), _known(row.spread), _known(1e6 * row.seconds), row.note)
