@@ -1,11 +1,11 @@
-"""Proofs that a machine checks: one function per statement, listed in the order in which they are read.
+"""Machine-checked proofs: one function per statement, listed in reading order.
 
     >>> from verification.proofs import all_proofs, check
     >>> for name in all_proofs():
     ...     record = check(name)
     ...     print(record.name, record.verdict)
 
-A function of the statement's name returns a `Statement`; adding a proof is one function plus one name below.
+The function with the statement's name returns a `Statement`. To add a proof, write its function and add its name below.
 """
 
 from __future__ import annotations
@@ -60,12 +60,12 @@ _HOME = {name: module for module, names in _STATEMENTS.items() for name in names
 
 
 def all_proofs() -> tuple[str, ...]:
-    """Names of all statements, in reading order. Nothing is imported or checked yet."""
+    """Return the names of all statements, in reading order, without importing or checking them."""
     return tuple(_HOME)
 
 
 def load(name: str) -> Statement:
-    """The statement of this name, unchecked."""
+    """Return the statement of this name without checking it."""
     if name not in _HOME:
         raise ArgumentError("name", name, one_of(name, _HOME))
     module = importlib.import_module(f"verification.proofs.statements.{_HOME[name]}")
@@ -85,12 +85,12 @@ def check(name: str) -> ProofRecord:
 
 
 def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[ProofRecord, ...]:
-    """Check all statements, none for one that raises."""
+    """Check all statements; a statement that raises an exception gives a Failure and no record."""
     return tuple(of_each(counted(all_proofs(), progress), lambda name: [_check_with_coq(name)], failures))
 
 
 def _check_with_coq(name: str) -> ProofRecord:
-    """The record, with Coq's answer for the theorems that are written out for it."""
+    """Return the record, with Coq's answer for the theorems in CERTIFIED."""
     record = check(name)
     if name not in CERTIFIED:
         return record
@@ -100,7 +100,7 @@ def _check_with_coq(name: str) -> ProofRecord:
 
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
               development: Sequence[Theorem] = ()) -> Finding:  # fmt: skip
-    """How many statements are proved, by whom, how many wrong twins are refuted, and what Coq proves of the code."""
+    """Return the Finding on proofs: proved statements, checking tools, refuted false variants, and Coq's theorems."""
     rows = [{"statement": one.name, "holds": one.holds,
              "own kernel": YES if all(step.accepted for step in one.steps) else NO, "SymPy": one.sympy, "Coq": one.coq,
              "wrong twins": len(one.twins)} for one in records]  # fmt: skip

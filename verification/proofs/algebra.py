@@ -1,12 +1,12 @@
 """The free algebra in which operator identities are checked.
 
-An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters (matrices of a *named*
-size such as c x d, never a number), which do not commute; the scalars (e, alpha, ...) do. Two expressions are equal
-only if they have the same terms: no simplifier, no size, no sample takes part. A product whose sizes do not fit is
-refused, and so is a sum of different shapes.
+An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters, which do not commute
+(matrices of a *named* size such as c x d, never a number); the scalars (e, alpha, ...) commute. Two expressions are
+equal only if they have the same terms; no simplifier, numeric size or sample is used. A product with unequal inner
+sizes raises an error, and so does a sum of different shapes.
 
-One rule beyond the free algebra: a 1 x 1 product equals its own transpose, so words of that shape are kept in one
-canonical order (`canonical`).
+One rule goes beyond the free algebra: a 1 x 1 product equals its own transpose, so `canonical` brings words of that
+shape to one order.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 from iapb.errors import ArgumentError
 
-ANY = "*"  # the size of a multiple of the identity: fits every square shape
+ANY = "*"  # the size of a multiple of the identity, which fits every square shape
 
 
 class Letter(NamedTuple):
-    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it stands transposed."""
+    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it is transposed."""
 
     name: str
     rows: str
@@ -90,7 +90,7 @@ class Expression:
 
     @property
     def T(self) -> Expression:
-        """Transpose: every word reversed, every letter flipped."""
+        """The transpose: every word is reversed and every letter flipped."""
         flipped = {(scalars, transposed(word)): k for (scalars, word), k in self.terms.items()}
         return Expression(flipped, self.cols, self.rows)
 
@@ -103,18 +103,18 @@ class Expression:
         return {letter for _, word in self.terms for letter in word}
 
     def canonical(self) -> Expression:
-        """The same value with every 1 x 1 word replaced by the smaller of itself and its transpose."""
+        """Return the same value with every 1 x 1 word replaced by the smaller of itself and its transpose."""
         if not self.is_scalar:
             return self
         parts = ({(s, min(w, transposed(w))): k} for (s, w), k in self.terms.items())
         return sum((Expression(part, "1", "1") for part in parts), Expression({}, "1", "1"))
 
     def vanishes(self) -> bool:
-        """True if the expression is zero in the free algebra (1 x 1 words up to transposition)."""
+        """Whether the expression is zero in the free algebra, with 1 x 1 words equal to their transposes."""
         return not self.canonical().terms
 
     def ordered(self) -> Iterator[tuple[Term, Fraction]]:
-        """Terms in a fixed order, for printing: short words first, as a reader expects."""
+        """Return the terms in a fixed order for printing, short words first."""
         return iter(sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1])))
 
 
@@ -122,7 +122,7 @@ Operand = Expression | int | Fraction
 
 
 def expression(value: Operand) -> Expression:
-    """An expression from itself or from a rational number (a multiple of the identity)."""
+    """Return an expression unchanged, or a rational number as a multiple of the identity."""
     if isinstance(value, Expression):
         return value
     if isinstance(value, int | Fraction):
@@ -131,33 +131,33 @@ def expression(value: Operand) -> Expression:
 
 
 def matrix(name: str, rows: str, cols: str) -> Expression:
-    """A letter of shape rows x cols, both given as names such as "c" and "d"; "1" is the only number."""
+    """Return a letter of shape rows x cols; both sizes are names such as "c" and "d", or "1"."""
     return word_expression((Letter(name, rows, cols),))
 
 
 def vector(name: str, size: str) -> Expression:
-    """A column of the named size."""
+    """Return a column vector of the named size."""
     return matrix(name, size, "1")
 
 
 def scalar(name: str) -> Expression:
-    """A commuting real unknown."""
+    """Return a commuting real unknown."""
     return Expression({((name,), ()): Fraction(1)})
 
 
 def word_expression(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(1)) -> Expression:
-    """One term; its shape is read off the ends of the word."""
+    """Return an expression of one term; the first and the last letter of the word give its shape."""
     rows, cols = (word[0].rows, word[-1].cols) if word else (ANY, ANY)
     return Expression({(scalars, word): coefficient}, rows, cols)
 
 
 def names_in(value: Expression) -> set[str]:
-    """Names of all letters and scalars that occur."""
+    """Return the names of all letters and scalars in the expression."""
     return {letter.name for letter in value.letters} | {name for scalars, _ in value.terms for name in scalars}
 
 
 def transposed(word: Word) -> Word:
-    """The transpose of a word: reversed, each letter flipped."""
+    """Return the transpose of a word: the reversed word with each letter flipped."""
     return tuple(letter.transposed for letter in reversed(word))
 
 
@@ -194,7 +194,7 @@ class Equation:
 
     @cached_property
     def T(self) -> Equation:
-        """The transposed equation, as good as the equation itself."""
+        """The transposed equation, which is equivalent to the equation."""
         return Equation(f"({self.name})ᵀ", self.lhs.T, self.rhs.T)
 
     @property
@@ -239,5 +239,5 @@ Fact = Equation | NonNegative | Definite | Entrywise | Nonzero
 
 
 def equation(name: str, lhs: Operand, rhs: Operand) -> Equation:
-    """An equation whose sides may be plain numbers (multiples of the identity, or zero)."""
+    """Return an equation; its sides may be plain numbers (multiples of the identity, or zero)."""
     return Equation(name, expression(lhs), expression(rhs))

@@ -1,9 +1,9 @@
-"""Attacks on the floating-point bound: many adversarial impacts against `bounds.gain_bound`.
+"""Attacks on the floating-point bound: tests of `bounds.gain_bound` with many adversarial impacts.
 
     >>> from verification.proofs.attack import attack, factored_in_bulk
     >>> attack(factored_in_bulk, count=1_000_000).worst_ratio  # at most 1, or the proof (or the resolver) is wrong
 
-Anybody's resolver can be attacked: `one_by_one` turns a call (M, J, v, e) -> v⁺ into a bulk one.
+Any resolver can be attacked: `one_by_one` turns a function (M, J, v, e) -> v⁺ into a bulk resolver.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from verification.proofs.bounds import gain_bound
 Floats = NDArray[np.float64]
 BulkResolver = Callable[[Floats, Floats, Floats, Floats], Floats]
 
-# v and the rows of J, as combinations of M's eigenvectors: where the energy or the rounding is felt most
+# v and the rows of J as combinations of M's eigenvectors, for which the energy or the rounding error is largest
 FAMILIES = (
     "random",
     "v in the lightest direction",
@@ -35,7 +35,7 @@ FAMILIES = (
 )
 LARGEST_COORDINATES, LARGEST_CONTACTS, BATCH = 12, 16, 500
 KAPPA_RANGE = (0.0, 12.0)  # exponents of ten
-DEPENDENCE_RANGE = (-12.0, -2.0)  # exponents of ten of what sets a row apart from its neighbour
+DEPENDENCE_RANGE = (-12.0, -2.0)  # exponents of ten of the difference between neighbouring rows
 
 
 class Impacts(NamedTuple):
@@ -63,7 +63,7 @@ class Attack:
 
     @property
     def holds(self) -> bool:
-        """No impact gained more than the bound allows."""
+        """Whether no impact gained more than the bound allows."""
         return self.worst_ratio <= 1.0
 
 
@@ -76,7 +76,7 @@ def attack(
     ----------
     resolve : bulk resolver, (M (n,d,d), J (n,c,d), v (n,d), e (n,)) -> v⁺ (n,d).
     count : number of impacts.
-    seed : of the generator; the same seed gives the same impacts.
+    seed : seed of the generator; the same seed gives the same impacts.
     bound : (d, κ(M)) -> largest relative gain allowed.
 
     Raises
@@ -105,21 +105,21 @@ def attack(
 
 
 def _judge(batch: Impacts, v_plus: Floats) -> tuple[Floats, Floats]:
-    """Relative gains, with their own error taken off, and κ(M) of each mass matrix as rounded."""
+    """Return the relative gains minus their own error bounds, and κ(M) of each rounded mass matrix."""
     gains, error = bulk_energy_gain(batch.mass_matrix, batch.velocity, v_plus)
     spectra = np.linalg.eigvalsh(batch.mass_matrix)
     return gains - error, np.maximum(1.0, spectra[:, -1] / spectra[:, 0])
 
 
 def _batches(count: int, seed: int) -> Iterator[Impacts]:
-    """Batches small enough that each family meets several sizes d, even when count is small."""
+    """Yield batches small enough that each family gets several sizes d, even if count is small."""
     rng, size = np.random.default_rng(seed), min(BATCH, max(1, count // (5 * len(FAMILIES))))
     for number, start in enumerate(range(0, count, size)):
         yield draw(rng, FAMILIES[number % len(FAMILIES)], min(size, count - start))
 
 
 def draw(rng: np.random.Generator, family: str, n: int) -> Impacts:
-    """n impacts of one family: M with known spectrum in a random frame, rows and velocities in that frame."""
+    """Draw n impacts of one family: M with known spectrum in a random frame, rows and velocities in that frame."""
     d, c = int(rng.integers(1, LARGEST_COORDINATES + 1)), int(rng.integers(1, LARGEST_CONTACTS + 1))
     frame = np.linalg.qr(rng.standard_normal((n, d, d)))[0]
     spectrum = 10.0 ** -np.sort(rng.uniform(0.0, 1.0, (n, d)) * rng.uniform(*KAPPA_RANGE, (n, 1)), axis=1)
@@ -135,13 +135,13 @@ def draw(rng: np.random.Generator, family: str, n: int) -> Impacts:
     elif family == "nearly dependent" and c > 1:
         apart = 10.0 ** rng.uniform(*DEPENDENCE_RANGE, (n, 1))
         rows[:, -1] = rows[:, 0] + apart * rows[:, -1]
-    # Elastic impacts conserve the energy exactly: every gain is rounding. A few others for the range of e.
+    # Elastic impacts conserve the energy exactly, so every gain is rounding. A few others cover the range of e.
     restitution = np.where(rng.uniform(size=n) < 0.8, 1.0, rng.uniform(-1.0, 1.0, n))
     return Impacts(family, 0.5 * (mass + np.swapaxes(mass, 1, 2)), rows, v, restitution)
 
 
 def one_by_one(resolve: Callable[[Floats, Floats, Floats, float], Floats]) -> BulkResolver:
-    """A bulk resolver from a call for one impact."""
+    """Return a bulk resolver from a resolver for one impact."""
 
     def in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
         cases = zip(mass_matrix, contact_jacobian, velocity, restitution, strict=True)
@@ -151,11 +151,11 @@ def one_by_one(resolve: Callable[[Floats, Floats, Floats, float], Floats]) -> Bu
 
 
 def engine_resolver(method: str = "factored", clamp: bool | None = None) -> BulkResolver:
-    """The engine's public `resolve_impact`, one call per impact (about 10⁴ in a second)."""
+    """Return the engine's public `resolve_impact` as a bulk resolver: one call per impact (about 10⁴ per second)."""
     return one_by_one(lambda m, j, v, e: resolve_impact(m, j, v, e, method=method, clamp=clamp).velocity)
 
 
 def factored_in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:
-    """The engine's compiled kernel as the simulation step calls it, without the public call around it."""
+    """Resolve n impacts by the engine's compiled kernel, as the simulation step calls it."""
     columns = np.ascontiguousarray(np.swapaxes(contact_jacobian, 1, 2))
     return resolve_batch(mass_matrix, columns, velocity, restitution)[0]

@@ -1,4 +1,4 @@
-"""Calls the engine's impact kernel on a batch, as the simulation step calls it: a million impacts take seconds."""
+"""Batch calls of the engine's impact kernel, as the simulation step calls it: a million impacts take seconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def resolve_batch(
 ) -> tuple[Floats, Floats]:
     """Return v⁺ (n, d) and the clamps (n,) of n impacts: M (n, d, d), Jᵀ (n, d, c), v (n, d), e (n,).
 
-    Where M is not positive definite to rounding, v⁺ = v and the clamp is −1.
+    If M is not positive definite to rounding, v⁺ = v and the clamp is −1.
     """
     d, c = columns.shape[1:]
     v_plus, clamps = np.empty_like(velocity), np.empty(len(velocity))

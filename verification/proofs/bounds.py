@@ -1,10 +1,10 @@
 """Executable forms of the floating-point bounds; the statements fp_* derive them.
 
-Standard model: every operation rounds to nearest, relative error at most u = 2⁻⁵³; no over- or underflow. With
-ε = 2u. κ is the condition number of the mass matrix; since all rounding is component by component, κ may be
-replaced by the smallest κ(S M S) over positive diagonal S, which is what makes metres and radians harmless.
+The standard model applies: every operation rounds to nearest with a relative error of at most u = 2⁻⁵³, without
+overflow or underflow; ε = 2u. κ is the condition number of the mass matrix. Since all rounding is componentwise, the
+smallest κ(S M S) over positive diagonal S may replace κ, so units such as metres and radians do not matter.
 
-How `gain_bound` comes about (‖x‖² = xᵀMx, Δ the candidate change of velocity, x = vᵀMΔ, y = ΔᵀMΔ):
+Derivation of `gain_bound` (‖x‖² = xᵀMx, Δ the candidate change of velocity, x = vᵀMΔ, y = ΔᵀMΔ):
 
 1. The clamp computes X ≈ x and Y ≈ y in double-double, rounds each once, and α = min(1, fl(−2X/Y)). The
    double-double sums err by at most τ‖v‖‖Δ‖ with τ = 16 (d+1) √d u² κ: each of the 2(d+1) compensated steps per
@@ -28,7 +28,7 @@ UNIT_ROUNDOFF = 2.0**-53
 EPSILON = 2.0 * UNIT_ROUNDOFF
 _MARGIN = 65.0 / 64.0  # covers products of terms that are each below 2⁻¹²
 _SMALL = 2.0**-12
-# Every eligible residual in the pivoted factorisation is nearly orthogonal to the basis before its last pass.
+# In the pivoted factorisation every eligible residual is nearly orthogonal to the basis before its last pass.
 REORTHOGONALISED_OVERLAP = 2.0**-10
 
 
@@ -62,17 +62,18 @@ def promised_bound(d: int, kappa: float) -> float:
 
 
 def double_double_error(d: int, kappa: float) -> float:
-    """τ: what the double-double energies may err by, relative to ‖v‖‖Δ‖."""
+    """Return τ, the error bound of the double-double energies relative to ‖v‖‖Δ‖."""
     return 16.0 * (d + 1) * math.sqrt(d) * UNIT_ROUNDOFF**2 * kappa
 
 
 def radius_margins(d: int) -> tuple[Fraction | int, Fraction | int, Fraction | int]:
-    """How far the radius of `iapb.contact.kernels.passive.gain` is above what Coq's `accepted_never_gains` asks for.
+    """Margins of the radius of `iapb.contact.kernels.passive.gain` above the need of Coq's `accepted_never_gains`.
 
-    `Passive.v` proves a bound of the error of `gain` (gain_error) and of its low part (loop_error) that is linear in
-    W = Σ|Δᵢ||Aᵢⱼ||sⱼ| of the high parts, η Σ|Δᵢ| and η = 2⁻¹⁰⁷⁴. Here are the three coefficients of (1 − u) r − error
-    − u|low|, exactly, where r is what `gain` returns, rounded down: S in it loses at most 2d + 1 roundings and η/2 in
-    each product, `underflow` d + 1 and η/2. G = 1 + 2 (d + 2) u is above (1 + u) to the power d + 2.
+    `Passive.v` proves bounds of the error of `gain` (gain_error) and of its low part (loop_error). They are linear in
+    W = Σ|Δᵢ||Aᵢⱼ||sⱼ| of the high parts, η Σ|Δᵢ| and η = 2⁻¹⁰⁷⁴. This function returns the three exact coefficients of
+    (1 − u) r − error − u|low|, where r is a lower bound of the radius that `gain` returns: its S loses at most 2d + 1
+    roundings and η/2 in each product, `underflow` d + 1 and η/2. G = 1 + 2 (d + 2) u exceeds (1 + u) to the power
+    d + 2.
     """
     u, n = Fraction(1, 2**53), Fraction(d)
     grown = 1 + 2 * (n + 2) * u  # G
@@ -113,12 +114,12 @@ class _Linear:
 
 
 def gamma(n: int) -> float:
-    """γₙ = n u / (1 − n u), Higham's bound for n accumulated roundings."""
+    """Return γₙ = n u / (1 − n u), Higham's bound for n accumulated roundings."""
     return n * UNIT_ROUNDOFF / (1.0 - n * UNIT_ROUNDOFF)
 
 
 def projector_bound(d: int, departure: float) -> float:
-    """Largest relative gain of |u|² by the projector as computed, whatever M and J are.
+    """Return the largest relative gain of |u|² by the computed projector, for any M and J.
 
     |û⁺|² ≤ (1 + g)|u|², g = (√(1 + 4δ(1+δ)) + ρ)² − 1, with δ = `departure` ≥ ‖QᵀQ − I‖₂ (fp_projector) and
     ρ = 2(γ_d + γ_{d+2} + u)√d (1+δ) for the two products with Q and the subtraction. No κ occurs.
@@ -130,9 +131,9 @@ def projector_bound(d: int, departure: float) -> float:
 
 
 def orthogonality_bound(d: int) -> float:
-    """‖QᵀQ − I‖ of a basis built by re-orthogonalised Gram-Schmidt (Kahan's criterion: the last pass keeps half).
+    """Return a bound of ‖QᵀQ − I‖ for re-orthogonalised Gram-Schmidt (Kahan's criterion: the last pass keeps half).
 
-    A last pass that starts from a unit vector with overlap ω ≤ 2⁻¹⁰ and keeps at least half of it leaves
+    If the last pass starts from a unit vector with overlap ω ≤ 2⁻¹⁰ and keeps at least half of its length, then
     |Qₖᵀq| ≤ 2(ω δ + 3γ_d √d); over d columns δ ≤ √2 d · 6γ_d √d / (1 − 4dω) + (d + 4) u.
     """
     columns = 6.0 * math.sqrt(2.0) * d * gamma(d) * math.sqrt(d)
@@ -140,17 +141,18 @@ def orthogonality_bound(d: int) -> float:
 
 
 def cholesky_error(d: int, kappa: float) -> float:
-    """η with |vᵀ(L Lᵀ − M)v| ≤ η vᵀMv: η = d γ_{d+1} κ / (1 − d γ_{d+1}) (Higham 2002, Theorem 10.3)."""
+    """Return η = d γ_{d+1} κ / (1 − d γ_{d+1}), for which |vᵀ(L Lᵀ − M)v| ≤ η vᵀMv (Higham 2002, Theorem 10.3)."""
     _check(d, kappa)
     g = gamma(d + 1)
     return d * g * kappa / (1.0 - d * g)
 
 
 def unclamped_bound(d: int, kappa: float) -> float:
-    """Relative gain that the factored form may show *without* the final clamp: about 2 d² u κ (fp_cholesky).
+    """Return the bound of the relative gain of the factored form *without* the final clamp (fp_cholesky).
 
-    (1+η)/(1−η) (1+g)(1+σ)² − 1: Cholesky's backward error η, the projector's g, and σ = 6 γ_{d+1} √(dκ) for
-    Lᵀv, the triangular solve and the rounding of v⁺. Infinite where η ≥ 1: then L says nothing about M.
+    The bound is (1+η)/(1−η) (1+g)(1+σ)² − 1, about 2 d² u κ, with Cholesky's backward error η, the projector's g, and
+    σ = 6 γ_{d+1} √(dκ) for Lᵀv, the triangular solve and the rounding of v⁺. It is infinite if η ≥ 1, because L then
+    need not approximate M.
     """
     eta = cholesky_error(d, kappa)
     if eta >= 1.0:

@@ -1,4 +1,4 @@
-"""Checks a statement: its steps, its witness, the need for each hypothesis, and its wrong twins."""
+"""Checks of a statement: its steps, its witness, the need for each hypothesis, and its false variants (twins)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from verification.proofs.sympy_kernel import sympy_opinion
 
 
 def checked(statement: Statement, started: float | None = None) -> ProofRecord:
-    """Check everything about a statement; the verdict is "proved" only if nothing at all is open.
+    """Check everything about a statement; the verdict is "proved" only if no problem is open.
 
-    `started` (time.perf_counter) lets the caller include the time spent on building the statement.
+    `started` (time.perf_counter) lets the caller include the time to build the statement.
     """
     started = time.perf_counter() if started is None else started
     known = Known((*statement.given, *statement.definitions))
@@ -63,7 +63,7 @@ def _checked_step(step: Step, known: Known) -> StepRecord:
 
 
 def _needed(without: Without, statement: Statement) -> Refutation:
-    """Without this hypothesis, the others do not carry the theorem: an exact case."""
+    """Check the exact case which shows that the theorem fails without this hypothesis."""
     case = completed(without.instance, statement.definitions)
     names = [fact.name for fact in statement.given]
     others = [fact for fact in statement.given if fact.name not in without.names]
@@ -78,7 +78,7 @@ def _needed(without: Without, statement: Statement) -> Refutation:
 
 
 def _twin(twin: Twin, statement: Statement) -> Refutation:
-    """The twin's instance keeps every hypothesis and breaks the twin's claim: on both exact backends."""
+    """Check that the twin's instance satisfies every hypothesis and breaks the twin's claim, on both exact backends."""
     if isinstance(twin.claim, Exact):
         return Refutation(twin.title, step_claim(twin.claim), (), twin.note, not twin.claim.is_true)
     case = completed(twin.instance, statement.definitions)
@@ -89,7 +89,7 @@ def _twin(twin: Twin, statement: Statement) -> Refutation:
 
 
 def _loose_ends(statement: Statement, known: Known) -> list[str]:
-    """What would make the theorem say less than it seems: unused, unneeded or contradictory hypotheses."""
+    """Return problems that weaken the theorem, such as unused, unneeded or contradictory hypotheses."""
     shown = {name for without in statement.needed for name in without.names}
     open_ends = [f"hypothesis never used: {f.name}" for f in statement.given if f.name not in known.used]
     open_ends += [f"hypothesis not shown to be needed: {f.name}" for f in statement.given if f.name not in shown]
@@ -104,7 +104,7 @@ def _loose_ends(statement: Statement, known: Known) -> list[str]:
 
 
 def _circular_definitions(statement: Statement) -> list[str]:
-    """A definition names one new letter: it occurs neither in its own right side nor in a definition before it."""
+    """Return the invalid definitions: each must name one letter that its right side and earlier definitions lack."""
     taken: set[str] = set()
     found = []
     for definition in statement.definitions:

@@ -1,8 +1,8 @@
-"""The Coq development in `verification/proofs/coq`: compiled, the assumptions it prints, and the checker made from it.
+"""The Coq development in `verification/proofs/coq`: its compilation, its assumptions, and the extracted checker.
 
-`Checker.v` proves an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
-`iapb certify --export` writes. `Passive.v` proves with Flocq what the last step of the resolver rests on. What is
-missing (coqc, Flocq, OCaml) is said by name; nothing is claimed then.
+`Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
+`iapb certify --export` writes. `Passive.v` proves with Flocq the basis of the last step of the resolver. If coqc, Flocq
+or OCaml is missing, the result names the missing program and claims nothing.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from verification.proofs.statement import YES
 
 FOLDER = Path(__file__).with_name("coq")
 PATIENCE = 600.0  # seconds for one file
-# What `Print Assumptions` may name: the axioms from which Coq's library builds the real numbers, and classical
-# logic (P or not P, for every P), which comes in with Flocq.
+# Axioms that `Print Assumptions` may list: those from which Coq's library builds the real numbers, and classical
+# logic (P or not P, for every P), which Flocq uses.
 KNOWN_AXIOMS = frozenset({
     "ClassicalDedekindReals.sig_forall_dec", "ClassicalDedekindReals.sig_not_dec",
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
@@ -41,7 +41,7 @@ SAYS = {
     "sign_kept": "if a computed sum is at most 0, the exact sum is at most 0",
     "accepted_never_gains": "if the computed high + (low + radius) ≤ 0 and the radius bounds the error, then Γ ≤ 0",
 }
-# Of each, the digest of what was described (`stated`): the English is not printed of another statement.
+# The digest of each described statement (`stated`): if a statement changes, its English description is not printed.
 STATED = {
     "check_sound": "a1c099410aa9a793",
     "check_complete": "307f807fb7ca5381",
@@ -55,7 +55,7 @@ STATED = {
     "sign_kept": "d893e705bea3b779",
     "accepted_never_gains": "ae6f139f59ee5a76",
 }
-# What the report says beside the theorems: the rest of the proof that an accepted candidate never gains.
+# Text for the report beside the theorems: the rest of the proof that an accepted candidate never gains energy.
 ARGUED = ("Not proved in Coq: the error bound of theorem gain_error is below the radius that the function `gain` "
           "returns (rational arithmetic shows this for each d; the rounding of the radius has an argument in prose). "
           "The bounds of the other three evaluations, and the rejection of every overflow, are argued in prose only.")
@@ -64,8 +64,8 @@ _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 @dataclass(frozen=True)
 class Theorem:
-    """A theorem of the development, Coq's answer (yes, not run here, no answer), the axioms that it leans on, and why
-    Coq did not compile its file."""
+    """A theorem of the development: Coq's answer (yes, not run here, no answer), the axioms that it uses, and the error
+    if Coq did not compile its file."""
 
     name: str
     coq: str
@@ -74,13 +74,13 @@ class Theorem:
 
     @property
     def holds(self) -> bool | None:
-        """Coq accepts it with no axiom but those listed; None where Coq was not asked or did not compile the file."""
+        """Whether Coq accepts it with axioms of KNOWN_AXIOMS only; None if Coq did not run or compile the file."""
         return None if self.coq in (NOT_RUN, NO_ANSWER) else self.coq == YES and KNOWN_AXIOMS.issuperset(self.axioms)
 
 
 def theorems(progress: Callable[[int, int], None] = lambda done, total: None,
              failures: list[Failure] | None = None) -> tuple[Theorem, ...]:  # fmt: skip
-    """Every theorem of the development: compiled where Coq is installed, else "not run here"."""
+    """Return every theorem of the development, with Coq's answer, or "not run here" if Coq is not installed."""
     files = sorted(path.stem for path in FOLDER.glob("*.v"))
     return tuple(of_each(counted(files, progress), _answered, failures))
 
@@ -91,18 +91,18 @@ def _answered(name: str) -> tuple[Theorem, ...]:
     with TemporaryDirectory() as folder:
         try:
             return compiled(name, Path(folder))
-        except IapbError as error:  # another version of Coq or Flocq, as likely as a wrong proof: it refutes nothing
+        except IapbError as error:  # may be due to another version of Coq or Flocq, so it refutes nothing
             return tuple(Theorem(one, NO_ANSWER, (), str(error)) for one in _asked(name))
 
 
 def says(name: str) -> str:
-    """What a theorem says, in English; in Coq where its statement or a definition before it has changed."""
+    """Return the English description of a theorem, or its Coq statement if that or an earlier definition changed."""
     digest, statement = stated(name)
     return SAYS[name] if STATED.get(name) == digest else f"changed since it was described: {statement}"
 
 
 def stated(name: str) -> tuple[str, str]:
-    """Digest of a theorem's statement with all definitions before it, and the statement; no proof counts."""
+    """Return a digest of a theorem's statement and all definitions before it, without proofs, and the statement."""
     for path in sorted(FOLDER.glob("*.v")):
         source = re.sub(r"\(\*.*?\*\)|\bProof\..*?\bQed\.", " ", path.read_text(encoding="utf-8"), flags=re.DOTALL)
         before: list[str] = []
@@ -115,14 +115,14 @@ def stated(name: str) -> tuple[str, str]:
 
 
 def version() -> str:
-    """What `coqc` says of itself; "absent" without it."""
+    """Return the version of `coqc`, or "absent" if it is not installed."""
     if shutil.which("coqc") is None:
         return "absent"
     return subprocess.run(["coqc", "--print-version"], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def lacking(name: str) -> str:
-    """Name what is missing to compile a file of the development; empty where nothing is."""
+    """Return which program is missing to compile a file of the development; empty if none is."""
     if shutil.which("coqc") is None:
         return "coqc is not installed"
     if "Flocq" in (FOLDER / f"{name}.v").read_text(encoding="utf-8"):
@@ -153,7 +153,7 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
 
 
 def _asked(name: str) -> list[str]:
-    """The theorems whose assumptions a file prints."""
+    """Return the names of the theorems whose assumptions a file prints."""
     source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
     return [line.split()[2].rstrip(".") for line in source.splitlines() if line.startswith("Print Assumptions")]
 
@@ -185,7 +185,7 @@ def _run(command: list[str], folder: Path) -> str:
 
 
 def _assumptions(said: str) -> list[frozenset[str]]:
-    """The axioms that each `Print Assumptions` names: lines that start at the margin, after the word "Axioms:"."""
+    """Return the axioms that each `Print Assumptions` lists: the unindented lines after "Axioms:"."""
     found: list[set[str]] = []
     for line in said.splitlines():
         if line.startswith(("Axioms:", "Closed under the global context")):

@@ -1,7 +1,7 @@
-"""Exact values for the letters of a statement: rational matrices, on python-flint and, for a second opinion, on sympy.
+"""Exact values for the letters of a statement: rational matrices of python-flint and, as a cross-check, of sympy.
 
-An `Instance` gives every letter a rational matrix and every scalar a rational number; `holds` then decides a fact by
-rational arithmetic alone. This is how wrong twins are refuted and how hypotheses are shown to be needed.
+An `Instance` gives every letter a rational matrix and every scalar a rational number. `holds` then decides a fact by
+rational arithmetic alone. This refutes false variants of statements and shows that hypotheses are needed.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class Instance:
     values: Mapping[str, Matrix | Fraction]
 
     def with_values(self, values: Mapping[str, Any] | None = None, /, **changed: Any) -> Instance:
-        """The same instance with some letters changed."""
+        """Return a copy of the instance with some letters changed."""
         return Instance({**self.values, **instance(values, **changed).values})
 
 
 def instance(values: Mapping[str, Any] | None = None, /, **named: Any) -> Instance:
-    """Instance from numbers (scalars), lists of numbers (columns) and lists of rows; "1/3" is a third."""
+    """Return an Instance from numbers (scalars), lists of numbers (columns) and lists of rows; "1/3" is a third."""
     return Instance({name: _exact(name, value) for name, value in {**(values or {}), **named}.items()})
 
 
@@ -103,7 +103,7 @@ def identity_rows(size: int) -> Matrix:
 
 
 def evaluate(value: Expression, given: Instance, backend: Any = FlintBackend) -> Matrix:
-    """The rational matrix an expression takes on an instance. Commuting scalars alone give a 1 x 1 matrix."""
+    """Return the rational matrix of an expression on an instance. Commuting scalars alone give a 1 x 1 matrix."""
     sizes = _sizes(value, given)
     shape = (1, 1) if value.rows == ANY else (sizes[value.rows], sizes[value.cols])
     total = backend.matrix([[Fraction(0)] * shape[1]] * shape[0])
@@ -122,7 +122,7 @@ def evaluate(value: Expression, given: Instance, backend: Any = FlintBackend) ->
 
 
 def completed(given: Instance, definitions: Iterable[Equation]) -> Instance:
-    """Give each defined letter (the left side of its definition) the value of the right side."""
+    """Return the instance in which each defined letter (left side) has the value of its definition (right side)."""
     values = dict(given.values)
     for definition in definitions:
         (((scalars, word), _),) = definition.lhs.terms.items()
@@ -168,7 +168,7 @@ def all_hold(facts: Iterable[Fact], given: Instance) -> bool:
 
 
 def signature_allows(rows: Matrix, *, strict: bool) -> bool:
-    """Is x' A x >= 0 (strict: > 0) for every x other than 0? Exact elimination on the symmetric part of A."""
+    """Whether x' A x >= 0 (strict: > 0) for every x other than 0, by exact elimination on the symmetric part of A."""
     size = len(rows)
     a = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
     for k in range(size):
@@ -186,12 +186,12 @@ def signature_allows(rows: Matrix, *, strict: bool) -> bool:
 
 
 def exact_rows(rows: Rows) -> Matrix:
-    """Any exact entries as a matrix of Fractions."""
+    """Return a matrix of Fractions from any exact entries."""
     return instance(rows=rows).values["rows"]  # type: ignore[return-value]
 
 
 def inverse(rows: Rows) -> Matrix:
-    """Exact inverse; ZeroDivisionError if there is none."""
+    """Return the exact inverse; raise ZeroDivisionError if there is none."""
     return FlintBackend.rows(FlintBackend.matrix(exact_rows(rows)).inv())
 
 
@@ -200,7 +200,7 @@ def rank(rows: Rows) -> int:
 
 
 def pseudo_inverse(rows: Rows) -> Matrix:
-    """Exact Moore-Penrose inverse by full-rank factorisation: A = B C, A† = Cᵀ (C Cᵀ)⁻¹ (Bᵀ B)⁻¹ Bᵀ."""
+    """Return the exact Moore-Penrose inverse by full-rank factorisation: A = B C, A† = Cᵀ (C Cᵀ)⁻¹ (Bᵀ B)⁻¹ Bᵀ."""
     a = FlintBackend.matrix(exact_rows(rows))
     reduced, size = a.rref()
     if size == 0:
@@ -215,12 +215,12 @@ def pseudo_inverse(rows: Rows) -> Matrix:
 
 
 def delassus(mass: Rows, jacobian: Rows) -> Matrix:
-    """J M⁻¹ Jᵀ."""
+    """Return J M⁻¹ Jᵀ."""
     j = FlintBackend.matrix(exact_rows(jacobian))
     return FlintBackend.rows(j * FlintBackend.matrix(inverse(mass)) * j.transpose())
 
 
 def impact_case(mass: Rows, jacobian: Rows, velocity: list[Any], **scalars: Any) -> Instance:
-    """An impact with M, M⁻¹, J, G = (J M⁻¹ Jᵀ)† and v filled in; scalars such as e by name."""
+    """Return an impact with M, M⁻¹, J, G = (J M⁻¹ Jᵀ)† and v; scalars such as e are given by name."""
     values = {"M": mass, "M⁻¹": inverse(mass), "J": jacobian, "v": velocity}
     return instance({**values, "G": pseudo_inverse(delassus(mass, jacobian))}, **scalars)

@@ -1,4 +1,4 @@
-"""Formulas as text and as LaTeX (a LaTeX that latex2mathml digests)."""
+"""Formulas as text and as LaTeX that latex2mathml can convert."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ RELATIONS = {"=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥"
 
 
 def text(value: Expression) -> str:
-    """An expression on one line, such as  M − (1 + e)·Jᵀ G J  written out term by term."""
+    """Return an expression as text on one line, as a sum of terms."""
     return _sum(value, _text_term)
 
 
 def latex(value: Expression) -> str:
-    """The same in LaTeX."""
+    """Return an expression in LaTeX, as a sum of terms."""
     return _sum(value, _latex_term)
 
 
@@ -81,7 +81,7 @@ def _latex_letter(letter: Letter) -> str:
 
 
 def latex_name(name: str) -> str:
-    """LaTeX of a Unicode name such as M⁻¹, γ⁺ or J₁."""
+    """Return the LaTeX form of a Unicode name such as M⁻¹, γ⁺ or J₁."""
     base, lower, upper, rest = "", "", "", name
     while rest:
         raised = next((mark for mark in _SUPERSCRIPTS if rest.startswith(mark)), None)
@@ -105,7 +105,7 @@ def latex_number(value: Fraction) -> str:
 
 
 def fact_line(fact: Fact) -> Line:
-    """A fact as a line: its name in words, its formula."""
+    """Return a fact as a line: its name in words and its formula."""
     match fact:
         case Equation():
             right = ("I", "I") if _is_identity(fact) else (text(fact.rhs), latex(fact.rhs))
@@ -123,7 +123,7 @@ def fact_line(fact: Fact) -> Line:
 
 
 def _is_identity(fact: Equation) -> bool:
-    """A bare 1 opposite a matrix is the identity of its size."""
+    """Whether the right side is 1 and the left side a matrix, so that the 1 stands for the identity matrix."""
     return fact.rhs == 1 and fact.lhs.rows not in ("*", "1")
 
 
@@ -136,7 +136,7 @@ def step_claim(step: Step) -> Line:
 
 
 def step_lines(step: Step) -> tuple[Line, ...]:
-    """The certificate of a step, term by term."""
+    """Return the certificate of a step, term by term."""
     match step:
         case Exact():
             return ()
@@ -164,7 +164,7 @@ def _cofactor_line(cofactor: Cofactor) -> Line:
 
 
 def _bracketed(formula: str) -> str:
-    """Brackets where a sum or a sign would otherwise be misread."""
+    """Return the formula, in brackets if a sum or a sign could be misread without them."""
     misread = formula[0] in "-−" or any(mark in formula for mark in (" + ", " − ", " - "))
     return f"({formula})" if misread else formula
 
@@ -196,13 +196,13 @@ def _term_line(term: SumTerm) -> Line:
 
 
 def number_text(value: Fraction) -> str:
-    """A rational in full when short, with its decimal value when long."""
+    """Return a short rational in full, and a long one as its decimal value."""
     plain = str(value)
     return plain if len(plain) <= 24 else f"{float(value):.6g} (exact rational of {len(plain)} characters)"
 
 
 def case_lines(given: Instance) -> tuple[Line, ...]:
-    """An exact instance, one line per letter."""
+    """Return an exact instance as one line per letter."""
     return tuple(_value_line(name, value) for name, value in given.values.items())
 
 

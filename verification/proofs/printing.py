@@ -1,4 +1,4 @@
-"""A proof as plain text: statement, hypotheses, every step with its certificate, twins, cases."""
+"""A proof as plain text: statement, hypotheses, every step with its certificate, false variants, and exact cases."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def proof_text(record: ProofRecord) -> str:
-    """The whole proof as text."""
+    """Return the whole proof as text."""
     lines = [
         f"{record.title}   [{record.name}]",
         f"{record.source}",
@@ -34,7 +34,7 @@ def proof_text(record: ProofRecord) -> str:
 
 
 def plain(prose: str) -> str:
-    """Prose with LaTeX between dollars, made readable on a terminal."""
+    """Return prose with LaTeX between dollar signs in a form that is readable on a terminal."""
     from_to = {
         r"\top": "T", r"\dagger": "†", r"\leq": "≤", r"\geq": "≥", r"\succeq": "⪰", r"\succ": "≻", r"\in": "∈",
         r"\tfrac12": "½", r"\frac12": "½", r"\cdot": "·", r"\bar": "bar ", r"\le": "≤", r"\ge": "≥", r"\neq": "≠",

@@ -1,16 +1,16 @@
-"""The certificates, written out for a second tool: Coq expands them again and shares no code with the kit.
+"""The certificates as Coq scripts: Coq expands them again and shares no code with the kit.
 
-A statement becomes one self-contained script over an abstract ring that is not commutative, with a transposition.
-Sizes are erased: two words of one shape are equal letter by letter whatever the sizes are, so an identity of the free
-algebra is an identity of matrices. Each step becomes a lemma, "these equations, hence this equation", whose proof is
-the certificate itself,
+A statement becomes one self-contained script over an abstract non-commutative ring with a transposition. The script has
+no matrix sizes: words of one shape are compared letter by letter, whatever their sizes, so an identity of the free
+algebra is an identity of matrices. Each step becomes a lemma, "these equations imply this equation". The proof of the
+lemma is the certificate,
 
     claim.lhs - claim.rhs = sum of  left * (equation.lhs - equation.rhs) * right,
 
-which Coq has to expand. What is no identity stays a hypothesis that can be read in the script: that a number (a 1 x 1
-word) is its own transpose, that a scalar commutes, and that a positive definite form vanishes only at zero (each only
-for the very words it is used on). A sum of squares is checked as an equation; that its terms are not negative is left
-to the kit.
+which Coq expands. Facts that are not identities are visible hypotheses of the script: a number (a 1 x 1 word) equals
+its own transpose, a scalar commutes, and a positive definite form vanishes only at zero. Each hypothesis covers only
+the words for which it is used. Coq checks a sum of squares as an equation; only the kit checks that its terms are not
+negative.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from verification.proofs.steps import (
 )
 
 CERTIFIED = ("theorem_1", "theorem_2", "independent_subset")
-PATIENCE = 120.0  # seconds for one script; the three take up to 20 each on a loaded machine
-CLOSED = "Closed under the global context"  # Coq's words for a lemma that leans on nothing but its own hypotheses
+PATIENCE = 120.0  # seconds for one script; each of the three takes up to 20 s on a loaded machine
+CLOSED = "Closed under the global context"  # Coq's message for a lemma that depends only on its own hypotheses
 
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """What the second tool says: verdict "accepted", "refused" (with its words) or "skipped" (with the reason)."""
+    """Result of the second tool: verdict "accepted", "refused" or "skipped"; `words` is its message or the reason."""
 
     name: str
     verdict: str
@@ -54,12 +54,12 @@ class SecondOpinion:
 
     @property
     def answer(self) -> str:
-        """In a table: yes, no, or not applicable."""
+        """The verdict as a table cell: yes, no, or not applicable."""
         return {"accepted": YES, "refused": NO}.get(self.verdict, NOT_APPLICABLE)
 
 
 def second_opinion(statement: Statement) -> SecondOpinion:
-    """Let Coq check the certificates of a statement; skipped where there is no `coqc`."""
+    """Let Coq check the certificates of a statement; the verdict is "skipped" if there is no `coqc`."""
     started = time.perf_counter()
     coqc = shutil.which("coqc")
     if coqc is None:
@@ -75,14 +75,14 @@ def second_opinion(statement: Statement) -> SecondOpinion:
 
 
 def coq_script(statement: Statement) -> str:
-    """The script: the ring, the letters, the hypotheses, one lemma per step.
+    """Return the Coq script: the ring, the letters, the hypotheses, one lemma per step.
 
     Raises
     ------
     NotExportable
-        If a step is no identity, a coefficient is a fraction, or no step is there to be expanded.
+        If a step is not an identity, a coefficient is a fraction, or the statement has no step to expand.
     Refused
-        If a step leans on an equation that nobody established.
+        If a step uses an equation that was not established before.
     """
     return _Script(statement).text()
 
@@ -110,7 +110,7 @@ def _run(coqc: str, script: str) -> tuple[str, str]:
 
 
 class _Script:
-    """Collects the lines; `proofs` maps each established equation to the Coq term that proves it."""
+    """Collects the lines of the script; `proofs` maps each established equation to the Coq term that proves it."""
 
     def __init__(self, statement: Statement) -> None:
         self.lines: list[str] = []
@@ -170,7 +170,7 @@ class _Script:
             raise NotExportable(f"a step of kind {type(step).__name__}")
 
     def _inference(self, name: str, step: Cancelling | Dividing) -> None:
-        """X = 0 by certificate, hence N = 0 by the hypothesis that stands for definiteness (or for s ≠ 0)."""
+        """Write X = 0 with its certificate, and N = 0 from the hypothesis for definiteness (or for s ≠ 0)."""
         source = step.square if isinstance(step, Cancelling) else step.product
         if not isinstance(source, Equation):
             raise NotExportable(f"'{step.claim.name}' follows from an inequality, which is no identity")
@@ -209,7 +209,7 @@ class _Script:
         self.lemmas.append(name)
 
     def _turned(self, name: str, claim: Equation, cofactors: tuple[Cofactor, ...]) -> list[str]:
-        """Cofactors k s (wᵀ - w) for the 1 x 1 words w that the kit turns over; Coq checks that they suffice."""
+        """Write cofactors k s (wᵀ - w) for the 1 x 1 words w that the kit transposes; Coq checks that they suffice."""
         rest = claim.difference
         for cofactor in cofactors:
             rest = rest - cofactor.value

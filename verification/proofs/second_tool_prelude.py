@@ -1,4 +1,4 @@
-"""The Coq side of `second_tool`: how words are spelled, and the ring with a transposition they live in."""
+"""The Coq side of `second_tool`: the spelling of words in Coq, and the ring with transposition that contains them."""
 
 from __future__ import annotations
 
@@ -84,11 +84,11 @@ Ltac expand := autorewrite with expand;
 
 
 class NotExportable(Refused):
-    """The proof holds a move that is no identity between integer combinations of words."""
+    """The proof contains a step that is not an identity between integer combinations of words."""
 
 
 def in_coq(value: Expression) -> str:
-    """An expression as a sum of words, the scalars in front."""
+    """Return an expression in Coq as a sum of words, each with its scalars in front."""
     return " + ".join(_term(scalars, word, k) for (scalars, word), k in value.ordered()) or "zero"
 
 

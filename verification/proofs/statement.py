@@ -1,4 +1,4 @@
-"""What a file of proofs states, and what comes out when it is checked."""
+"""Records of statements to prove and of the results of checking them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from verification.proofs.steps import Exact, Step
 
 @dataclass(frozen=True)
 class Without:
-    """An exact case where one hypothesis fails, all others hold, and a conclusion is false: it is needed.
+    """An exact case that shows the need for a hypothesis: it fails, all others hold, and a conclusion is false.
 
-    Several names are dropped together where they say one thing (both sides of an inverse).
+    Several names are dropped together if they state one property (such as both sides of an inverse).
     """
 
     hypothesis: str | tuple[str, ...]
@@ -29,9 +29,9 @@ class Without:
 
 @dataclass(frozen=True)
 class Twin:
-    """A nearby statement that is wrong: under the same hypotheses `claim` fails on `instance`.
+    """A deliberately altered statement that is false: `claim` fails on `instance`, which satisfies all hypotheses.
 
-    A claim about numbers (`Exact`) needs no instance: it is false as it stands.
+    A claim about numbers (`Exact`) needs no instance, because it is false by itself.
     """
 
     title: str
@@ -44,11 +44,11 @@ class Twin:
 class Statement:
     """A theorem, lemma or erratum with its proof.
 
-    `definitions` give names to expressions (a letter or scalar on the left); they say nothing about the world, so
-    they need no counterexample. `statement` and `remarks` are prose with LaTeX between dollar signs. `concludes`
-    names the steps that are the conclusions; the others are lemmas on the way. `witness` is one exact case in
-    which every hypothesis holds, so that the theorem speaks of something. What a floating-point statement takes from
-    elsewhere is kept apart: `assumed` of rounding, `measured` on the compiled code. `name` is given by `load`.
+    `definitions` give names to expressions (a letter or scalar on the left); they assume nothing, so they need no
+    counterexample. `statement` and `remarks` are prose with LaTeX between dollar signs. `concludes` names the steps
+    that are conclusions; the other steps are lemmas. `witness` is one exact case that satisfies every hypothesis, so
+    the theorem is not vacuous. A floating-point statement lists its premises separately: `assumed` about rounding,
+    `measured` on the compiled code. `load` sets `name`.
     """
 
     title: str
@@ -76,7 +76,7 @@ YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a printed proof: its words and, where there is one, its formula as text and as LaTeX."""
+    """One line of a printed proof: its words and, if there is one, its formula as text and as LaTeX."""
 
     words: str
     text: str = ""
@@ -85,7 +85,7 @@ class Line:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """A checked step: what is claimed, why, the certificate term by term, and whether it closed."""
+    """A checked step: claim, reason, certificate term by term, and whether the check accepted it."""
 
     claim: Line
     because: str
@@ -96,7 +96,7 @@ class StepRecord:
 
 @dataclass(frozen=True)
 class Refutation:
-    """A false statement, the exact case that refutes it, and whether the case does so."""
+    """A false statement, an exact case, and whether the case refutes the statement."""
 
     title: str
     claim: Line
@@ -107,7 +107,7 @@ class Refutation:
 
 @dataclass(frozen=True)
 class ProofRecord:
-    """A proof as plain data: everything the command line and the report show."""
+    """A proof as plain data, with everything that the command line and the report show."""
 
     name: str
     title: str
@@ -133,5 +133,5 @@ class ProofRecord:
         return self.verdict == "proved"
 
     def as_text(self) -> str:
-        """The whole proof in plain text, to be followed without the code."""
+        """Return the whole proof as plain text, readable without the code."""
         return proof_text(self)

@@ -1,11 +1,11 @@
-"""The only moves a proof may make. Each one is checked by expansion or by exact arithmetic, never by trust.
+"""The permitted proof steps. Expansion or exact arithmetic checks each step.
 
 Identity      claim.lhs - claim.rhs = sum of  left * (equation.lhs - equation.rhs) * right   (cofactor certificate)
 Positivity    claim.value = sum of non-negative terms + cofactors                            (sum of squares)
 Cancelling    N' G N = 0 (or <= 0) with G positive definite, hence N = 0
 Exact         a relation between two rational numbers
 
-A move whose certificate does not close, or that leans on a fact nobody established, raises `Refused`.
+A step raises `Refused` if its certificate does not expand to zero, or if it uses a fact that is not established yet.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Refused(IapbError):
 
 @dataclass(frozen=True)
 class Cofactor:
-    """One term  left * (equation.lhs - equation.rhs) * right  of a certificate: zero by the equation."""
+    """One term  left * (equation.lhs - equation.rhs) * right  of a certificate; the equation makes it zero."""
 
     left: Expression
     equation: Equation
@@ -54,7 +54,7 @@ class Cofactor:
 
 @dataclass(frozen=True)
 class Square:
-    """half' core half, non-negative when the core is (no core: the identity)."""
+    """half' core half, which is non-negative if the core is (without a core: the identity)."""
 
     half: Expression
     core: Definite | NonNegative | None = None
@@ -71,7 +71,7 @@ class Square:
 
 @dataclass(frozen=True)
 class Pairing:
-    """left' core right, non-negative when all three are entrywise (no core: the identity)."""
+    """left' core right, which is non-negative if all three are so entrywise (without a core: the identity)."""
 
     left: Entrywise
     right: Entrywise
@@ -110,7 +110,7 @@ class Term:
 
 
 class Known:
-    """The facts a proof may lean on so far, and which of them it has used."""
+    """The facts that a proof may use so far, and the names of those that it has used."""
 
     def __init__(self, facts: Iterable[Fact]) -> None:
         self._facts = list(facts)
@@ -120,7 +120,7 @@ class Known:
         self._facts.append(fact)
 
     def require(self, wanted: Fact) -> None:
-        """Mark `wanted` as used; refuse it unless it, or its transpose, is established."""
+        """Mark `wanted` as used; raise Refused unless it or its transpose is established."""
         for fact in self._facts:
             if fact == wanted or (isinstance(fact, Equation) and fact.T == wanted):
                 self.used.add(fact.name)
@@ -137,7 +137,7 @@ class Identity:
     because: str = ""
 
     def verify(self, known: Known) -> None:
-        """Expand claim - sum of cofactors in the free algebra; anything left over is refused."""
+        """Expand claim - sum of cofactors in the free algebra; raise Refused if the result is not zero."""
         for cofactor in self.cofactors:
             known.require(cofactor.equation)
         _require_zero(self.claim.name, self.claim.difference, self.cofactors)
@@ -145,7 +145,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class Positivity:
-    """value >= 0 because it is a sum of terms that are each non-negative (and of cofactors, which are zero)."""
+    """value >= 0, because it is a sum of non-negative terms and of cofactors, which are zero."""
 
     claim: NonNegative
     terms: tuple[Term, ...]
@@ -153,7 +153,7 @@ class Positivity:
     because: str = ""
 
     def verify(self, known: Known) -> None:
-        """Check every term's right to be called non-negative, then that they add up to the claim."""
+        """Check that every term is non-negative, and that the terms and cofactors add up to the claim."""
         remainder = self.claim.value
         for term in self.terms:
             if term.weight <= 0:
@@ -172,7 +172,7 @@ class Positivity:
 
 @dataclass(frozen=True)
 class Cancelling:
-    """N = 0 because N' G N = 0, or -N' G N >= 0, and G is positive definite (no G: the identity)."""
+    """N = 0, because N' G N = 0 or -N' G N >= 0 with G positive definite (without a G: the identity)."""
 
     claim: Equation
     square: Equation | NonNegative
@@ -191,7 +191,7 @@ class Cancelling:
 
 @dataclass(frozen=True)
 class Dividing:
-    """N = 0 because s N = 0 and the scalar s is not zero."""
+    """N = 0, because s N = 0 and the scalar s is not zero."""
 
     claim: Equation
     product: Equation
@@ -207,7 +207,7 @@ class Dividing:
 
 @dataclass(frozen=True)
 class Exact:
-    """A relation between two rationals, computed before it is stated; `says` names what is compared."""
+    """A relation between two computed rationals; `says` describes the comparison."""
 
     says: str
     left: Fraction
@@ -236,11 +236,11 @@ def _require_zero(name: str, value: Expression, cofactors: Iterable[Cofactor]) -
         raise Refused(f"'{name}': the certificate leaves {len(value.canonical().terms)} terms")
 
 
-MOST_REPLACEMENTS = 2000  # a proof here needs some dozens; beyond this the rules run in a circle
+MOST_REPLACEMENTS = 2000  # a proof needs some dozens; beyond this limit the rules run in a circle
 
 
 def rewritten(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:
-    """Apply the rules until none fits. Returns what is left and the cofactors: value = rest + sum of cofactors."""
+    """Apply the rules until none matches; return rest and cofactors with value = rest + sum of cofactors."""
     cofactors: list[Cofactor] = []
     for _ in range(MOST_REPLACEMENTS):
         cofactor = _first_match(value, rules)
@@ -259,7 +259,7 @@ def identity(
     because: str = "",
     first: Sequence[Cofactor] = (),
 ) -> Identity:
-    """lhs = rhs: take away the cofactors `first`, written by hand, then rewrite what is left by `rules`."""
+    """Return the step lhs = rhs: subtract the cofactors `first`, given by hand, then rewrite the rest by `rules`."""
     claim = Equation(name, expression(lhs), expression(rhs))
     remainder = claim.difference
     for cofactor in first:
@@ -273,7 +273,7 @@ def identity(
 def positivity(
     name: str, value: Operand, terms: Sequence[Term], rules: Sequence[Equation] = (), because: str = ""
 ) -> Positivity:
-    """value >= 0 as the sum of `terms`, up to what rewriting by `rules` takes away."""
+    """Return the step value >= 0: subtract `terms` from value, then rewrite the rest to zero by `rules`."""
     claim = NonNegative(name, expression(value))
     remainder = claim.value
     for term in terms:
@@ -285,8 +285,10 @@ def positivity(
 
 
 def _reduced(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:
-    """Rewrite; then, for a 1 x 1 value, turn words over (a number is its own transpose) where that rewrites to a
-    smaller word, so that xᵀ W y and yᵀ W x meet when W is symmetric."""
+    """Rewrite the value; for a 1 x 1 value, also transpose a word if its transpose rewrites to a smaller word.
+
+    A number equals its own transpose, so xᵀ W y and yᵀ W x become equal if W is symmetric.
+    """
     rest, cofactors = rewritten(value, rules)
     if rest.is_scalar:
         for (scalars, word), coefficient in tuple(rest.ordered()):

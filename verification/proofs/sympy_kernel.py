@@ -1,12 +1,13 @@
-"""SymPy as a second kernel: every certificate expanded with non-commutative symbols, without the algebra of the kit.
+"""SymPy as a second kernel: it expands every certificate with non-commutative symbols, without the kit's algebra.
 
-A letter becomes a non-commutative symbol, its transpose another one, a scalar a commuting one. Products and sums are
-SymPy's; only single terms are taken over from the kit. A certificate holds where SymPy expands
+A letter becomes a non-commutative symbol, its transpose another symbol, and a scalar a commuting symbol. SymPy computes
+products and sums; the kit supplies only single terms. A certificate holds if SymPy expands
 
     claim.lhs - claim.rhs - sum of  left * (equation.lhs - equation.rhs) * right
 
-to zero, or the claim of a sum of squares less its terms. One rule beyond the free algebra: a number (a 1 x 1 word) is
-its own transpose. The kit alone checks that each equation used was established before, and that no term is negative.
+to zero; for a sum of squares, claim minus terms must expand to zero. One rule goes beyond the free algebra: a number
+(a 1 x 1 word) equals its own transpose. Only the kit checks that each equation was established before its use, and that
+no term is negative.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _TRANSPOSED = "ᵀ"
 
 
 def sympy_opinion(statement: Statement) -> SecondOpinion:
-    """Let SymPy expand every certificate of a statement; skipped where no step has one."""
+    """Let SymPy expand every certificate of a statement; the verdict is "skipped" if no step has a certificate."""
     started, expanded = time.perf_counter(), 0
     for step in statement.steps:
         left = remainder(step)
@@ -52,7 +53,7 @@ def sympy_opinion(statement: Statement) -> SecondOpinion:
 
 
 def remainder(step: Step) -> Any:
-    """What SymPy leaves of a step's certificate: 0 where it holds, None for a kind of step that has none."""
+    """Return the remainder of a step's certificate in SymPy: 0 if it holds, None if the step has no certificate."""
     if isinstance(step, Exact):
         holds = RELATIONS[step.relation](sympy.Rational(str(step.left)), sympy.Rational(str(step.right)))
         return sympy.Integer(0 if holds else 1)
@@ -85,7 +86,7 @@ def _difference(equation: Equation) -> Any:
 
 
 def _of(value: Expression) -> Any:
-    """The kit's sum of terms as SymPy's, term by term."""
+    """Convert the kit's sum of terms to SymPy, term by term."""
     total = sympy.Integer(0)
     for (scalars, word), coefficient in value.terms.items():
         product = sympy.Rational(coefficient.numerator, coefficient.denominator)
@@ -102,7 +103,7 @@ def _letter(name: str) -> Any:
 
 
 def _term(term: Term) -> Any:
-    """Weight, scalar factors and form of a term that is not negative."""
+    """Return a non-negative term in SymPy: weight times scalar factors times form."""
     product = sympy.Rational(str(term.weight))
     for factor in term.factors:
         product *= _of(factor.value)
@@ -119,7 +120,7 @@ def _term(term: Term) -> Any:
 
 
 def _words(value: Any) -> list[tuple[Any, tuple[Any, ...]]]:
-    """Coefficients and words of an expanded sum."""
+    """Return the coefficients and words of the expanded sum."""
     found = []
     for term in sympy.Add.make_args(sympy.expand(value)):
         scalars, letters = term.args_cnc()
@@ -141,7 +142,7 @@ def _transposed(value: Any) -> Any:
 
 
 def _canonical(value: Any, number: bool) -> Any:
-    """Expanded; each word of a number is the earlier one, by name, of itself and its transpose."""
+    """Return the expanded value; for a number, replace each word by the first of itself and its transpose, by name."""
     terms = []
     for scale, word in _words(value):
         if number:

@@ -1,7 +1,7 @@
-"""Letters, hypotheses and small lemmas that many statements share, so that each is written once.
+"""Letters, hypotheses and small lemmas that many statements share.
 
-c contacts, d degrees of freedom. M (d x d) mass matrix, J (c x d) contact Jacobian, G (c x c) any {1}-inverse of the
-Delassus matrix W = J M⁻¹ Jᵀ, v (d) velocity before the impact, e restitution.
+There are c contacts and d degrees of freedom. M (d x d) is the mass matrix, J (c x d) the contact Jacobian, G (c x c)
+any {1}-inverse of the Delassus matrix W = J M⁻¹ Jᵀ, v (d) the velocity before the impact, and e the restitution.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ MASS_RULES = (SYMMETRIC_MASS, INVERSE_SYMMETRIC.claim, INVERSE_MASS, INVERSE_FRO
 
 
 def row_space_lemmas(inverse: Expression, name: str, given: Equation) -> tuple[Step, ...]:
-    """W G J = J for a {1}-inverse G of W (`given`: W G W = W): what is true on range(W) is true on range(J).
+    """Return steps that prove W G J = J for a {1}-inverse G of W (`given`: W G W = W).
 
-    With N = W G J − J: N M⁻ᵀ Nᵀ = 0 by W G W = W alone, and M is positive definite, so M⁻¹ Nᵀ = 0 and N = 0.
-    The last step is the lemma; the others lead to it. No symmetry is used.
+    Let N = W G J − J. W G W = W alone gives N M⁻ᵀ Nᵀ = 0. M is positive definite, so M⁻¹ Nᵀ = 0 and N = 0. The last
+    step is the lemma; the others prepare it. The proof uses no symmetry.
     """
     return _vanishing_residual(W * inverse * J - J, f"W {name} J − J", on_row_space(inverse, name), given)
 
 
 def column_space_lemmas(inverse: Expression, name: str, given: Equation) -> tuple[Step, ...]:
-    """The same from the other side: Jᵀ G W = Jᵀ."""
+    """Return steps that prove Jᵀ G W = Jᵀ for a {1}-inverse G of W (`given`: W G W = W)."""
     return _vanishing_residual(
         (J.T * inverse * W - J.T).T, f"(Jᵀ {name} W − Jᵀ)ᵀ", on_column_space(inverse, name), given
     )
@@ -87,12 +87,12 @@ def _vanishing_residual(residual: Expression, words: str, lemma: Equation, given
 
 
 def on_row_space(inverse: Expression, name: str) -> Equation:
-    """The conclusion of `row_space_lemmas`."""
+    """Return the conclusion of `row_space_lemmas`."""
     return equation(f"W {name} J = J", W * inverse * J, J)
 
 
 def on_column_space(inverse: Expression, name: str) -> Equation:
-    """The conclusion of `column_space_lemmas`."""
+    """Return the conclusion of `column_space_lemmas`."""
     return equation(f"Jᵀ {name} W = Jᵀ", J.T * inverse * W, J.T)
 
 

@@ -1,4 +1,4 @@
-"""Stability maps: the walls that are stable in a sampled loop, over stiffness and damping, by penalties and impulses."""
+"""Stability maps: walls that are stable in a sampled loop, over stiffness and damping, with penalties and impulses."""
 
 from __future__ import annotations
 

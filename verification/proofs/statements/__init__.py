@@ -1,1 +1,1 @@
-"""The statements, one file each; `verification.proofs` lists them in reading order."""
+"""The statements, one file per topic; `verification.proofs` lists them in reading order."""

@@ -1,4 +1,4 @@
-"""What follows from the theorems: one contact, other coordinates, scaled impulses, no stiffness."""
+"""Consequences of the theorems: one contact, other coordinates, scaled impulses, independence of stiffness."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SINGLE_CONTACT_COMPLEMENTARITY_CASE = instance({"γ⁻": -1, "p": 1, "w": 1, "ω
 
 
 def single_contact_complementarity() -> Statement:
-    """C05: for one approaching contact the paper's impulse is the one solution of the complementarity problem."""
+    """C05: for one approaching contact the paper's impulse is the unique solution of the complementarity problem."""
     gamma, p, w, omega, slack = (scalar(name) for name in ("γ⁻", "p", "w", "ω", "s"))
     name = equation("slack: γ⁺ + e γ⁻ with γ⁺ = γ⁻ + w p", slack, (1 + e) * gamma + w * p)
     approaching = NonNegative("the contact approaches: γ⁻ ≤ 0", -gamma)
@@ -167,7 +167,7 @@ SCALED_IMPULSE_CASE = impact_case([[1]], [[1]], [-1], e=0, s="1/2")
 
 
 def scaled_impulse() -> Statement:
-    """C08, C09: scaling the impulse by one factor is a restitution in [−1, e]; a factor per contact is not."""
+    """C08, C09: one factor on the whole impulse acts as a restitution in [−1, e]; one factor per contact does not."""
     scale, after, effective = scalar("s"), vector("v⁺", "d"), scalar("eₛ")
     at_least_0, at_most_1 = NonNegative("s ≥ 0", scale), NonNegative("s ≤ 1", 1 - scale)
     names = (
@@ -237,7 +237,7 @@ LOSS_WITHOUT_STIFFNESS_CASE = instance({"M": [[1]], "M⁻¹": [[1]], "v⁺": [-1
 
 
 def loss_without_stiffness() -> Statement:
-    """C17: what an impact takes does not depend on finite contact forces, whatever their stiffness and damping."""
+    """C17: the energy loss of an impact does not depend on finite contact forces, for any stiffness and damping."""
     after, later, force, h = vector("v⁺", "d"), vector("vₕ", "d"), vector("F", "d"), scalar("h")
     name = equation("finite forces F (springs, dampers, the hand) act for a time h", later, after + h * MI * force)
     change = identity(

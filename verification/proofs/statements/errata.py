@@ -1,4 +1,4 @@
-"""What is wrong in the paper, each with the exact case that shows it."""
+"""Errata of the paper, each with an exact case that demonstrates it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from verification.proofs.vocabulary import E_AT_LEAST_MINUS_ONE, MI, ONE, G, J, 
 
 
 def erratum_half() -> Statement:
-    """Erratum: (32) carries the factor ½ to its last line and drops it there."""
+    """Erratum: (32) has the factor ½ up to its last line, which drops it."""
     energy, form = scalar("k"), scalar("x")
     before = energy - (1 + e) * Fraction(1, 2) * (2 * form - (1 + e) * form)
     step = identity("the last step of (32)", before, energy - Fraction(1, 2) * (1 - e * e) * form)
@@ -78,7 +78,7 @@ def erratum_symmetric() -> Statement:
 
 
 def erratum_hypothesis() -> Statement:
-    """Erratum: the hypothesis of Theorem 2 is printed with q̇ where q̇₀ is meant."""
+    """Erratum: the hypothesis of Theorem 2 is printed with q̇ instead of q̇₀."""
     after = vector("v⁺", "d")
     printed = equation("as printed: J q̇ = −e J q̇", J * after, -e * J * after)
     distinct = Nonzero("e is not −1", 1 + e)
@@ -113,7 +113,7 @@ def erratum_hypothesis() -> Statement:
 
 
 def erratum_rank() -> Statement:
-    """Erratum: Appendix III gives the left-over rows full rank."""
+    """Erratum: Appendix III states that the remaining rows have full rank, which is false."""
     rows = [[1], [1], [1]]
     all_rows, left_over = Fraction(rank(rows)), Fraction(rank(rows[1:]))
     return Statement(
@@ -132,7 +132,7 @@ def erratum_rank() -> Statement:
 
 
 def erratum_shape() -> Statement:
-    """Erratum: J_i is said to be d x 3, but (1) multiplies a force by its transpose."""
+    """Erratum: the paper gives J_i the size d x 3, but (1) multiplies a force by its transpose."""
     jacobian, force = matrix("Jᵢ", "k", "d"), vector("F", "k")
     work = identity("power at the contact = power in the joints", force.T * (jacobian * v), (jacobian.T * force).T * v)
     square = matrix("Jᵢ", "d", "d")
@@ -159,7 +159,7 @@ def erratum_shape() -> Statement:
 
 
 def erratum_friction_sign() -> Statement:
-    """Erratum: the sliding branch of (6) has no sign, and with a signed v_t it drives the motion."""
+    """Erratum: the sliding branch of (6) has no sign; with a signed v_t it can accelerate the motion."""
     mu, normal, sign, speed, friction = (scalar(name) for name in ("μ", "N", "σ", "vₜ", "f"))
     law = equation("friction with its sign", friction, -mu * normal * sign)
     rough, pressed = NonNegative("μ ≥ 0", mu), NonNegative("N ≥ 0", normal)
@@ -247,7 +247,10 @@ BALL = instance({"J": [[1]], "W⁻¹": [[1]], "v": [-1], "y": [1]}, e=0)
 
 
 def erratum_adhesion() -> Statement:
-    """Erratum: assumption (i), impulses at all approaching contacts, can pull: when it cannot, and where it does."""
+    """Erratum: assumption (i), impulses at all approaching contacts, can make impulses pull.
+
+    The statement gives a condition under which no impulse pulls, and a case in which one does.
+    """
     wi, y, p = matrix("W⁻¹", "c", "c"), vector("y", "c"), vector("p", "c")
     name = equation("the impulse (19)", p, -(1 + e) * wi * J * v)
     approaching = Entrywise("every contact approaches: −J v ≥ 0", -J * v)
@@ -293,7 +296,7 @@ def erratum_adhesion() -> Statement:
 
 
 def _slot():  # type: ignore[no-untyped-def]
-    """yᵀ (−J)(v + Jᵀ p): the velocity at the opposite wall after the impact."""
+    """Return yᵀ (−J)(v + Jᵀ p), the velocity at the opposite wall after the impact."""
     return -vector("y", "c").T * J * (v + J.T * vector("p", "c"))
 
 
@@ -301,7 +304,7 @@ MASS, SPEED, RESTITUTION, FORCE, STEP = (Fraction(2), Fraction(-1, 10), Fraction
 
 
 def spread(speed: Fraction) -> tuple[Fraction, int]:
-    """Velocity at which spreading ends, and the steps it takes: Newton's law is restarted in each step."""
+    """Return the final velocity of a spread impulse and the number of steps; each step applies Newton's law anew."""
     steps = 0
     while speed < 0:
         wanted = -(1 + RESTITUTION) * MASS * speed
@@ -403,7 +406,7 @@ def _square(f):  # type: ignore[no-untyped-def]
 
 
 def _peg() -> tuple[tuple[Exact, ...], Exact]:
-    """Energies of the peg: full impulse, and clipped as the device would clip it."""
+    """Return the energies of the peg for the full impulse and for the impulse as clipped by the device."""
     mass, inertia, arm = Fraction(2), Fraction(1, 200), Fraction(1, 100)
     speed, spin = Fraction(-1, 10), Fraction(4)
     p = -(speed + arm * spin) / (1 / mass + arm**2 / inertia)

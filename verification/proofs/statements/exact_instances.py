@@ -1,4 +1,4 @@
-"""Exact instances: random rational M and J, redundant rows among them, on python-flint and on sympy."""
+"""Exact instances: random rational M and J, some with redundant rows, computed by python-flint and by sympy."""
 
 import random
 from fractions import Fraction
@@ -22,7 +22,7 @@ CASES, SEED, LARGEST = 40, 20050301, 4
 
 
 def random_case(draw: random.Random) -> Instance:
-    """A rational impact: M = B Bᵀ + I, rows of J with repeats and combinations, e = p/q in [−1, 1]."""
+    """Return a rational impact: M = B Bᵀ + I, rows of J with repeats and combinations, e = p/q in [−1, 1]."""
     d, c = draw.randint(1, LARGEST), draw.randint(1, LARGEST + 1)
 
     def number() -> Fraction:
@@ -38,7 +38,7 @@ def random_case(draw: random.Random) -> Instance:
 
 
 def exact_instances() -> Statement:
-    """Theorem 2 on random rational impacts, on two exact libraries."""
+    """Theorem 2 on random rational impacts, with two exact libraries."""
     draw = random.Random(SEED)
     theorem = load("theorem_2")
     cases = [completed(random_case(draw), theorem.definitions) for _ in range(CASES)]
@@ -77,7 +77,7 @@ def exact_instances() -> Statement:
 
 
 def _is_redundant(case: Instance) -> bool:
-    """W has no inverse."""
+    """Whether W has no inverse."""
     w: Matrix = delassus(case.values["M"], case.values["J"])  # type: ignore[arg-type]
     try:
         inverse(w)

@@ -1,4 +1,4 @@
-"""Floating point: from the projector as computed to the promised 10 d ε √κ, and why (20) has no such bound."""
+"""Floating point: from the computed projector to the guaranteed 10 d ε √κ, and why (20) has no such bound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FP_PROJECTOR_CASE = instance(Q=[[1]], u=[1], δ="1/4", e=1)
 
 
 def fp_projector() -> Statement:
-    """Floating point 1: a projector whose basis is not quite orthonormal. No condition number occurs."""
+    """Floating point 1: the gain of a projector with a nearly orthonormal basis. No condition number occurs."""
     q, u, after, delta = matrix("Q", "d", "r"), vector("u", "d"), vector("u⁺", "d"), scalar("δ")
     name = equation("the computed impact", after, u - (1 + e) * q * q.T * u)
     near = NonNegative("Qᵀ Q ⪯ (1 + δ) I", 1 + delta - q.T * q)
@@ -90,7 +90,7 @@ PLANE = FP_CHOLESKY_CASE.with_values(
 
 
 def fp_cholesky() -> Statement:
-    """Floating point 2: what Cholesky's backward error does to the energy. This is where κ enters."""
+    """Floating point 2: the effect of Cholesky's backward error on the energy, which depends on κ."""
     error, after, eta, growth = matrix("Δ", "d", "d"), vector("w", "d"), scalar("η"), scalar("g")
     above = NonNegative("Δ ⪯ η M", eta * M - error)
     below = NonNegative("−Δ ⪯ η M", eta * M + error)
@@ -148,7 +148,7 @@ FP_CLAMP_CASE = instance({"α": 1, "x": -1, "y": 2, "X": -1, "Y": 2, "h": 0}, u=
 
 
 def fp_clamp() -> Statement:
-    """Floating point 3: the clamp as computed, with X, Y and α each rounded."""
+    """Floating point 3: the computed clamp, with X, Y and α each rounded."""
     alpha, x, y, cross, square, slack, u = (scalar(name) for name in ("α", "x", "y", "X", "Y", "h", "u"))
     cross_near = NonNegative("x ≤ (1−u) X + h: X was rounded once", (1 - u) * cross + slack - x)
     square_near = NonNegative("(1−u) y ≤ Y: Y was rounded once", square - (1 - u) * y)
@@ -207,7 +207,7 @@ ROUND = instance({"M": [[1, 0], [0, 1]], "v": [1, 0], "r": [0, "1/2"], "κ": 1, 
 
 
 def fp_rounding() -> Statement:
-    """Floating point 4: rounding v⁺ to doubles costs √κ, and no more."""
+    """Floating point 4: rounding v⁺ to doubles causes an energy error proportional to √κ."""
     r, kappa, eta = vector("r", "d"), scalar("κ"), scalar("η")
     lightest, heaviest = NonNegative("M ⪰ I", M - 1), NonNegative("M ⪯ κ I", kappa - M)
     rounded = NonNegative("κ |r|² ≤ η² |v|²", eta * eta * v.T * v - kappa * r.T * r)
@@ -272,7 +272,7 @@ def fp_rounding() -> Statement:
 
 
 def fp_promise() -> Statement:
-    """Floating point 5: the sum of all terms is below the promised 10 d ε √κ."""
+    """Floating point 5: the sum of all terms is below the guaranteed 10 d ε √κ."""
     d, k = scalar("d"), scalar("k")
     dimension, condition = NonNegative("d ≥ 1", d - 1), NonNegative("k = √κ ≥ 1", k - 1)
     at_least_zero = positivity("k ≥ 0", k, (Term(1, (condition,)), Term(1)))
@@ -322,11 +322,11 @@ def fp_promise() -> Statement:
     )
 
 
-SIZE = 2.0**-28  # the second row leaves the first by this much
+SIZE = 2.0**-28  # distance of the second row from the direction of the first
 
 
 def energy_factor(k: int) -> Fraction:
-    """KE⁺/KE⁻ of an elastic impact whose Delassus matrix alone is rounded; all else is exact.
+    """Return KE⁺/KE⁻ of an elastic impact with a rounded Delassus matrix W; all other quantities are exact.
 
     M = I, J = [1 0; a t] with a = 1 − 2⁻ᵏ, t = 2⁻²⁸, v = (0, 1). The entries of W are computed in doubles; its
     inverse, the impulse and v⁺ are rational.
@@ -337,7 +337,10 @@ def energy_factor(k: int) -> Fraction:
 
 
 def energy_factor_above_cutoff(ulps: int) -> Fraction:
-    """The same for a = 1 and t² = (ulps + 0.49) ε: the computed W keeps its rank above a cutoff of ulps ε/4."""
+    """Return KE⁺/KE⁻ as in `energy_factor` for a = 1 and t² = (ulps + 0.49) ε.
+
+    The computed W keeps its rank above a cutoff of ulps ε/4.
+    """
     t = ((ulps + 0.49) * 2.0**-52) ** 0.5
     rounded = [[Fraction(1), Fraction(1)], [Fraction(1), Fraction(1.0 + t * t)]]
     return _energy_after(Fraction(1), Fraction(t), rounded)
@@ -351,7 +354,7 @@ def _energy_after(a: Fraction, t: Fraction, w: list[list[Fraction]]) -> Fraction
 
 
 def fp_gram_pinv() -> Statement:
-    """Floating point 6: why no such bound exists for the printed formula, which forms J M⁻¹ Jᵀ."""
+    """Floating point 6: the printed formula, which forms J M⁻¹ Jᵀ, has no such bound."""
     one, cut = Fraction(1), energy_factor_above_cutoff(19)
     return Statement(
         title="Floating point: the printed formula has no such bound",

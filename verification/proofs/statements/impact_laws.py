@@ -1,4 +1,4 @@
-"""Impact laws: restitution that differs, complementarity, Poisson's law, momentum."""
+"""Impact laws: unequal restitution, complementarity, Poisson's law, momentum."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CASE = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "W⁻¹": [[1]], "E": 
 
 
 def unequal_restitution() -> Statement:
-    """A restitution for each contact, by equalities: the exact condition, and the bar that breaks it."""
+    """One restitution per contact, as equalities: the exact condition for passivity, and a bar that violates it."""
     wi, law_matrix = matrix("W⁻¹", "c", "c"), matrix("E", "c", "c")
     gamma, after = vector("γ", "c"), vector("v⁺", "d")
     inverse_ = equation("W W⁻¹ = I for W = J M⁻¹ Jᵀ", W * wi, 1)
@@ -92,7 +92,7 @@ def _bar_case():  # type: ignore[no-untyped-def]
 
 
 def _bar() -> tuple[Exact, ...]:
-    """The bar's energies from its velocities: before (−1, 0), after with J v⁺ = (1, 0)."""
+    """Return the bar's energies from its velocities: before the impact (−1, 0), after it with J v⁺ = (1, 0)."""
     spin = Fraction(1) / (Fraction(1, 2) - Fraction(2, 5))
     speed = -Fraction(2, 5) * spin
     after = speed**2 / 2 + spin**2 / 24
@@ -106,7 +106,7 @@ NEWTON_LCP_BALL = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "E": [[0]],
 
 
 def newton_lcp() -> Statement:
-    """Newton's law as a complementarity problem is passive when every contact given approaches."""
+    """Newton's law as a complementarity problem is passive if every contact approaches."""
     restitution, p, after = matrix("E", "c", "c"), vector("p", "c"), vector("v⁺", "d")
     name = equation("momentum balance", after, v + MI * J.T * p)
     pushes, approaching = Entrywise("p pushes", p), Entrywise("every contact approaches: −J v ≥ 0", -J * v)
@@ -164,7 +164,8 @@ def _skew():  # type: ignore[no-untyped-def]
 
 
 def _mixed():  # type: ignore[no-untyped-def]
-    """W = [1 −1/2; −1/2 1], p = −W⁻¹ (I + E) J v: both contacts push, both slacks are zero."""
+    """Return the case W = [1 −1/2; −1/2 1], p = −W⁻¹ (I + E) J v, in which both contacts push and both slacks are zero.
+    """
     return instance(
         {
             "M": [["4/3", "2/3"], ["2/3", "4/3"]],
@@ -178,7 +179,7 @@ def _mixed():  # type: ignore[no-untyped-def]
 
 
 def _pulling():  # type: ignore[no-untyped-def]
-    """The bar: meeting both restitutions needs the second contact to pull."""
+    """Return the bar: to satisfy both restitutions, its second contact must pull."""
     return instance(
         {
             "M": [[1, 0], [0, "1/12"]],
@@ -195,7 +196,7 @@ NEWTON_LCP_EQUAL_BALL = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "p": 
 
 
 def newton_lcp_equal() -> Statement:
-    """With one restitution coefficient the Newton LCP is passive whatever the signs of the velocities."""
+    """With one restitution coefficient the Newton LCP is passive for any signs of the velocities."""
     p, after = vector("p", "c"), vector("v⁺", "d")
     name = equation("momentum balance", after, v + MI * J.T * p)
     complementary = equation("p ⟂ J v⁺ + e J v", p.T * (J * after + e * J * v), 0)
@@ -242,7 +243,7 @@ def newton_lcp_equal() -> Statement:
 
 
 POISSON_TWO_LCPS_BALL = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "E": [["1/2"]], "p": [1], "z": [0], "v": [-1]})
-# W = [2 −2; −2 4]: compression p = (2, 1) stops both; with e = (1, 0) the second contact must push again
+# W = [2 −2; −2 4]: the compression impulse (2, 1) stops both; with e = (1, 0) the second contact must push again
 WEDGE = instance(
     {
         "M": [[1, 0], [0, 1]],
@@ -257,7 +258,7 @@ WEDGE = instance(
 
 
 def poisson_two_lcps() -> Statement:
-    """Poisson's law by two LCPs is passive for every restitution matrix with entries of I − E not negative."""
+    """Poisson's law by two LCPs is passive for every restitution matrix E whose I − E has no negative entry."""
     restitution, p, z = matrix("E", "c", "c"), vector("p", "c"), vector("z", "c")
     release, squeezed, after = vector("pₑ", "c"), vector("vₖ", "d"), vector("v⁺", "d")
     names = (
@@ -326,7 +327,7 @@ def _needed(names: tuple[str, ...]) -> tuple[Without, ...]:
     )
 
 
-# two unit balls on a line; ball 1 moves at 1 into ball 2 at rest; relative row (−1, 1), elastic
+# two unit balls on a line: ball 1 hits ball 2, which rests, with velocity 1; relative row (−1, 1), elastic
 BALLS = instance({"M": [[1, 0], [0, 1]], "J": [[-1, 1]], "p": [1], "v": [1, 0], "v⁺": [0, 1], "t": [1, 1]})
 
 
@@ -364,7 +365,7 @@ def momentum() -> Statement:
 
 
 def impact_friction() -> Statement:
-    """Friction in an impact: what moves no normal velocity, and takes no more than the normal impact lost."""
+    """Friction in an impact is passive if it changes no normal velocity and adds at most the normal impact's loss."""
     normal, p, w, alpha = vector("n", "d"), vector("p", "c"), vector("w", "d"), scalar("α")
     rows, u = matrix("A", "c", "d"), vector("u", "d")
     impulse = equation("n = Aᵀ p", normal, rows.T * p)
@@ -412,7 +413,7 @@ def impact_friction() -> Statement:
 
 
 def islands() -> Statement:
-    """Islands: projectors that do not meet may be applied one after the other."""
+    """Islands: projectors with P₁ P₂ = 0 may be applied one after the other."""
     one, other, u = matrix("P₁", "d", "d"), matrix("P₂", "d", "d"), vector("u", "d")
     apart = equation("P₁ P₂ = 0: no coordinate is felt by rows of both islands", one * other, 0)
     together = u - (1 + e) * (one + other) * u

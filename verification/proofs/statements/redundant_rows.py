@@ -1,4 +1,4 @@
-"""Redundant rows: any {1}-inverse will do, (25), (33), and what (35) to (37) say of it."""
+"""Redundant rows: every {1}-inverse gives the same impact, (25), (33), and the role of (35) to (37)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from verification.proofs.vocabulary import (
 
 
 def one_inverse_invariance() -> Statement:
-    """The step that the paper's proof of (33) needs: every {1}-inverse gives the same Jᵀ G J."""
+    """The step that is missing in the paper's proof of (33): every {1}-inverse gives the same Jᵀ G J."""
     other = matrix("H", "c", "c")
     given = equation("H is a {1}-inverse of J M⁻¹ Jᵀ", W * other * W, W)
     same = identity(
@@ -66,7 +66,7 @@ INDEPENDENT_SUBSET_CASE = instance(
 
 
 def independent_subset() -> Statement:
-    """(33) = (25): redundant rows may stay; the result is that of any maximal independent subset."""
+    """(33) = (25): with redundant rows the result equals that of any maximal independent subset."""
     jn, s, r, wi = (matrix("Jₙ", "n", "d"), matrix("S", "c", "n"), matrix("R", "n", "c"), matrix("Wₙ⁻¹", "n", "n"))
     wn = jn * MI * jn.T
     rows = equation("all rows from the chosen ones", J, s * jn)
@@ -140,7 +140,7 @@ STEP_37_CASE = instance(
 
 
 def step_37() -> Statement:
-    """(37): what the printed matrix is (a {1,2}-inverse), and what it is not (the Moore-Penrose inverse)."""
+    """(37): the printed matrix is a {1,2}-inverse, but not the Moore-Penrose inverse."""
     jn, s, r, wi = (matrix("Jₙ", "n", "d"), matrix("S", "c", "n"), matrix("R", "n", "c"), matrix("Wₙ⁻¹", "n", "n"))
     p, printed = matrix("P", "c", "c"), matrix("X", "c", "c")
     rows = equation("all rows from the chosen ones", J, s * jn)
@@ -190,7 +190,7 @@ REVERSE_ORDER_LAW_CASE = instance(P=[[0, 1], [1, 0]], Y=[[1, 0], [0, 0]]).with_v
 
 
 def reverse_order_law() -> Statement:
-    """The reverse-order law that (37) uses holds for orthogonal P, and only the orthogonality makes it hold."""
+    """The reverse-order law used in (37) holds for orthogonal P; without orthogonality it fails."""
     p, y, plus, z, x = (matrix(name, "c", "c") for name in ("P", "Y", "Y†", "Z", "X"))
     orthogonal = equation("P Pᵀ = I", p * p.T, 1)
     penrose = (

@@ -1,4 +1,4 @@
-"""The forms that the resolver computes: projector, filter, damping, truncation, clamp."""
+"""Forms of the impact that a resolver may compute: projector, filter, damping, truncation, clamp."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PROJECTOR_FORM_CASE = instance(
 
 
 def projector_form() -> Statement:
-    """The form the resolver computes: an orthogonal projector in the coordinates u = Lᵀ v."""
+    """The resolver's form: an orthogonal projector in the coordinates u = Lᵀ v."""
     low, li, q = matrix("L", "d", "d"), matrix("L⁻¹", "d", "d"), matrix("Q", "d", "r")
     c, d, a, u = matrix("C", "c", "r"), matrix("D", "c", "r"), matrix("A", "c", "d"), vector("u", "d")
     names = (
@@ -186,7 +186,7 @@ def spectral_filter() -> Statement:
 
 
 def _skewed(u, modes, filter_):  # type: ignore[no-untyped-def]
-    """|u⁺|² when the modes are first sheared by T."""
+    """Return |u⁺|² after a shear T of the modes."""
     shear = matrix("T", "k", "k")
     after = u - modes * (1 + filter_) * shear * modes.T * u
     return after.T * after
@@ -196,7 +196,7 @@ DAMPED_IMPACT_CASE = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "X": [["
 
 
 def damped_impact() -> Statement:
-    """Damping: (W + λ I)⁻¹ in the place of the pseudo-inverse is passive, at the price of Newton's law."""
+    """Damping: (W + λ I)⁻¹ instead of the pseudo-inverse is passive, but breaks Newton's law."""
     x, lam, after = matrix("X", "c", "c"), scalar("λ"), vector("v⁺", "d")
     inverse = equation("X = (J M⁻¹ Jᵀ + λ I)⁻¹", (W + lam) * x, 1)
     positive = NonNegative("λ ≥ 0", lam)
@@ -273,7 +273,7 @@ ANY_TRUNCATION_CASE = instance({"Q₁": [[1], [0]], "Q₂": [[0], [1]], "u": [1,
 
 
 def any_truncation() -> Statement:
-    """The anytime form: every truncation of the factored form is passive, and the work still missing is known."""
+    """The anytime form: every truncation of the factored form is passive, and the missing energy loss is known."""
     q1, q2, u = matrix("Q₁", "d", "k"), matrix("Q₂", "d", "m"), vector("u", "d")
     early, full = vector("u₁", "d"), vector("u₂", "d")
     names = (
@@ -329,12 +329,12 @@ def any_truncation() -> Statement:
     )
 
 
-# a mass at v = 1 that a wrong solver would send to −3: α = 1/2 sends it to −1
+# a mass at v = 1 for which a wrong solver returns −3: α = 1/2 gives −1
 ENERGY_CLAMP_CASE = instance({"M": [[1]], "v": [1], "Δ": [-4]}, α="1/2")
 
 
 def energy_clamp() -> Statement:
-    """The energy clamp makes any candidate change of velocity passive, and keeps as much of it as it may."""
+    """The energy clamp makes any candidate change of velocity passive and keeps the largest passive share of it."""
     change, alpha, after = vector("Δ", "d"), scalar("α"), vector("v⁺", "d")
     name = equation("the clamped velocity", after, v + alpha * change)
     slack = NonNegative("α is at most −2 (vᵀMΔ)/(ΔᵀMΔ)", -2 * v.T * M * change - alpha * change.T * M * change)

@@ -1,4 +1,4 @@
-"""Theorems 1 and 2, and the equations that they are derived from."""
+"""Theorems 1 and 2, and the equations from which they follow."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ THEOREM_1_POINT_MASS = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "ω": 
 
 
 def theorem_1() -> Statement:
-    """Theorem 1: one contact. The energy lost is the stated quadratic form, with the factor one half."""
+    """Theorem 1, for one contact: the energy loss is the stated quadratic form with the factor one half."""
     row, omega, after = matrix("J", "1", "d"), matrix("ω", "1", "1"), vector("v⁺", "d")
     inverse = equation("ω = (J M⁻¹ Jᵀ)⁻¹", row * MI * row.T * omega, 1)
     impact = equation("the impact (9), (19)", after, v - (1 + e) * MI * row.T * omega * row * v)
@@ -104,7 +104,7 @@ THEOREM_2_POINT_MASS = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "G": [
 
 
 def theorem_2() -> Statement:
-    """Theorem 2: any number of contacts, independent or not, with any {1}-inverse of the Delassus matrix."""
+    """Theorem 2, for any number of contacts, independent or not, and any {1}-inverse of the Delassus matrix."""
     after = vector("v⁺", "d")
     impact = equation("the impact (21)", after, v - (1 + e) * MI * J.T * G * J * v)
     rules = (impact, impact.T, *MASS_RULES, ON_ROW_SPACE)
@@ -183,7 +183,7 @@ CASE = instance({"M": [[1]], "M⁻¹": [[1]], "J": [[1]], "W⁻¹": [[1]], "v": 
 
 
 def impulse_of_independent_rows() -> Statement:
-    """(19) = (27): momentum balance and Newton's law leave one impulse, when the rows are independent."""
+    """(19) = (27): momentum balance and Newton's law determine the impulse uniquely if the rows are independent."""
     delassus_inverse, after, p = matrix("W⁻¹", "c", "c"), vector("v⁺", "d"), vector("p", "c")
     mass_inverse = equation("M⁻¹ M = I", MI * M, 1)
     inverse = equation("W⁻¹ is a left inverse of J M⁻¹ Jᵀ", delassus_inverse * W, 1)
@@ -236,7 +236,7 @@ def impulse_of_independent_rows() -> Statement:
 
 
 def dynamically_consistent_inverse() -> Statement:
-    """(28)-(31): the dynamically consistent inverse and the identity that Appendix I rests on."""
+    """(28)-(31): the dynamically consistent inverse, and the identity on which Appendix I is based."""
     wi, bar = matrix("W⁻¹", "c", "c"), matrix("J̄", "d", "c")
     inverse = equation("W W⁻¹ = I for W = J M⁻¹ Jᵀ", W * wi, 1)
     definition = equation("dynamically consistent inverse", bar, MI * J.T * wi)
@@ -300,7 +300,7 @@ TWICE = instance(
 
 
 def newton_law_solvable() -> Statement:
-    """When Newton's law can be met: exactly when the wanted change lies in the range of the Delassus matrix."""
+    """Newton's law has a solution if and only if the required change is in the range of the Delassus matrix."""
     w, g, restitution = (matrix(name, "c", "c") for name in ("W", "G", "E"))
     gamma, p, z, b = (vector(name, "c") for name in ("γ⁻", "p", "z", "b"))
     wanted = equation("wanted change of normal velocities", b, -(1 + restitution) * gamma)
