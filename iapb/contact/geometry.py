@@ -189,7 +189,7 @@ def contact_capacity(shapes: Shapes, pairs: Integers) -> int:
 
 
 def _most_contacts(shapes: Shapes, a: int, b: int) -> int:
-    """Largest number of contacts of one pair."""
+    """Return the largest number of contacts of one pair."""
     kinds = (int(shapes.kind[a]), int(shapes.kind[b]))
     if kinds[1] == HALF_PLANE:
         return int(shapes.count[a])  # one contact per vertex

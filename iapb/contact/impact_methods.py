@@ -149,7 +149,7 @@ def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: 
 
 def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = (),
             method: str = "factored") -> ArgumentError | RangeError:
-    """Return the error for what the kernel found wrong; `which` : (number of the impact,), if there are several."""
+    """Return the error for the fault that the kernel found; `which` : (number of the impact,), if there are several."""
     reason, i, j = wrong
 
     def name(argument: str, *place: int) -> str:
@@ -303,7 +303,7 @@ def _delassus(problem: ImpactInput, size: float | Floats = 1.0) -> tuple[Floats,
 
 
 def gram_pinv(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(20)-(21) as printed: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size.
+    """Apply (20)-(21) as printed: p = −(1 + e) W† J v⁻ with numpy's pseudo-inverse, on rows of the caller's size.
 
     For comparison only: the last bits of LAPACK depend on the processor, and W's condition number amplifies them.
     """
@@ -336,7 +336,7 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
 
 
 def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps part of its approach velocity, and none gains energy."""
+    """Apply p = −(1 + e)(W + λI)⁻¹ J v⁻: every mode keeps part of its approach velocity, and none gains energy."""
     work = _prepared(problem)
     rows = _whitened_rows(problem, work) * work.length[: problem.contacts, None]
     W, gamma = product(rows, rows.T), product(problem.contact_jacobian, problem.velocity)
@@ -347,7 +347,7 @@ def damped(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | 
 
 
 def svd(problem: ImpactInput, budget: int, clamped: bool, tolerance: float | None) -> Whitened:
-    """(21) with the projector from the truncated singular value decomposition of unit-scaled A.
+    """Apply (21) with the projector from the truncated singular value decomposition of unit-scaled A.
 
     For comparison only: LAPACK computes it, so the last bits depend on the processor.
     """

@@ -35,7 +35,7 @@ EVERYTHING = frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_F
 
 
 class StepResult(NamedTuple):
-    """What a law returns for one step (d generalized velocities)."""
+    """Result of one step of a law (d generalized velocities)."""
 
     q: Floats  # (nq,) configuration at the end of the step
     v: Floats  # (d,) generalized velocity at the end of the step [m/s, rad/s]

@@ -58,7 +58,7 @@ class FourChannel(_PositionCoupling):
 
 
 class UnilateralCoupler(_PositionCoupling):
-    """PD between device and tool while the tool is in contact; otherwise only the hand acts on the device."""
+    """PD between device and tool while the tool is in contact; apart from it only the hand acts on the device."""
 
     name = "unilateral"
     kind = 2

@@ -42,7 +42,7 @@ class Device(Protocol):
 
 
 class SimulatedDevice:
-    """Pure inertia M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with delay, limits and sensors.
+    """Inertia with damping, M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with delay, limits and sensors.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class SimulatedDevice:
     force_limit : (d,), optional
         The actuators clip each component to ±limit [N, N m]; default: no limit.
     delay : int
-        Number of steps by which a reading reaches the simulation late, and a force the actuators.
+        Delay [steps] of readings on their way to the simulation, and of forces on their way to the actuators.
     resolution : (d,), optional
         Resolution of the position sensors [m, rad], 0 = exact. Above 0, the velocity reading is the difference
         of two successive position readings over dt: it changes in steps of resolution / dt.

@@ -47,7 +47,7 @@ class Port(NamedTuple):
     device_damping: np.ndarray  # (d_t,) physical damping b of the device
     damped: bool
     force_limit: np.ndarray  # (d_t,) [N, N m], inf = none
-    limited: bool  # the actuators clip what they are asked for to force_limit
+    limited: bool  # the actuators clip the commanded force to force_limit
     resolution: np.ndarray  # (nq_t,) [m, rad] of the position sensors
     quantised: bool
     pulsed: bool  # an impulse is rendered over more than one step
@@ -59,7 +59,7 @@ class Port(NamedTuple):
     delayed_force: np.ndarray  # (n + 1, d_t) ring of actuator forces on their way; n = 0: no delay
     delayed_q: np.ndarray  # (n + 1, nq_t) ring of measured positions on their way
     delayed_v: np.ndarray  # (n + 1, d_t)
-    sensed_q: np.ndarray  # (nq_t,) what the sensors read
+    sensed_q: np.ndarray  # (nq_t,) positions read by the sensors
     measured_q: np.ndarray  # (nq_t,) position of the device as the simulation reads it
     measured_v: np.ndarray  # (d_t,)
     hand_force: np.ndarray  # (d,) of the hand on the tool
@@ -152,7 +152,7 @@ def pushes(port):
 
 @kernel
 def press(mechanism, body, held, port, out):
-    """out += J_hᵀF_h for the wrench at the held point."""
+    """Add J_hᵀF_h of the wrench at the held point to `out`."""
     wrench, arm = port.wrench, port.hand_point
     force, torque = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     point = add(load(body.position, held), transform(body.rotation, held, (arm[0], arm[1], arm[2])))
@@ -268,7 +268,7 @@ def command(port):
 
 @kernel
 def move_device(world, state, port):
-    """M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged."""
+    """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged."""
     a = port.acceleration
     for i in range(a.shape[0]):
         a[i] = port.device_hand_force[i] + port.device_force[i]
@@ -297,7 +297,7 @@ def move_device(world, state, port):
 
 @kernel
 def engage(world, state, port):
-    """Engage the coupler if the tool touches a body, or would at the device's pose; else the tool follows it."""
+    """Engage the coupler if the tool touches a body or would at the device's pose; else move the tool to the device."""
     port.engaged[0] = state.state_of_tree[port.tool_tree] != FREE or inside(world, state, port)
     if not port.engaged[0]:
         copy_into(state.q[port.q_start : port.q_stop], port.device_q)

@@ -70,7 +70,7 @@ def ring_weights(material: str) -> Callable[[float], Floats]:
                                                                f"cannot be rendered at {1.0 / dt:g} Hz")
         envelope = np.array([float(Decimal(x).exp()) for x in (-decay * time).tolist()])  # integer arithmetic: no libm
         ringing = envelope * _sines(2.0 * np.pi * frequency * time)
-        ringing -= envelope * (math.fsum(ringing) / math.fsum(envelope))  # no momentum of its own
+        ringing -= envelope * (math.fsum(ringing) / math.fsum(envelope))  # so that the sinusoid carries no momentum
         return _summing_to_one(np.concatenate([[1.0], attack * dt * ringing]))
 
     return weights

@@ -124,7 +124,7 @@ class Joint:
 
     @property
     def unit_axis(self) -> NDArray[np.float64]:
-        """The axis with length one; scaled first, so that tiny and huge axes neither vanish nor overflow."""
+        """The axis with length one; scaled first, so that tiny axes do not vanish and huge axes do not overflow."""
         axis = np.asarray(self.axis, dtype=np.float64)
         axis = axis / np.abs(axis).max()
         return axis / math.sqrt(sum(x * x for x in axis.tolist()))

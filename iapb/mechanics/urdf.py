@@ -390,5 +390,5 @@ def _check_attributes(element: ElementTree.Element, where: str) -> None:
     if known is None:
         return
     for name, value in element.attrib.items():
-        if name not in known and not name.startswith("{"):  # another XML namespace: somebody else's
+        if name not in known and not name.startswith("{"):  # attributes of other XML namespaces are allowed
             raise ArgumentError(f"{where} {name}", value, one_of(name, known, "one of its attributes: "))

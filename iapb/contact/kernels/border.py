@@ -297,7 +297,7 @@ def _out_of_range(v_plus, momentum, impulses, energy):
 @kernel
 def whole_impacts(masses, jacobians, velocities, restitution, tolerance, budget, clamped, work, v_plus, momentum,
                   impulses, counts, numbers):
-    """`whole_impact` of n problems; counts (n, 2): rank, status; numbers (n, 4): clamp, energy change, its bounds.
+    """Do `whole_impact` for n problems; counts (n, 2): rank, status; numbers (n, 4): clamp, energy change, its bounds.
 
     Returns (reason, i, j) and the index of the first impact that is refused; FINE and n if none is.
     """

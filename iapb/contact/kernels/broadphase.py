@@ -205,7 +205,7 @@ def keep_pair(broad, i, j, margin, count):
 
 @kernel
 def sort_keys(keys, count):
-    """Sort the first `count` keys by heapsort: no recursion, no scratch, n log n in every order."""
+    """Sort the first `count` keys by heapsort: no recursion, no scratch, n log n for every input order."""
     for root in range(count // 2 - 1, -1, -1):
         _sift(keys, root, count)
     for end in range(count - 1, 0, -1):

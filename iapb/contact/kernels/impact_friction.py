@@ -31,7 +31,7 @@ class FrictionWork(NamedTuple):
     response: np.ndarray  # (c m,) ∂p_n,i / ∂p_t,i by least norm: effect of a contact's friction on its normal impulse
     coefficient: np.ndarray  # (c,) μ
     radius: np.ndarray  # (c,) Coulomb's limit μ p_n [N s]
-    change: np.ndarray  # (c,) change of each limit that a round asks for
+    change: np.ndarray  # (c,) change of each limit required by a round
     sliding: np.ndarray  # (c,) μ; 0 where the frictionless normal impulse pulls
     without: np.ndarray  # (c,) normal impulses without friction [N s]
     wanted: np.ndarray  # (c,) normal impulses with friction
@@ -372,7 +372,9 @@ SINGULAR = 1e-12
 
 @kernel
 def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, still):
-    """Sweep p_i ← where w_i = 0, or proj(p_i − w_i / ρ_i), in discs |p_i| ≤ radius_i; w = slip + B Bᵀ p; p in place.
+    """Sweep over the contacts: set p_i to make w_i = 0 if |p_i| ≤ radius_i allows it, else to proj(p_i − w_i / ρ_i).
+
+    w = slip + B Bᵀ p is the tangential velocity, proj the projection on the disc |p_i| ≤ radius_i; p changes in place.
 
     free : (k m, d) rows B: tangential impulses change u by Bᵀ p and keep the normal velocities
     slip : (k m,) tangential velocity without friction; radius : (k,) μ p_n; inertia : (k,) ρ ≥ ‖B_i B_iᵀ‖
@@ -403,7 +405,7 @@ def combine(rows, weight, out):
 
 @kernel
 def along(row, vector):
-    """row · vector."""
+    """Return row · vector."""
     total = 0.0
     for k in range(vector.shape[0]):
         total += row[k] * vector[k]

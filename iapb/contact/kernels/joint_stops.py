@@ -1,7 +1,7 @@
 """Ends of the joints' ranges as contacts: impulses and penalty forces act at a joint's limit as at any contact.
 
-A point on an arm of length r that a revolute joint turns about its axis a moves with a × r, so that its contact with
-the joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the velocity of this joint alone. A prismatic
+A revolute joint with axis a moves a point on an arm of length r with a × r. The contact of this point with the
+joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the velocity of this joint alone. A prismatic
 joint slides along its axis, and the row is ± e_k. Impulses, penalty forces and records then treat a limit as a contact.
 """
 

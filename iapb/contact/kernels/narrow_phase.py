@@ -77,7 +77,7 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def circles(shapes, a, b, R, p, margin, buffer, count):
-    """Two circles: gap = distance of the centres - both radii, normal along the line of centres.
+    """Write the contact of two circles: gap = distance of centres - both radii, normal along the line of centres.
 
     Coincident centres have no such line. The normal is then +y if a has the smaller shape index and -y for the
     swapped pair, so that it is finite and still antisymmetric.
@@ -103,7 +103,7 @@ def circles(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
-    """A circle and a convex polygon: one contact at the polygon's nearest edge or vertex.
+    """Write the contact of a circle and a convex polygon, at the polygon's nearest edge or vertex.
 
     For a centre inside the polygon, the contact is at the nearest edge.
     """

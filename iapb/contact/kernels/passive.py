@@ -61,7 +61,7 @@ def plainly_loses(mass_matrix, v, w):
 
 @kernel
 def gain(mass_matrix, v, w):
-    """Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤ radius + underflow.
+    """Evaluate Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤ radius + underflow.
 
     Proof of the bound, with Rᵢ = Σⱼ |ah sh| and S = Σᵢ |dhᵢ| Rᵢ. The pairs s = sh + sl, Δ = dh + dl, A = ah + al are
     exact (TwoSum), |sl| ≤ u|sh| and so on. In row i, h + l approximates Σⱼ Aᵢⱼ sⱼ; step j adds p + e = ah·sh, exact
@@ -105,7 +105,7 @@ def gain(mass_matrix, v, w):
 
 @kernel
 def wide_gain(mass_matrix, v, w):
-    """Γ of numbers of any size: (high, low, radius, exponent) with |Γ/2^exponent − (high + low)| ≤ radius.
+    """Return Γ for numbers of any size: (high, low, radius, exponent) with |Γ/2^exponent − (high + low)| ≤ radius.
 
     Γ = Σᵢⱼ Mᵢⱼ (Δᵢ sⱼ + sᵢ Δⱼ) has n = 8d² products x M y of doubles, x and y the halves of the pairs Δ and s. Each is
     evaluated on mantissas in [½, 1), so that nothing under- or overflows, and scaled to the largest exponent among them

@@ -150,7 +150,7 @@ def orthonormal_basis(columns, count, u, tolerance, budget, basis, closing, size
 
 @kernel
 def projected_change(basis, rank, u, factor, change):
-    """Δu = −factor · Q Qᵀ u, with factor = 1 + e (21)."""
+    """Write Δu = −factor · Q Qᵀ u, with factor = 1 + e (21)."""
     d = u.shape[0]
     for k in range(d):
         change[k] = 0.0

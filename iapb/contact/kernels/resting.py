@@ -12,7 +12,7 @@ from iapb.mechanics.kernels.vectors import dot, load, scale, store
 
 @kernel
 def normal_force(gap, normal_velocity, stiffness, damping, clamped):
-    """(5) F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; with `clamped`, F_n is never below zero."""
+    """Return (5), F_n = −K s − B v_n [N] on body a along the normal, s = gap <= 0; with `clamped`, F_n >= 0."""
     force = -stiffness * gap
     if damping != 0.0:
         force -= damping * normal_velocity
@@ -21,7 +21,7 @@ def normal_force(gap, normal_velocity, stiffness, damping, clamped):
 
 @kernel
 def friction_share(normal_force, speed, friction, friction_velocity):
-    """(6) F_f / v_t [N s/m]: −μ F_n t above the threshold speed, −(v_t / v_threshold) μ F_n below it.
+    """Return F_f / v_t [N s/m] of (6): −μ F_n t above the threshold speed, −(v_t / v_threshold) μ F_n below it.
 
     A contact that pulls, F_n < 0 in (5) as printed, gets no friction: (6) would then push along the motion.
     """
@@ -54,7 +54,7 @@ def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, fric
 
 @kernel
 def add_friction(m, w, contacts, i, friction, friction_velocity, drag):
-    """Friction (6) of contact i, opposed to the tangential velocity; `drag` (d,) += Jᵀ F_f."""
+    """Add Jᵀ F_f to `drag` (d,): friction (6) of contact i, opposed to the tangential velocity."""
     x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)
     speed = math.sqrt(dot(tangential, tangential))
     force = scale(friction_share(contacts.normal_force[i], speed, friction, friction_velocity), tangential)

@@ -22,9 +22,9 @@ ROW_NOISE = 1e-13
 def add_body_row(m, w, body, x, n, factor, out):
     """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
 
-    With j the motion of x per unit rate of a dof, the entry n·j is set to zero where it is only rounding: for a
-    translation if |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o). The lever x − o has the rounding of x and o,
-    so the bound includes their size; the lever of a contact at the joint itself is zero.
+    With j the motion of x per unit rate of a dof, the entry n·j is left out if it is only rounding. For a translation
+    the bound is |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o), and the lever x − o has the rounding of x and
+    o, so the bound includes the size of x and o. For a contact at the joint itself the lever is only rounding.
     Dofs that carry both bodies of a self-collision add and subtract the same number, which gives an exact zero.
     """
     if body < 0:

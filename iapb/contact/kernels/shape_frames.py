@@ -67,7 +67,7 @@ def relative_frame(shapes, onto, other, R, p):
 
 @kernel
 def store_in_plane(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
-    """`store_in_space` for a contact in the plane."""
+    """Do `store_in_space` for a contact in the plane."""
     return store_in_space(buffer, count, shapes, a, b, feature, (x, y, 0.0), (nx, ny, 0.0), gap)
 
 

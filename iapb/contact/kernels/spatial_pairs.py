@@ -39,7 +39,7 @@ def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def spheres(shapes, a, b, R, p, margin, buffer, count):
-    """Two spheres: gap = distance of the centres - both radii; coincident centres get the normal ±z."""
+    """Write the contact of two spheres: gap = distance of centres - both radii; normal ±z if the centres coincide."""
     center_b = world_center(shapes, b, R, p)
     apart = subtract(world_center(shapes, a, R, p), center_b)
     radius_a, radius_b = shapes.radius[a], shapes.radius[b]
@@ -56,7 +56,7 @@ def spheres(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def sphere_half_space(shapes, a, b, R, p, margin, buffer, count):
-    """gap = (centre - point)·normal - radius."""
+    """Write the contact of a sphere and a half-space: gap = (centre - point)·normal - radius."""
     normal, center = world_axis(shapes, b, 2, R), world_center(shapes, a, R, p)
     radius = shapes.radius[a]
     gap = dot(subtract(center, world_center(shapes, b, R, p)), normal) - radius
@@ -68,7 +68,7 @@ def sphere_half_space(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def box_half_space(shapes, a, b, R, p, margin, buffer, count):
-    """One contact per corner of the box: gap = (corner - point)·normal."""
+    """Write one contact per corner of the box: gap = (corner - point)·normal."""
     normal, center = world_axis(shapes, b, 2, R), world_center(shapes, a, R, p)
     height = dot(subtract(center, world_center(shapes, b, R, p)), normal)
     x = scale(shapes.half_size[a, 0], world_axis(shapes, a, 0, R))
@@ -89,7 +89,7 @@ def box_half_space(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
-    """A sphere and a box: one contact at the nearest point of the box; for a centre inside, at the nearest face."""
+    """Write the contact of a sphere and a box, at the box's nearest point, or nearest face for a centre inside."""
     center = world_center(shapes, sphere, R, p)
     apart = subtract(center, world_center(shapes, box, R, p))
     half, radius = load(shapes.half_size, box), shapes.radius[sphere]

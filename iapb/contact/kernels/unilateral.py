@@ -1,7 +1,7 @@
 """Impulses that only push: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution based on it.
 
-The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. Active-set method of Lawson and Hanson
-(Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factors.
+The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. The solver is the active-set method of Lawson and
+Hanson (Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factors.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def _set_residual(rows, b, passive, size, p, residual):
 
 @kernel
 def poisson_impulses(rows, count, u, restitution, p, change, work):
-    """Poisson's law with eᵢ in [0, 1] by two LCPs; write p (for unit rows) and Δu = Aᵀp. Return False if not converged.
+    """Apply Poisson's law, eᵢ in [0, 1], by two LCPs; write p (unit rows) and Δu = Aᵀp. Return False if not converged.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
     p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.

@@ -29,7 +29,7 @@ class MechanismArrays(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of the kernels for one mechanism, world axes. `forward_kinematics` fills the first four."""
+    """Scratch of the kernels for one mechanism, world axes. `forward_kinematics` fills the first four fields."""
 
     rotation: NDArray[np.float64]  # (n, 3, 3) body axes as columns
     position: NDArray[np.float64]  # (n, 3) [m] body origin
@@ -48,14 +48,14 @@ class Workspace(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """A mechanism with its scratch, passed as one argument: each argument costs a call from Python 0.1 µs."""
+    """A mechanism with its scratch, passed as one argument: each argument adds 0.1 µs to a call from Python."""
 
     mechanism: MechanismArrays
     workspace: Workspace
 
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:
-    """Return scratch for a mechanism for that many bodies and dofs (joints have at most two entries of q per dof)."""
+    """Return scratch for a mechanism with that many bodies and dofs (joints have at most two entries of q per dof)."""
     rows, frames = (bodies, 3), (bodies, 3, 3)
     shapes = (frames, rows, rows, (dofs, 3), (bodies,), rows, frames, *([rows] * 6))
     nowhere = np.full(2 * dofs, np.nan)

@@ -88,9 +88,9 @@ def solve_mass(lower, force, acceleration):
 
 @kernel
 def _solve_block(lower, start, stop, force, acceleration):
-    """`solve_mass` on coordinates start .. stop.
+    """Do `solve_mass` on coordinates start .. stop.
 
-    All three measures shorten the chain of dependent operations. Zeros of L are skipped, since a product with zero
+    Three measures shorten the chain of dependent operations. Zeros of L are skipped, since a product with zero
     would still wait for the coordinate before. Factors 1 / L_kk replace divisions, since they do not depend on the sum.
     In the back substitution the entry that was computed last comes last in the sum.
     """
@@ -112,14 +112,14 @@ def _solve_block(lower, start, stop, force, acceleration):
 
 @kernel
 def solve_tree_blocks(lower, start, stop, force, acceleration):
-    """`solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the same bits."""
+    """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the same bits."""
     for t in range(start.shape[0]):
         _solve_block(lower, start[t], stop[t], force, acceleration)
 
 
 @kernel
 def cholesky_tree_blocks(matrix, start, stop, lower):
-    """`cholesky` of each block of a block diagonal M; other entries of `lower` stay; return 0, or 1 on failure."""
+    """Do `cholesky` for each block of a block diagonal M; other entries of `lower` stay; return 0, or 1 on failure."""
     for t in range(start.shape[0]):
         i, j = start[t], stop[t]
         if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:
