@@ -1,4 +1,4 @@
-"""The figures of the report: each a recipe in the module of its topic, and one line here, in the order of a page."""
+"""The figures of the report in page order: each is a recipe in the module of its topic, and one line here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture of a planar scene: equal scales, no axes, walls hatched, bodies filled. Lengths in metres."""
+"""Pictures of planar scenes: equal scales, no axes, hatched walls, filled bodies. Lengths are in metres."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TURNED = ("peg_",)  # scenes in the paper's frame, x to the left and y down: dra
 class Canvas(Plot):
     """A panel without axes that shows at least the rectangle from `low` to `high`, at equal scales.
 
-    Without a `size` the panel has the width of all others, and the proportions of the rectangle.
+    Without a `size` the panel has the standard width and the proportions of the rectangle.
     """
 
     def __init__(self, key: str, low: Floats, high: Floats, size: tuple[float, float] | None = None, *,
@@ -46,9 +46,9 @@ def invert(axes: Any) -> None:
 
 def hand(axes: Any, scene: Mapping[str, Any], place: Placement, length: float,
          flat: Callable[[Any], Any] = lambda point: np.asarray(point, dtype=float)[:2]) -> None:  # fmt: skip
-    """Draw the hand's force as an arrow of some length [m] from where it holds its body, which is at `place`.
+    """Draw the hand's force as an arrow of the given length [m] from the held point of its body, which is at `place`.
 
-    Call it last: its name goes where nothing is drawn.
+    Call it last, because the label is placed where nothing is drawn yet.
     """
     force = flat(scene["hand"]["force"][:3])
     if np.hypot(*force) > 0.0:
@@ -67,7 +67,7 @@ def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Float
 
 
 def is_turned(scene: Mapping[str, Any]) -> bool:
-    """Tell whether a scene is in the paper's frame of the peg."""
+    """Return whether a scene uses the paper's peg frame, whose pictures are turned by 180 degrees."""
     return str(scene["name"]).startswith(TURNED)
 
 
@@ -80,7 +80,7 @@ def draw_walls(axes: Any, scene: Mapping[str, Any], reach: float) -> None:
 
 def draw_bodies(axes: Any, scene: Mapping[str, Any], pose: Floats | None = None, *,
                 color: str = PEG, edge: str = INK, width: float = 1.1) -> None:
-    """Fill the moving bodies at a `pose` of a run, or where the scene starts."""
+    """Fill the moving bodies at a `pose` of a run, by default at the start of the scene."""
     for _, corners in body_outlines(scene, pose):
         axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
 
@@ -100,7 +100,7 @@ def note(axes: Any, point: Any, text: str, offset: tuple[float, float] = (0.0, 0
 
 
 def scale_bar(axes: Any, start: Any, length: float, text: str, *, turned: bool) -> None:
-    """Draw a bar of known length, its text above it."""
+    """Draw a scale bar of the given length with its text above it."""
     end = np.asarray(start) + np.array([-length if turned else length, 0.0])
     axes.plot([start[0], end[0]], [start[1], end[1]], color=MUTED, linewidth=1.4, solid_capstyle="butt", zorder=7)
     note(axes, (np.asarray(start) + end) / 2, text, (0, 6), color=MUTED, fontsize=8.5)

@@ -1,4 +1,4 @@
-"""IAPB beside complementarity: where both move alike, what an impact and a step cost, and what its solvers solve."""
+"""IAPB against complementarity: where their motions agree, the time of impacts and steps, and the solvers' success."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
     "metric. The laws agree on and above the line r = c, and nowhere below.",
 )  # fmt: skip
 def agreement_map(numbers: Table, border: Table) -> Drawn:
-    """Draw share and distance of the map, and the border."""
+    """Draw the share of impacts that agree, the distance in the other impacts, and the border r = c of two contacts."""
     rows = [row for row in numbers.records() if not row["impacts"].startswith("scene ")]
     kinds: dict[str, Rows] = {}
     for row in rows:
@@ -108,7 +108,7 @@ def _border(numbers: Table) -> str:
 
 @recipe("where-to-stop", "Where to stop using (19): dense piles", "complementarity/piles", section="hero", caption="")
 def where_to_stop(numbers: Table) -> Drawn:
-    """Draw the distance from complementarity over contacts and redundancy, and the price of pushing."""
+    """Draw the distance from complementarity over contacts and redundancy, and the time of impulses that only push."""
     rows = numbers.records()
     limit = max(row["most contacts that agree"] for row in rows)
     price = [row["time of pushing"] / row["time of (21)"] for row in rows]
@@ -161,7 +161,7 @@ def _price(rows: Rows, price: Sequence[float]) -> str:
 
 
 def _by_rows(plot: Plot, rows: Rows, places: Sequence[tuple[float, float]]) -> None:
-    """Mark each place in the look of the rows that were taken."""
+    """Mark each place in the style of the row choice of that case."""
     looks = looks_of(f"contacts that are {row['rows']}" for row in rows)
     for name, look in looks.items():
         plot.marks([place for row, place in zip(rows, places, strict=True) if name.endswith(f" {row['rows']}")], look)
@@ -185,7 +185,7 @@ TIMED = {
     "picture: time of one step of each world.",
 )  # fmt: skip
 def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
-    """Draw a panel for each family, and the steps."""
+    """Draw a panel for each family of impacts, and one for the time of a step."""
     solvers = sorted(dict.fromkeys(numbers.column("solver")), key=lambda name: name not in TIMED)[: len(TIMED)]
     styles = looks_of(solvers) | {name: TIMED[name] for name in solvers if name in TIMED}
     most = max(numbers.column("contacts"))
@@ -220,7 +220,7 @@ def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int)
 
 
 def _unsolved(axes: Any, rows: Rows, style: LineStyle, top: float) -> None:
-    """Crosses over wrong answers, triangles where nothing was asked."""
+    """Draw crosses over wrong answers, and triangles where a solver was not run."""
     for row in rows:
         at, median = row["contacts"], row["median"]
         if row["outcome"] == "failed" and median is not None:
@@ -255,7 +255,7 @@ def _steps(numbers: Table) -> str:
     "compiled solve of Siconos, a call from Python of the others. At most six curves; the numbers have all solvers.",
 )  # fmt: skip
 def performance_profile(numbers: Table) -> Drawn:
-    """Draw a panel for each collection and kind of problem; the solvers of the two kinds are numbered apart."""
+    """Draw a panel for each collection and kind of problem; the solvers of each kind have their own numbering."""
     panels: list[Panel] = []
     legend: dict[str, LineStyle] = {}
     for kind in ("frictionless", "friction"):
@@ -286,7 +286,7 @@ def _profile(numbers: Table, looks: Mapping[str, LineStyle], key: str) -> str:
 
 
 def _ends(numbers: Table) -> Table:
-    """Where each curve starts and ends."""
+    """Return a table of the first and last value of each curve."""
     curves: dict[tuple[str, ...], list[float]] = {}
     for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
         curves.setdefault(tuple(name), []).append(share)
@@ -308,7 +308,7 @@ _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over ti
     "The six scenes with the largest errors are drawn; the numbers have all.",
 )  # fmt: skip
 def rigid_convergence(numbers: Table) -> Drawn:
-    """Draw positions and velocities."""
+    """Draw a panel for the errors of positions and one for those of velocities."""
     errors = {row["scene"]: max(row[column] for column in _ERRORS.values()) for row in numbers.records()}
     shown = sorted(errors, key=errors.__getitem__)[-_SCENES:]
     looks = looks_of(scene for scene, error in errors.items() if scene in shown and error > _ROUNDING)

@@ -1,7 +1,7 @@
-"""Where a claim holds: small maps over two conditions, for a claim's record (no recipe: the ledger calls it).
+"""Maps over two conditions that show where a claim holds, for the claim's record (called directly, without a recipe).
 
-A filled dot holds, a cross fails, a ring cannot tell; where several trials share a place, the size of the dot is
-the share that holds.
+A filled dot means that the claim holds, a cross that it fails, a ring that the trial cannot tell. If several trials
+share a place, the size of the dot is the share of trials in which the claim holds.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
     Parameters
     ----------
     x, y : label with unit, and the condition's value in each trial.
-    holds : whether the claim held in each trial; None where the trial cannot tell.
-    panels : the value by which trials are split into maps of their own; default one map.
-    ranked : whether x goes by rank, each value with a tick of its own, so that crowded values stay apart.
+    holds : whether the claim held in each trial; None if the trial cannot tell.
+    panels : label of each trial's map; trials with the same label share a map. Default: one map.
+    ranked : whether x shows ranks, with a tick for each value, so that close values are drawn apart.
     """
     values = sorted(set(x[1])) if ranked else []
     across = [values.index(value) for value in x[1]] if ranked else x[1]

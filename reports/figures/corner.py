@@ -60,7 +60,7 @@ _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinat
 
 @dataclass(frozen=True)
 class Shown:
-    """One figure: its number in the paper, its runs, and what is drawn of them."""
+    """One figure: its number in the paper, its runs, and the quantities drawn."""
 
     number: int
     title: str
@@ -70,7 +70,7 @@ class Shown:
 
     @property
     def recipe(self) -> Recipe:
-        """How the figure is made."""
+        """Return the recipe of the figure."""
         key = f"fig{self.number:02d}"
 
         def draw(*runs: Run) -> Drawn:
@@ -117,7 +117,7 @@ FIGURES = (
 
 
 def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, LineStyle], ...]:
-    """Return the legend: each curve under its own style."""
+    """Return the legend: each curve with its style."""
     return tuple((curve, STYLES[curve]) for curve in names)
 
 
@@ -128,7 +128,7 @@ def marks(count: int, number: int) -> tuple[int, int]:
 
 
 def first_shown(runs: Mapping[str, Run], before: float = _BEFORE_CONTACT) -> int:
-    """Return the step shortly `before` [s] the first contact of any run: until then all paths are one straight line."""
+    """Return the step `before` [s] the first contact of any run; up to that contact all paths are the same line."""
     touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
     dt = next(iter(runs.values())).dt
     return max(min(touching) - round(before / dt), 0) if touching else 0
@@ -141,7 +141,7 @@ _PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; 
 
 def _trajectory_figure(key: str, runs: Mapping[str, Run],
                        names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Table]:
-    """The path and the three coordinates; where the device is limited, also tool against device and penetration."""
+    """Draw the path and the three coordinates; for limited devices, also tool against device and penetration."""
     panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
     if "ideal" in runs:
         panels += [_deviation_panel(key, runs, *each) for each in _DEVIATIONS]
@@ -175,7 +175,7 @@ def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
 
 def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Floats], label: str, *,
                height: tuple[float, float] | None = None, first: int = 0, last: int | None = None, **how: Any) -> str:
-    """Draw one quantity of each run over time, or from one step to another; `height` cuts the other axis."""
+    """Draw one quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
     with Plot(key, kind=TIME) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             values = values_of(run)[first:last]
@@ -189,7 +189,7 @@ def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Flo
 
 
 def _deviation_panel(key: str, runs: Mapping[str, Run], which: slice, name: str, label: str, factor: float) -> Panel:
-    """How far the hand is from where the rigid world has it, at the same time."""
+    """Draw the distance between the hand and its position in the ideal world at the same time."""
     ideal = runs["ideal"].device_q
 
     def apart(run: Run) -> Floats:
@@ -209,7 +209,7 @@ def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
 
 
 def _printed_panel(key: str, runs: Mapping[str, Run]) -> Panel:
-    """How deep the hand goes along y past where the rigid world stops, on the axis that Figure 7 prints."""
+    """Draw how far the hand moves along y beyond its final position in the ideal world, on the axis of Figure 7."""
     stop = runs["ideal"].device_q[-1, 1]
     svg = _over_time(f"{key}-printed", runs, lambda run: MILLI * (stop - run.device_q[:, 1]),
                      "past the rigid place [mm]", height=_PRINTED_RANGE)  # fmt: skip
@@ -234,7 +234,7 @@ def _penetration_panel(key: str, runs: Mapping[str, Run]) -> Panel:
 
 
 def tool_positions(run: Run) -> Floats:
-    """Return the tool's coordinates (n + 1, d_t); planar and one-dof joints have as many as they have velocities."""
+    """Return the tool's coordinates (n + 1, d_t); planar and one-dof joints have equally many velocities."""
     return run.q[:, slice(*run.tool_coordinates)]
 
 
@@ -253,7 +253,7 @@ def distance_between(run: Run, other: Run) -> Floats:
 
 
 def settling_time(run: Run) -> float | None:
-    """Return when the device was last faster than SETTLED_SPEED [s]; None if it still is at the end."""
+    """Return the time [s] from which the device stays slower than SETTLED_SPEED; None if it moves until the end."""
     moving = np.flatnonzero(np.any(np.abs(run.device_v) > SETTLED_SPEED[: run.device_v.shape[1]], axis=1))
     if not len(moving):
         return 0.0
@@ -276,7 +276,10 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
 
 
 def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Table]:
-    """Force along x and torque, each in full, at the first contact and between blows; peaks, and what is held."""
+    """Draw force along x and torque at the first contact, over the whole run and between impulses.
+
+    The table has the peak forces and the forces held at the end.
+    """
     panels = tuple(panel for each in _FORCES for panel in _force_panels(key, runs, *each))
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")

@@ -1,4 +1,4 @@
-"""What accuracy costs in time: impact methods, whole motions, stopping early, growth with size, and effects."""
+"""Accuracy against computing time: impact methods, whole motions, row budgets, growth with size, and effects."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
     "distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
-    """A cell per size and budget."""
+    """Draw a cell per size and budget."""
     found = choices(numbers)
     sizes = list(dict.fromkeys(found.select(("contacts", "coordinates")).rows))
     budgets = list(dict.fromkeys(found.column("budget")))
@@ -99,7 +99,7 @@ def _cell_note(row: Row) -> str:
 
 
 def power_of_error(value: float) -> str:
-    """An error in a few characters: 7e-14."""
+    """Return an error in a few characters, such as 7e-14."""
     return f"{value:.0e}".replace("e-0", "e-") if value < 0.1 else f"{value:.1f}"
 
 
@@ -116,7 +116,7 @@ _WHY = (
     section="accuracy", caption="",
 )  # fmt: skip
 def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
-    """Lemke's time over IAPB's by contacts, both compiled; the size and the reason in words."""
+    """Draw Lemke's time relative to IAPB's over the contacts, both compiled; the text says where IAPB is slower."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     looks = looks_of(dict.fromkeys(kernels.column("problem")))
@@ -143,7 +143,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
 
 
 def _lost_on(name: str, kernels: Table) -> str:
-    """Where IAPB clearly costs more on one family of impacts, and how much at worst."""
+    """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
     slower = [row for row in kernels.records() if holds(row) is False]
     faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
     won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({faster['contacts']} contacts). "
@@ -175,7 +175,7 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
     "of the nine. A cross at the rim: it failed on some or took more than 10 ms.",
 )  # fmt: skip
 def impact_accuracy(numbers: Table) -> Drawn:
-    """A panel per size."""
+    """Draw a panel per size."""
     sizes = dict.fromkeys(numbers.select(("contacts", "coordinates")).rows)
     panels = tuple(
         Panel(_impacts(numbers.where(contacts=c, coordinates=d), f"impact-accuracy-{c}"),
@@ -225,7 +225,7 @@ _TOLERANCES = (1e-3, 1e-6, 1e-9)
     "the method stays too inexact, creates energy, finds no solution or needs more than 10 ms.",
 )  # fmt: skip
 def budget_share(numbers: Table) -> Drawn:
-    """A panel per tolerance."""
+    """Draw a panel per tolerance."""
     panels = tuple(Panel(_share(numbers, error), f"Share of impacts solved to {error:g} against time for "
                          f"{', '.join(_LOOKS)}.", f"error below {power_of_error(error)}")
                    for error in _TOLERANCES)  # fmt: skip
@@ -282,7 +282,7 @@ _READ = (
     "the largest kinetic energy.",
 )  # fmt: skip
 def trajectory_precision(motions: Table) -> Drawn:
-    """The worlds: a table in words, and a panel per scene."""
+    """Draw the worlds: a panel with a table, and a panel per scene."""
     return _precision("trajectory-precision", motions, _WORLDS)
 
 
@@ -294,7 +294,7 @@ def trajectory_precision(motions: Table) -> Drawn:
     "needs four evaluations and gains little. Marks and numbers as above.",
 )  # fmt: skip
 def integrator_precision(motions: Table) -> Drawn:
-    """The integrators, in the same way."""
+    """Draw the integrators in the same way as the worlds."""
     return _precision("integrator-precision", motions, _INTEGRATORS)
 
 
@@ -318,7 +318,7 @@ _HEADINGS = ((0.03, ""), (0.16, "ten times the accuracy costs"), (0.43, "smalles
 
 
 def _worth(key: str, told: Table, looks: Mapping[str, LineStyle]) -> str:
-    """The figure's numbers in words, a line per method."""
+    """Draw the figure's main numbers as a table with a line per method."""
     rows = told.records()
     with Plot(f"{key}-worth", (6.8, 0.24 * (len(rows) + 1) + 0.1), bare=True) as plot:
         plot.axes.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -1.5))
@@ -338,7 +338,7 @@ _NEVER = "never worth its time here"
 
 
 def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[str, ...]]:
-    """A line of the table: as one text, and by columns."""
+    """Return a line of that table, as one text and as the text of each column."""
     name, scenes = looks[row["method"]].name, row["scenes"]
     cost = "no step buys it: the error stays"
     if row["scenes fitted"]:
@@ -379,7 +379,7 @@ def _places(runs: Iterable[Row]) -> list[tuple[float, float]]:
 
 
 def _draw_fit(plot: Plot, curve: Curve, look: LineStyle) -> None:
-    """The fitted power, over the runs that it is fitted to."""
+    """Draw the fitted power law over the range of the fitted runs."""
     if curve.cost is None:
         return
     time, error = (np.log10(column) for column in zip(*_places(curve.fitted), strict=True))
@@ -389,7 +389,7 @@ def _draw_fit(plot: Plot, curve: Curve, look: LineStyle) -> None:
 
 
 def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float | None = None) -> None:
-    """Grey steps that join what nothing beats in both time and error, on to a time if it is given."""
+    """Draw grey steps through the points that no other point beats in both time and error, up to the time `until`."""
     steps, least = list[tuple[float, float]](), np.inf
     for time, error in sorted(points):
         if error < least:
@@ -407,7 +407,7 @@ def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float 
     "impact, so every budget is passive.",
 )  # fmt: skip
 def anytime(numbers: Table) -> Drawn:
-    """Residual and energy."""
+    """Draw a panel for the residual and one for the energy."""
     sizes: dict[str, list[Row]] = {}
     for row in numbers.records():
         name = f"{row['coordinates']} coordinates, {row['contacts']} contacts, rank {row['rank']}"
@@ -441,7 +441,7 @@ _FORMS = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
     "contacts.",
 )  # fmt: skip
 def impact_scaling(numbers: Table, fitted: Table) -> Drawn:
-    """Two panels."""
+    """Draw the time over the number of contacts and over the number of coordinates."""
     powers = {(row["method"], row["axis"]): row for row in fitted.records()}
     panels = tuple(
         Panel(_growth(numbers, powers, axis), f"Time of one impact against the number of {axis}.",
@@ -473,7 +473,7 @@ def _growth(numbers: Table, powers: Mapping[tuple[str, str], Row], axis: str) ->
     caption="",
 )  # fmt: skip
 def effect_steps(numbers: Table, machine: str) -> Drawn:
-    """A bar per scene, a mark where every switch is on, and the shares in words."""
+    """Draw for each scene a bar, a mark for the time with every effect on, and the largest shares as text."""
     rows = numbers.records()[::-1]
     places, longest = range(len(rows)), max(row["all on"] for row in rows)
     with Plot("effect-steps", (6.8, 0.3 * len(rows) + 0.8)) as plot:
@@ -509,7 +509,7 @@ _NOTHING = 1e-4  # [mm] where an error of zero is drawn
     "clock.",
 )  # fmt: skip
 def effect_costs(numbers: Table) -> Drawn:
-    """A panel per scene."""
+    """Draw a panel per scene."""
     panels = tuple(_effects(scene, numbers.where(scene=scene).records())
                    for scene in dict.fromkeys(numbers.column("scene")))  # fmt: skip
     return Drawn(panels, numbers)

@@ -32,7 +32,7 @@ def energy_gains(numbers: Table) -> Drawn:
 
 
 def series(numbers: Table, method: str, column: str) -> tuple[list[float], list[float]]:
-    """Return the conditions and the values of one method, without the row that sums up all of them."""
+    """Return the condition numbers and the values of one method, without its summary row."""
     rows = [row for row in numbers.where(method=method).records() if row[CONDITION] != "all"]
     return [float(row[CONDITION]) for row in rows], [float(row[column]) for row in rows]
 

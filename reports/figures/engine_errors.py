@@ -34,7 +34,7 @@ def engine_errors(numbers: Table) -> Drawn:
 
 
 def value_of(row: Mapping[str, Any], column: str) -> float | None:
-    """The size of the number of a cell; at rest an energy error is what the energy rose by."""
+    """Return the absolute value of a cell; without an energy error, return the largest rise of energy."""
     value = row[column]
     if value is None and column == "energy error":
         value = row["largest rise of energy"]
@@ -75,7 +75,7 @@ def _cell(axes: Any, x: int, y: int, row: Mapping[str, Any], column: str) -> Non
 
 
 def exponent(value: float) -> str:
-    """The power of ten nearest to a value, as text; ε below rounding."""
+    """Return the nearest power of ten as text, or ε for a value below rounding."""
     from math import log10
 
     return "ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", "\N{MINUS SIGN}")

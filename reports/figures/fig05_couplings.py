@@ -1,4 +1,4 @@
-"""Figure 5 and Table I: how device and tool hold each other, as block diagrams. Gains are those of the scene file."""
+"""Figure 5 and Table I: the couplings of device and tool as block diagrams, with the gains of the scene file."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def summing_point(axes: Any, center: tuple[float, float]) -> None:
 
 def wire(axes: Any, corners: Sequence[tuple[float, float]], text: str = "", at: tuple[float, float] | None = None, *,
          color: str = INK, width: float = 1.2, dash: tuple[float, ...] = (), align: str = "center") -> None:
-    """Draw a signal along `corners`, an arrow head at its end, and its name at `at`."""
+    """Draw a signal along `corners` with an arrow head at its end, and its name at `at`."""
     xs, ys = zip(*corners, strict=True)
     style: Any = (0, dash) if dash else "-"
     axes.plot(xs[:-1] + (xs[-1],), ys, color=color, linewidth=width, linestyle=style, solid_capstyle="butt", zorder=2)

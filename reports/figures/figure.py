@@ -1,7 +1,7 @@
-"""Figure: one drawing of the report as plain values, and Recipe: what a figure needs and who draws it.
+"""Figure: one drawing of the report as plain values. Recipe: the inputs of a figure and its drawing function.
 
-A figure is a few SVG panels (they wrap on a narrow screen), a legend, a caption that says what to see, and the
-numbers behind it. Nothing here knows about matplotlib or about the page.
+A figure consists of a few SVG panels (they wrap on a narrow screen), a legend, a caption that says what to see, and
+the numbers behind it. This module depends neither on matplotlib nor on the page.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Legend = tuple[tuple[str, LineStyle], ...]
 
 @dataclass(frozen=True)
 class Panel:
-    """One SVG drawing; `label` is its heading, `alt` what a person who cannot see it is told."""
+    """One SVG drawing; `label` is its heading, `alt` its description for readers who cannot see it."""
 
     svg: str
     alt: str
@@ -29,7 +29,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What the function of a recipe returns; `caption` replaces the recipe's."""
+    """The result of a recipe's function; a non-empty `caption` replaces the caption of the recipe."""
 
     panels: tuple[Panel, ...]
     numbers: Table | None = None
@@ -39,7 +39,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawn figure. `number` is the paper's ("Figure 7"), empty for a figure that is ours."""
+    """A drawn figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this project."""
 
     key: str
     number: str
@@ -53,7 +53,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class NotComputed:
-    """Stands where a figure would be: what it would have shown, and which inputs are missing."""
+    """The substitute for a figure that was not drawn: its title, and which inputs are missing."""
 
     key: str
     number: str
@@ -63,9 +63,9 @@ class NotComputed:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a figure is made: `draw` gets the inputs named in `needs`, by name, and returns the Figure.
+    """The recipe of a figure: `draw` gets the inputs named in `needs`, by name, and returns the Figure.
 
-    Without all of `needs` the figure is not drawn, and the page says so: never a picture of half the evidence.
+    If an input in `needs` is missing, the figure is not drawn, and the page says so.
     """
 
     key: str
@@ -83,7 +83,7 @@ class Recipe:
 def recipe(
     key: str, title: str, *needs: str, caption: str, section: str = "figures", number: str = ""
 ) -> Callable[[Callable[..., Drawn]], Recipe]:
-    """Make a recipe from the function below it, which gets one argument per input."""
+    """Make a recipe from the decorated function, which gets one argument per input."""
 
     def made(function: Callable[..., Drawn]) -> Recipe:
         def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -97,7 +97,7 @@ def recipe(
 
 
 def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:
-    """Draw one figure from what there is, or say what is missing."""
+    """Draw one figure, or return which of its inputs are missing."""
     missing = recipe.missing(inputs)
     if missing:
         return NotComputed(recipe.key, recipe.number, recipe.title, missing)

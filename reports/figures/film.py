@@ -1,10 +1,10 @@
-"""A run as a film: where its bodies are at some hundred moments, and where they touch, small enough for a page.
+"""A run as a film: the poses and contacts of its bodies at up to 300 moments, small enough for a page.
 
-Positions and marks are whole numbers of 16 bits, in base64. A picture is SIZE units large, y down. The moments are even
-in time, and those just before and after an impact are among them; no impulse between two moments is left out.
+Positions and marks are 16-bit integers in base64. A picture has SIZE units, y down. The moments are evenly spaced in
+time; the moments just before and after the first impacts are added. All impulses between two moments are included.
 
-What is seen of a scene: rings and balls that bodies carry, standing walls, lines between joints. They are told in the
-view's frame, right-handed: x across the picture, y up, z towards the reader [m]. A planar scene is seen from above.
+A film shows the rings and balls of the bodies, static walls, and lines between joints. Their coordinates are in the
+right-handed frame of the view: x across the picture, y up, z towards the reader [m]. A planar scene is seen from above.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _REACH = 50.0  # the side of a standing half-plane that is drawn, in sizes of th
 
 @dataclass(frozen=True)
 class Ring:
-    """Corners (n, 3) [m] in the frame of a body (its number); -1 = the world. `flat`: seen from both sides."""
+    """A face with corners (n, 3) [m] in the frame of `body` (a number; -1 = world). `flat`: seen from both sides."""
 
     body: int
     corners: Floats
@@ -78,7 +78,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Parts:
-    """All that is drawn of a scene."""
+    """Everything that is drawn of a scene."""
 
     seen: View
     rings: tuple[Ring, ...]
@@ -88,19 +88,19 @@ class Parts:
 
 
 def plan(scene: Mapping[str, Any]) -> View:
-    """Return the view on a scene in the plane, turned as its drawing in the paper is."""
+    """Return the view of a planar scene, turned in the same way as its drawing in the paper."""
     sign = -1.0 if is_turned(scene) else 1.0
     return View(np.array([sign, 0.0, 0.0]), np.array([0.0, sign, 0.0]), np.array([0.0, 0.0, 1.0]))
 
 
 def frames(scene: Mapping[str, Any], seen: View, pose: Floats) -> tuple[Placement, ...]:
-    """Return where the bodies are at a pose of the run, in the view's frame."""
+    """Return the placements of the bodies at a pose of the run, in the view's frame."""
     turn = Placement(np.array([seen.across, seen.up, seen.towards]), np.zeros(3))
     return tuple(turn @ place for place in body_placements(scene, pose).values())
 
 
 def parts(scene: Mapping[str, Any], sight: Sight | None) -> Parts:
-    """Return what is drawn; a scene in space needs the `sight` from which it is looked at."""
+    """Return the drawn parts of a scene; a scene in space needs a `sight`, which gives the viewpoint."""
     number = {body["name"]: k for k, body in enumerate(scene["bodies"])} | {WORLD: -1}
     seen = sight.seen if sight else plan(scene)
     shapes = [shape for k, body in enumerate(scene["bodies"]) for shape in _shapes(k, body)]
@@ -123,14 +123,14 @@ def _shapes(number: int, body: Mapping[str, Any]) -> Iterator[Ring | Ball]:
 
 
 def _of_inertia(body: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the even box of a free body's mass and inertia, which stands for a body without shape."""
+    """Return a homogeneous box with a free body's mass and inertia; it represents a body without a shape."""
     if body["joint"] != "free_flyer":
         return ()
     return ({"kind": "box", "size": cuboid_of_inertia(body), "center": body["center_of_mass"], "rpy": (0, 0, 0)},)
 
 
 def _links(scene: Mapping[str, Any], number: Mapping[str, int]) -> Iterator[Link]:
-    """Yield lines from joint to joint, and on to the shapes."""
+    """Yield lines from joint to joint, and from the last joints to the shapes."""
     for body in scene["bodies"]:
         if body["parent"] != WORLD:
             own = number[body["name"]]
@@ -151,7 +151,7 @@ def _walls(scene: Mapping[str, Any], seen: View, sight: Sight | None) -> Iterato
 
 @dataclass(frozen=True)
 class Film:
-    """What the player needs (`text`, JSON), and what the still pictures are drawn from."""
+    """The data of the player (`text`, JSON), and the data of the still pictures."""
 
     run: Run
     parts: Parts
@@ -169,7 +169,7 @@ class Film:
 def film(run: Run, sight: Sight | None = None, beside: Sequence[Run] = ()) -> Film:
     """Return a run as a film of at most LARGEST bytes; a run in space needs a `sight`.
 
-    Films that stand beside each other are given each other's runs (of the same scene), and so have one scale.
+    Films that are shown side by side get the same scale: pass the other runs (of the same scene) as `beside`.
     """
     drawn = parts(run.scene_resolved, sight if is_spatial(run.scene_resolved) else None)
     low, high = _bounds((run, *beside), drawn)
@@ -184,14 +184,14 @@ def film(run: Run, sight: Sight | None = None, beside: Sequence[Run] = ()) -> Fi
 
 
 def moments(run: Run, count: int) -> tuple[int, ...]:
-    """Return steps that are even in time, and those around the first impacts."""
+    """Return steps that are evenly spaced in time, and the steps around the first impacts."""
     even = np.linspace(0, run.steps, min(count, run.steps + 1)).round().astype(int)
     struck = np.unique(run.impacts.step)[: min(_IMPACTS, count // 4)]
     return tuple(int(step) for step in np.unique(np.concatenate([even, struck, struck + 1])) if step <= run.steps)
 
 
 def _bounds(runs: Sequence[Run], drawn: Parts) -> tuple[Floats, Floats]:
-    """Return the corners (2,) [m] of a picture in which all bodies stay, all the time."""
+    """Return the corners (2,) [m] of a picture that contains all bodies at all times."""
     points = [corner for run in runs for step in moments(run, _MOMENTS[-1]) for corner in _corners(run, drawn, step)]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     margin = _MARGIN * max(high - low)
@@ -208,7 +208,7 @@ def _corners(run: Run, drawn: Parts, step: int) -> list[Floats]:
 
 
 def _plain(made: Film) -> dict[str, Any]:
-    """Return the film as plain values; lengths in units of the picture."""
+    """Return the film as plain values; lengths are in units of the picture."""
     run, scale = made.run, made.scale
     turns, origins = _poses(made)
     factor = _WHOLE / max(float(np.abs(origins).max()), float(max(SIZE)))
@@ -228,7 +228,10 @@ def _plain(made: Film) -> dict[str, Any]:
 
 
 def _poses(made: Film) -> tuple[Floats, Floats]:
-    """Return quaternions (moments, bodies, 4) and origins (moments, bodies, 3) in units, y up from the lower left."""
+    """Return quaternions (moments, bodies, 4) and origins (moments, bodies, 3).
+
+    Origins are in picture units from the lower left corner, y up.
+    """
     from scipy.spatial.transform import Rotation
 
     corner = np.append(made.corner, 0.0)
@@ -241,7 +244,8 @@ def _poses(made: Film) -> tuple[Floats, Floats]:
 
 
 def _marks(made: Film) -> Floats:
-    """Return rows (moment, x, y, angle, strength): contacts at a moment, and impulses (strength < 0) since the last."""
+    """Return rows (moment, x, y, angle, strength): contacts at a moment, and impulses (strength < 0) since the one
+    before."""
     contacts, offsets = made.run.contacts, made.run.contacts.offsets
     rows: list[list[float]] = []
     for k, step in enumerate(made.steps):
@@ -252,7 +256,7 @@ def _marks(made: Film) -> Floats:
 
 
 def _rows(made: Film, moment: int, part: slice, strengths: Floats, sign: float) -> list[list[float]]:
-    """Return the strongest of some contacts; strength in shares of the strongest of the run, as its root."""
+    """Return rows for the strongest of some contacts; strength is the square root of the share of the run's largest."""
     contacts, seen = made.run.contacts, made.parts.seen
     largest = float(strengths.max(initial=0.0))
     chosen = np.arange(part.start, part.stop)[strengths[part] > 0.0]
@@ -268,5 +272,5 @@ def _rows(made: Film, moment: int, part: slice, strengths: Floats, sign: float) 
 
 
 def _encoded(values: Floats) -> str:
-    """Return whole numbers of 16 bits, the lower byte first, in base64."""
+    """Return 16-bit little-endian integers in base64."""
     return base64.b64encode(np.rint(values).astype("<i2").tobytes()).decode()

@@ -1,6 +1,6 @@
-"""Runs played back: the four worlds of the corner side by side, and one scene after another.
+"""Films of runs: the four worlds of the corner side by side, and films of single scenes.
 
-Without a script a page shows four moments of a run, in one SVG of the size of the player's picture.
+Without JavaScript the page shows four moments of a run, in one SVG with the size of the player's picture.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MARKS = "Blue dots are contacts; the line at a dot grows with its force; red ray
 
 @dataclass(frozen=True)
 class Playback:
-    """A film's title, the runs in it by the label of their panel, and what to see."""
+    """A film: its title, its runs by the label of their panel, and its caption."""
 
     title: str
     runs: Mapping[str, str]
@@ -102,7 +102,7 @@ _CELLS = (2, 2)
 
 
 def strip(film: Film, key: str, times: Sequence[float]) -> str:
-    """Return a film at four `times` [s], in rows; each layer is a group that the player can fill anew."""
+    """Return a film at four `times` [s] as an SVG; each layer is a group whose content the player can replace."""
     steps = np.searchsorted(film.run.time, times).clip(0, film.run.steps)
     cells = [_cell(film, key, int(step), k % _CELLS[0], k // _CELLS[0]) for k, step in enumerate(steps)]
     return (
@@ -114,7 +114,7 @@ def strip(film: Film, key: str, times: Sequence[float]) -> str:
 
 
 def still_times(film: Film) -> tuple[float, ...]:
-    """Return four times [s] from start to end, even along the way of the bodies rather than in time."""
+    """Return four times [s] from start to end, evenly spaced along the path of the bodies rather than in time."""
     steps, count = list(film.steps), _CELLS[0] * _CELLS[1]
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(film.run.q[steps], axis=0), axis=1))])
     between = np.searchsorted(way, np.linspace(0.0, way[-1], count)[1:-1])
@@ -136,7 +136,7 @@ def _cell(film: Film, key: str, step: int, column: int, row: int) -> str:
 
 
 def _looks(spatial: bool) -> dict[str, str]:
-    """Return the paint of each layer. Walls in space are see-through and have edges; those in the plane are one."""
+    """Return the fill and stroke of each layer; walls in space are transparent with edges, planar walls are solid."""
     edge = f'{_paint("stroke", MUTED)} stroke-width="0.8" fill-opacity="0.5"' if spatial else ""
     return {
         "walls": f"{_paint('fill', WALL)} {edge}",
@@ -156,7 +156,7 @@ def _ring(points: Floats) -> str:
 
 
 def bodies_markup(film: Film, step: int) -> Iterator[str]:
-    """Yield the faces and discs of the bodies at a step as SVG, the farthest first."""
+    """Yield the faces and discs of the bodies at a step as SVG, the most distant first."""
     places = frames(film.run.scene_resolved, film.parts.seen, film.run.pose[step])
     drawn: list[tuple[float, str]] = []
     for ring in film.parts.rings:
@@ -171,7 +171,7 @@ def bodies_markup(film: Film, step: int) -> Iterator[str]:
 
 
 def _area(corners: Floats) -> float:
-    """Return twice the area of a ring in the picture, positive where it is seen from outside."""
+    """Return twice the area of a ring in the picture; it is positive if the ring is seen from outside."""
     (x, y), (u, v) = corners[:, :2].T, np.roll(corners[:, :2], -1, axis=0).T
     return float(np.sum(x * v - u * y))
 

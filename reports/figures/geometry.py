@@ -1,8 +1,8 @@
-"""Where the outlines of a scene are, from its resolved file and the poses of a run, and how they look.
+"""The outlines of a scene, computed from its resolved file and the poses of a run, and their projection to a picture.
 
 A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners, those of a scene in space (n, 3) [m].
-The view is axonometric: parallel lines stay parallel and nothing shrinks with distance. Quaternions are x, y, z, w; rpy
-turns about the fixed x, y and z axes in this order.
+The view is axonometric: parallel lines stay parallel and sizes do not depend on the distance. Quaternions are x, y, z,
+w; rpy rotates about the fixed x, y and z axes in this order.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), 
 
 
 def is_spatial(scene: Mapping[str, Any]) -> bool:
-    """Tell whether a resolved scene is one in space."""
+    """Return whether a resolved scene is a scene in space."""
     return scene.get("dimensions") == 3
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a frame is: `rotation` (3, 3) and `origin` (3,) [m], both in world axes."""
+    """The placement of a frame: `rotation` (3, 3) and `origin` (3,) [m], both in world axes."""
 
     rotation: Floats
     origin: Floats
@@ -41,33 +41,33 @@ class Placement:
         return Placement(self.rotation @ inner.rotation, self.origin + self.rotation @ inner.origin)
 
     def of(self, points: Any) -> Floats:
-        """Return points of this frame (..., 2 or 3) in world axes, as many numbers each."""
+        """Return points (..., 2 or 3) of this frame in world axes, in the same shape."""
         points = np.asarray(points, dtype=float)
         n = points.shape[-1]
         return self.origin[:n] + points @ self.rotation[:n, :n].T
 
 
 def placement(origin: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0)) -> Placement:
-    """Return the frame at `origin` (2 or 3 numbers), turned by roll, pitch and yaw."""
+    """Return the frame at `origin` (2 or 3 numbers), rotated by roll, pitch and yaw."""
     from scipy.spatial.transform import Rotation
 
     return Placement(Rotation.from_euler("xyz", rpy).as_matrix(), np.resize(np.append(origin, 0.0), 3))
 
 
 def placement_of(placed: Mapping[str, Any], origin: str = "center") -> Placement:
-    """Return the frame of a shape or joint of a resolved scene: its `angle` in the plane, its `rpy` in space."""
+    """Return the frame of a shape or joint of a resolved scene, from its `angle` (plane) or its `rpy` (space)."""
     return placement(placed.get(origin, (0.0, 0.0)), placed.get("rpy", (0.0, 0.0, placed.get("angle", 0.0))))
 
 
 def start_pose(scene: Mapping[str, Any]) -> Floats:
-    """Return the poses (bodies, 3 or 7) of a resolved scene where it starts, as the engine has them."""
+    """Return the initial poses (bodies, 3 or 7) of a resolved scene, as computed by the engine."""
     checked = scene_kind(scene).model_validate(scene)
     poses: Floats = mechanism_of(checked).poses(start_of(checked)[0][None], planar=not is_spatial(scene))[0]
     return poses
 
 
 def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dict[str, Placement]:
-    """Return where every body is: at one of a run's poses (bodies, 3 or 7), or where the scene starts."""
+    """Return the placement of every body, at a pose (bodies, 3 or 7) of a run or at the start of the scene."""
     poses = start_pose(scene) if pose is None else pose
     return {body["name"]: _placed(one) for body, one in zip(scene["bodies"], poses, strict=True)}
 
@@ -84,7 +84,7 @@ def _placed(pose: Floats) -> Placement:
 
 
 def outline(shape: Mapping[str, Any]) -> Floats:
-    """Return the corners of a box, circle or polygon in the frame that carries it."""
+    """Return the corners of a box, circle or polygon in the frame of its body."""
     frame = placement_of(shape)
     if shape["kind"] == "circle":
         turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
@@ -96,7 +96,7 @@ def outline(shape: Mapping[str, Any]) -> Floats:
 
 
 def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
-    """Return a rectangle of size `reach` that stands for everything behind the wall's line."""
+    """Return a rectangle of size `reach` that represents the half-plane behind the wall's line."""
     normal = np.asarray(wall["normal"], dtype=float)
     normal = normal / np.hypot(*normal)
     along = np.array([-normal[1], normal[0]])
@@ -129,7 +129,10 @@ def cuboid_faces(frame: Placement, size: Any) -> tuple[Floats, ...]:
 
 
 def cuboid_of_inertia(body: Mapping[str, Any]) -> Floats:
-    """Return the sides (3,) [m] of the even box with the body's mass and principal moments: m (b² + c²) / 12 = I_xx."""
+    """Return the sides (3,) [m] of the homogeneous box with the body's mass and principal moments of inertia.
+
+    The sides a, b, c follow from m (b² + c²) / 12 = I_xx and so on.
+    """
     xx, yy, zz = body["inertia"][:3]
     squares = 6.0 * (np.array([yy + zz - xx, zz + xx - yy, xx + yy - zz])) / body["mass"]
     sides: Floats = np.sqrt(np.maximum(squares, 0.0))
@@ -138,26 +141,26 @@ def cuboid_of_inertia(body: Mapping[str, Any]) -> Floats:
 
 @dataclass(frozen=True)
 class View:
-    """A direction to look along: `across` and `up` (3,) span the picture, `towards` points at the reader."""
+    """A viewing direction: `across` and `up` (3,) span the picture, `towards` points at the reader."""
 
     across: Floats
     up: Floats
     towards: Floats
 
     def flat(self, points: Any) -> Floats:
-        """Return points (..., 3) in the picture (..., 2) [m]."""
+        """Return the projection (..., 2) [m] of points (..., 3) to the picture."""
         return np.asarray(points, dtype=float) @ np.column_stack([self.across, self.up])
 
     def depth(self, points: Any) -> float:
-        """Return how near [m] the middle of some points is to the reader."""
+        """Return the coordinate [m] of the mean of some points along `towards`; it is larger nearer to the reader."""
         return float(np.mean(np.asarray(points, dtype=float) @ self.towards))
 
     def faces_reader(self, ring: Floats) -> bool:
-        """Tell whether a ring of corners is seen from outside."""
+        """Return whether a ring of corners is seen from outside."""
         return float(np.cross(ring[1] - ring[0], ring[2] - ring[1]) @ self.towards) > 0.0
 
     def disc(self, center: Floats, radius: float) -> Floats:
-        """Return the outline (n, 3) of a ball: a circle across the line of sight."""
+        """Return the outline (n, 3) of a ball: a circle perpendicular to the line of sight."""
         turn = np.linspace(0.0, 2.0 * np.pi, _BALL_CORNERS, endpoint=False)
         return center + radius * (np.outer(np.cos(turn), self.across) + np.outer(np.sin(turn), self.up))
 
@@ -169,7 +172,7 @@ def view(azimuth: float, elevation: float) -> View:
 
 
 def links(scene: Mapping[str, Any], pose: Floats | None = None) -> Sequence[tuple[Floats, Floats]]:
-    """Return lines (from, to) [m] from joint to joint, and on to the shapes: the skeleton of what hangs together."""
+    """Return lines (from, to) [m] from joint to joint, and to the shapes: the skeleton of each mechanism."""
     places, lines = body_placements(scene, pose), []
     for body in scene["bodies"]:
         if body["parent"] != WORLD:

@@ -1,4 +1,4 @@
-"""Names beside marks and at curves, moved apart: not on one another, not on a mark, on a curve only if it must be."""
+"""Place labels at marks and curves so that they cover no other label and no mark, and a curve only if unavoidable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Points = NDArray[np.float64]
 def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]]) -> list[Box]:
     """Write each name beside its mark, in the nearest place where it covers no mark, no other name and no line.
 
-    Call it last, when the limits of the axes stand. Returns the boxes of the names [points].
+    Call it last, after the limits of the axes are set. Returns the boxes of the names [points].
     """
     axes.figure.draw_without_rendering()  # the layout decides where marks are
     marks = [tuple(place) for place in _on_paper(axes, places)]
@@ -42,7 +42,7 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
 
 
 def _lines(axes: Any, frame: Box) -> Points:
-    """Return places along all lines that are drawn, curves and segments."""
+    """Return points along all drawn lines, both curves and segments."""
     found = [_places_of(line, frame) for line in axes.lines if line.get_linestyle() != "None"]
     for collection in axes.collections:
         found += [_dense(_on_paper(axes, path), frame) for path in getattr(collection, "get_segments", list)()]
@@ -50,10 +50,10 @@ def _lines(axes: Any, frame: Box) -> Points:
 
 
 def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Write the name of each curve at it, in its colour, where it covers least; what is named already is left alone.
+    """Write the name of each curve beside it, in its colour, where the name covers least; skip curves already named.
 
-    A curve has a name where its `gid` is "curve=name", as `line_arguments` gives it. A single one needs none. `words`
-    follow the name.
+    The name of a curve comes from its `gid`, "curve=name", which `line_arguments` sets. A single curve gets no name.
+    The entry of a curve in `words` is written after its name.
     """
     lines = {str(line.get_gid())[6:]: line for line in axes.lines if str(line.get_gid()).startswith("curve=")}
     named = [text.get_text() for text in axes.texts]
@@ -84,7 +84,7 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
 
 
 def arrow_of_time(axes: Any) -> None:
-    """Draw an arrow along the curves, beside the first half of the first one: the way in which time goes."""
+    """Draw an arrow in the direction of time, beside the first half of the first curve."""
     line = axes.lines[0]
     axes.figure.draw_without_rendering()
     path = _places_of(line, _frame(axes))
@@ -100,9 +100,9 @@ def arrow_of_time(axes: Any) -> None:
 
 
 def note_beside(axes: Any, tail: Any, tip: Any, text: str, size: float, **how: Any) -> None:
-    """Write the name of an arrow from `tail` to `tip` where it covers least: no arrow, no edge of a body.
+    """Write the name of an arrow from `tail` to `tip` where it covers the least of arrows, lines and edges of bodies.
 
-    Call it last, when the limits of the axes stand.
+    Call it last, after the limits of the axes are set.
     """
     axes.figure.draw_without_rendering()
     frame, scale = _frame(axes), 72.0 / axes.figure.dpi
@@ -121,10 +121,10 @@ def note_beside(axes: Any, tail: Any, tip: Any, text: str, size: float, **how: A
 
 def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[Box], own: Points, others: Points,
            shared: float = 10.0) -> tuple[Box, Points]:  # fmt: skip
-    """Return where a name covers least, and the start that it belongs to.
+    """Return the box in which a name covers least, and the start that it belongs to.
 
-    starts : places that it may stand at; own : what it names; others : what it must not cover either
-    shared : cost of a start at which others run as well, so that the name could be theirs
+    starts : points beside which the name may be placed; own : points of the named line; others : points of other lines
+    shared : cost of a start close to other lines, where the name could belong to one of them
     """
     left, bottom, right, top = frame
     extent = np.array([_LETTER * size * len(name) + 2.0, size + 2.0])
@@ -151,7 +151,7 @@ _ARROW, _ASIDE = 9, 8.0  # half the length of the arrow of time, in steps, and i
 _STEP = 2.0  # points between the places of a curve that a name must not cover
 
 def _on_paper(axes: Any, places: Any) -> Points:
-    """Return places of the axes in points of the drawing, once it has its layout."""
+    """Return data coordinates as points (1/72 inch) of the drawing; call it after the layout."""
     return np.asarray(axes.transData.transform(np.asarray(places, dtype=float)) * 72.0 / axes.figure.dpi)
 
 
@@ -166,7 +166,7 @@ def _box_of(text: Any) -> Box:
 
 
 def _places_of(line: Any, frame: Box) -> Points:
-    """Return the places that a line covers: along it, or those of its marks where they are not joined."""
+    """Return the points that a line covers: points along it, or its marks if they are not joined."""
     from matplotlib.cbook import STEP_LOOKUP_MAP
 
     steps = STEP_LOOKUP_MAP[line.get_drawstyle()]
@@ -179,7 +179,7 @@ def _places_of(line: Any, frame: Box) -> Points:
 
 
 def _dense(path: Points, frame: Box) -> Points:
-    """Return places along a path, evenly spaced, those inside the frame."""
+    """Return evenly spaced points along a path that are inside the frame."""
     path = path[np.isfinite(path).all(axis=1)]
     if len(path) > 1:
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
@@ -199,12 +199,12 @@ def _covered(box: Box, points: Points) -> float:
 
 
 def _near(place: Points, others: Points) -> bool:
-    """Whether another curve is so near that a name could belong to either."""
+    """Return whether another curve is so close that a name could belong to either."""
     return bool(len(others)) and float(np.min(np.hypot(*(others - place).T))) < _GAP
 
 
 def _free(x: float, y: float, width: float, taken: Sequence[Box], lines: Points, frame: Sequence[float]) -> Box:
-    """The first place for a name inside of the axes where nothing is in the way; else the one that covers least."""
+    """Return the first box for a name inside of the axes that covers nothing, else the box that covers least."""
     best: tuple[float, Box] = (np.inf, (0.0, 0.0, 0.0, 0.0))
     for step in range(24):
         lift = (step + 1) // 2 * SIZE * (1 if step % 2 else -1)  # 0, up, down, further up, ...

@@ -1,7 +1,7 @@
-"""Newton's cradle and Bernoulli's three balls: the same blow by relative rows, by per-body rows, and event by event.
+"""Newton's cradle and Bernoulli's three balls: one impact solved with relative rows, per-body rows, or event by event.
 
-What is conserved stands beside each outcome; that all but the per-body rows conserve everything and still differ shows
-what the choice of rows decides.
+Beside each outcome stands which quantities it conserves. All but the per-body rows conserve energy and momentum; their
+outcomes differ nevertheless, because the choice of rows decides the outcome.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ORDERS = {"contact 0, then 1": "the upper ball first", "contact 1, then 0": "th
 
 
 class Outcome(NamedTuple):
-    """One treatment of one problem: velocities after [m/s], and the relative changes."""
+    """One treatment of one problem: velocities after the impact [m/s], and relative changes of energy and momentum."""
 
     treatment: str
     rows: str
@@ -40,7 +40,7 @@ class Outcome(NamedTuple):
 
     @property
     def look(self) -> LineStyle:
-        """Colour and marker of its treatment."""
+        """Return the colour and marker of the treatment."""
         return next(look for start, look in TREATMENTS.items() if self.treatment.startswith(start))
 
 
@@ -62,7 +62,7 @@ def outcomes(numbers: Table, problem: str) -> list[Outcome]:
     "to seven balls.",
 )  # fmt: skip
 def linked_impacts(numbers: Table) -> Drawn:
-    """Draw both problems, and what the last ball of a cradle gets."""
+    """Draw both problems, and the velocity of the last ball of cradles of several lengths."""
     cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
     panels = (
         Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
@@ -74,7 +74,7 @@ def linked_impacts(numbers: Table) -> Drawn:
 
 
 def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
-    """Draw once what comes out alike by two choices of rows of the same treatment, under both their names."""
+    """Merge outcomes of the same treatment with equal velocities into one, under the names of both row choices."""
     kept: dict[Any, Outcome] = {}
     for outcome in found:
         key = (outcome.treatment, tuple(round(v, 9) + 0.0 for ball in outcome.velocity for v in ball))
@@ -119,7 +119,7 @@ def _balls(axes: Any, centers: Sequence[tuple[float, float]], velocities: Sequen
 
 
 def _kept(axes: Any, place: tuple[float, float], change: float) -> None:
-    """Write "kept", or by how much of itself it changed."""
+    """Write "kept", or the relative change of the quantity."""
     if abs(change) < ROUNDING:
         note(axes, place, "kept", color=INK)
     else:
@@ -146,7 +146,7 @@ def _bernoulli(found: Sequence[Outcome]) -> str:
 
 
 def _series(numbers: Table) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
-    """The outcomes of all cradles by treatment and rows, each with the number of balls."""
+    """Return the outcomes of all cradles by treatment and rows, each with its number of balls."""
     series: dict[tuple[str, str], list[tuple[int, Outcome]]] = {}
     for problem in dict.fromkeys(numbers.column("problem")):
         for outcome in outcomes(numbers, problem):

@@ -1,4 +1,4 @@
-"""The mechanics against truths: other coordinates (C06), a tumbling body, and false collisions in a socket (C18)."""
+"""Checks of the mechanics: other coordinates (C06), a tumbling body, and false collisions in a socket (C18)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditio
     "below the dashed line the error is below the bound C ε κ/σ_min.",
 )  # fmt: skip
 def coordinate_invariance(numbers: Table) -> Drawn:
-    """Draw the way through the singular pose, and every case against its bound."""
+    """Draw the motion through the singular pose, and the error of every case against its bound."""
     rows = numbers.records()
     told = [row for row in rows if row["bound"] < 1.0 and row["error"] is not None]
     share = max(row["error"] / row["bound"] for row in told)
@@ -131,7 +131,7 @@ _DURATION = 2.0  # [s]
     "the edges, and its next contact is new to both filters.",
 )  # fmt: skip
 def socket_collisions(times: Table, counts: Table) -> Drawn:
-    """Draw counts and losses in time, and the counts over damping."""
+    """Draw collision counts and energy losses over time, and the counts over damping."""
     found = ", ".join(f"{row['filters']} {row['false collisions']}"
                       for row in counts.where(damping=_DAMPING).records())  # fmt: skip
     words = f"False collisions in two seconds at {_DAMPING:g} N s/m: {found}."

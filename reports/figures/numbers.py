@@ -1,4 +1,4 @@
-"""How a number is printed: a true minus sign, superscript powers of ten, the same digits down a column."""
+"""Format numbers for readers: a true minus sign, superscript powers of ten, equal digits within a column."""
 
 from __future__ import annotations
 
@@ -48,5 +48,5 @@ def format_cell(value: Any, digits: int = 4) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a cell is aligned to the right: numbers, and the dash that stands for one."""
+    """Return whether a cell is aligned to the right: it is a number, or None, which is printed as a dash."""
     return value is None or (hasattr(value, "__float__") and not isinstance(value, bool | str))

@@ -1,4 +1,4 @@
-"""One panel with axes: what every curve, cloud of marks and map of the report is drawn with."""
+"""One panel with axes. All curves, scatter plots and maps of the report are drawn with it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from reports.figures.svg import to_svg, traced_svg
 
 
 class Plot:
-    """Axes under the report's parameters, and their SVG once the `with` block has been left.
+    """Axes with the report's style, and their SVG after the `with` block has ended.
 
     Parameters
     ----------
-    key : of the panel, unique in the page; makes the identifiers of its SVG
+    key : key of the panel, unique in the page; the identifiers of its SVG contain it
     size : width and height [inches]
-    kind : TIME or PATH where the page's script reads values off the curves
-    frame : place of the axes in the drawing (left, bottom, width, height); by default the layout decides
-    bare : without axes: a canvas for shapes, by default as large as the drawing
+    kind : TIME or PATH if the page's script reads values from the curves
+    frame : position of the axes in the drawing (left, bottom, width, height); by default the layout decides
+    bare : whether to hide the axes: a canvas for shapes, by default as large as the drawing
 
     Attributes
     ----------
-    axes, drawing : matplotlib's
-    words : what is written after the name of a curve
-    svg : the panel
+    axes, drawing : matplotlib's axes and figure
+    words : text after the name of each curve
+    svg : the SVG of the panel
     """
 
     def __init__(self, key: str, size: tuple[float, float] = PANEL, *, kind: str = "", bare: bool = False,
@@ -60,7 +60,7 @@ class Plot:
         self._style.__exit__(kind, error, trace)
 
     def curve(self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any) -> None:
-        """Draw a curve through points (x, y); nothing without points."""
+        """Draw a curve through points (x, y); draw nothing if there are none."""
         points = list(points)
         if points:
             self.axes.plot(*zip(*points, strict=True), **line_arguments(look, marked=marked) | how)
@@ -70,7 +70,7 @@ class Plot:
         self.curve(points, look, **{"linestyle": "none", **how})
 
     def lost(self, places: Sequence[float], look: LineStyle, height: float) -> None:
-        """Draw crosses at the upper rim: what failed, at its x."""
+        """Draw crosses at the upper rim at the x values `places` of failed cases."""
         self.axes.plot(places, [height] * len(places), "x", color=look.color, markersize=5,
                        transform=self.axes.get_xaxis_transform())  # fmt: skip
 
@@ -80,19 +80,19 @@ class Plot:
         plain_powers(self.axes)
 
     def without_lines(self) -> None:
-        """Leave out the grid and the frame: a table of marks."""
+        """Hide the grid and the frame, for a table of marks."""
         self.axes.grid(visible=False)
         for side in self.axes.spines.values():
             side.set_visible(False)
 
     def lines_of(self, names: Sequence[str]) -> None:
-        """Make a row for each name, from the top."""
+        """Make the vertical axis a list of rows, one for each name, from top to bottom."""
         self.axes.set_yticks(range(len(names)), names)
         self.axes.set_ylim(len(names) - 0.5, -0.5)
 
 
 def plain_powers(axes: Any) -> None:
-    """Label logarithmic axes with powers of ten as plain text (mathematical text is no text in an SVG)."""
+    """Label logarithmic axes with powers of ten as plain text; matplotlib's mathematical text is not plain text in an SVG."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     for axis in (axis for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):

@@ -1,4 +1,4 @@
-"""Every scene at a glance: where the energy is over time, how deep bodies overlap, how long a step takes."""
+"""Overview of all scenes: the parts of the energy over time, and the deepest overlap of bodies."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _NO_DEPTH, _DEEPEST = 1e-3, 5.0  # [mm] ends of the logarithmic scale
 class Strip:
     """One scene: `layers` (5, n) and `line` (n,) [J] over `time` (n,) [s].
 
-    struck : whether there was an impact since the instant before; at_rest : nothing moves in it but rounding
+    struck : whether an impact occurred since the previous instant; at_rest : whether all motion is within rounding
     """
 
     scene: str
@@ -60,7 +60,7 @@ class Strip:
 
 
 def strips(numbers: Table) -> tuple[Strip, ...]:
-    """Return the strips of all scenes from the table of the books over time."""
+    """Return the strips of all scenes from the table of energies over time."""
     names = tuple(dict.fromkeys(numbers.column("scene")))
     return tuple(_strip(name, numbers) for name in names)
 
@@ -87,7 +87,7 @@ def _strip(name: str, numbers: Table) -> Strip:
     "logarithmic scale.",
 )  # fmt: skip
 def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
-    """Draw every row."""
+    """Draw a row for every scene."""
     shown, facts = strips(over_time), {row["scene"]: row for row in contacts.records()}
     with styled() as new_figure:
         height = _HEAD + _ROW * len(shown) + _FOOT
@@ -137,7 +137,7 @@ def _energy(axes: Any, strip: Strip) -> None:
 
 def _bar(drawing: Any, column: str, bottom: float, height: float, value: float, scale: tuple[float, float],
          color: str, text: str) -> None:  # fmt: skip
-    """Draw a value as a bar on a logarithmic scale, its number behind it."""
+    """Draw a value as a bar on a logarithmic scale, with its number to the right."""
     left, width = _COLUMNS[column]
     axes = drawing.add_axes((left, bottom + 0.14 * height, width, 0.78 * height))
     axes.set_axis_off()

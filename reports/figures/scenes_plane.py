@@ -1,4 +1,4 @@
-"""Scenes in the plane: Figure 1, the forces on a contact group; Figure 4, the peg; and others at their start."""
+"""Planar scenes: Figure 1 (forces on a contact group), Figure 4 (the peg), and other scenes in their initial state."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def contacts_of(run: Run, step: int) -> range:
 
 
 def hardest_collision(run: Run) -> int | None:
-    """Return the step with the largest contact impulse, if any."""
+    """Return the step with the largest contact impulse; None without impulses."""
     if not len(run.contacts.impulse) or not run.contacts.impulse.any():
         return None
     row = int(np.argmax(np.abs(run.contacts.impulse)))
@@ -51,7 +51,7 @@ def hardest_collision(run: Run) -> int | None:
 
 
 def last_contact(run: Run) -> int | None:
-    """Return the last step in which something touches, if any."""
+    """Return the last step with a contact; None without contacts."""
     steps = np.flatnonzero(np.diff(run.contacts.offsets))
     return int(steps[-1]) if len(steps) else None
 

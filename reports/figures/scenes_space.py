@@ -1,4 +1,4 @@
-"""Scenes in space: each where it starts and where its run ends, drawn from the run alone."""
+"""Scenes in space: each in its first and last state, drawn from its run alone."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _BODY_SHOWS, _WALL_SHOWS = 0.7, 0.35  # how much of what lies behind them they h
 
 @dataclass(frozen=True)
 class Sight:
-    """How to look at a scene: from where, and at which `moments` of its run, as shares of its length."""
+    """The viewpoint of a scene, and the `moments` of its run that are drawn, as fractions of its duration."""
 
     run: str
     seen: View
@@ -49,7 +49,7 @@ SIGHTS = (
 
 @dataclass(frozen=True)
 class Piece:
-    """Something to draw: a ring or line of points (n, 3) [m]."""
+    """A ring or line of points (n, 3) [m] to draw."""
 
     points: Floats
     face: str
@@ -68,12 +68,12 @@ class Piece:
     "no shape; the picture shows the uniform box with its mass and inertia, with one corner marked.",
 )  # fmt: skip
 def scenes_space(*runs: Run) -> Drawn:
-    """Draw every scene at its moments."""
+    """Draw every scene at the moments of its `Sight`."""
     return Drawn(tuple(panel for sight, run in zip(SIGHTS, runs, strict=True) for panel in panels_of(sight, run)))
 
 
 def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
-    """Yield a picture of the run for each moment, all of one scene at one scale."""
+    """Yield a picture of the run for each moment; all pictures of a scene have the same scale."""
     scene = run.scene_resolved
     steps = [round(share * run.steps) for share in sight.moments]
     drawn = [sorted(pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
@@ -102,7 +102,7 @@ def _fill(axes: Any, seen: View, piece: Piece, order: int) -> None:
 
 
 def pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
-    """Yield the faces, discs and lines of a scene at a pose that are turned to the reader."""
+    """Yield the faces, discs and lines of a scene at a pose that face the reader."""
     seen = sight.seen
     for wall in scene["walls"]:
         yield from _wall(sight, wall)
@@ -133,12 +133,12 @@ def _wall(sight: Sight, wall: Mapping[str, Any]) -> Iterator[Piece]:
 
 
 def _onwards(sight: Sight) -> Floats:
-    """Shift a floor to where an arm reaches, x > 0."""
+    """Return the shift that moves a floor to the reach of an arm, x > 0."""
     return np.array([0.7 * sight.floor, 0.0, 0.0])
 
 
 def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
-    """Return a static box, cut to a square of half side `reach` about the origin."""
+    """Return a static box, cut to a square with half side `reach` about the origin."""
     if not reach or wall["kind"] != "box":
         return wall
     half, center = np.asarray(wall["size"]) / 2.0, np.asarray(wall["center"], dtype=float)

@@ -1,4 +1,4 @@
-"""Sampled walls: which ones a hand can lean on, and how hard they feel, by penalties and by impulses."""
+"""Sampled walls: which ones are stable under a hand, and how hard they feel, with penalties and with impulses."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SETTLES = "+"
     "undamped device no wall is.",
 )  # fmt: skip
 def stability_map(table: Table, dampings: Table) -> Drawn:
-    """One panel per loop."""
+    """Draw one panel per loop."""
     damping = np.array(dampings.column("damping"))
     panels = tuple(_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
                    for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows)))  # fmt: skip
@@ -66,7 +66,7 @@ _FELT = ("rate-hardness", "settles after", "penetration")
     "the wall's stiffness. Where a curve ends, the mass never comes to rest.",
 )  # fmt: skip
 def hardness(table: Table) -> Drawn:
-    """Three panels over the stiffness."""
+    """Draw three panels over the stiffness."""
     labels = {column.key: column.title for column in table.columns}
     here = table.where(**dict(zip(_LOOP, (512.0, "ideal", 0.0), strict=True)))
     panels = tuple(Panel(_felt(here, key, labels[key]), f"{labels[key]} against stiffness, penalties and impulses.",

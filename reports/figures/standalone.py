@@ -53,7 +53,7 @@ def _panels(figure: Figure, sizes: list[tuple[float, float]]) -> list[str]:
 
 
 def _legend(figure: Figure, width: float, height: float) -> str:
-    """Swatch and name of each curve, centred."""
+    """Return the legend as SVG: swatch and name of each curve, centred."""
     steps = [_SWATCH[0] + 8 + _LETTER * len(text) + 22 for text, _ in figure.legend]
     x, y = (width - sum(steps)) / 2, height - _LEGEND / 2
     parts = []

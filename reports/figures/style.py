@@ -1,7 +1,7 @@
-"""How the figures look: one colour, line and marker per world, the same in every figure.
+"""The style of the figures: one colour, line and marker per world, the same in every figure.
 
-Colours are Okabe and Ito's (safe for colour-blind readers); line styles and markers differ as well, so that a
-grey print can be read. The page maps each colour to a variable, so that dark mode is not a negative.
+Colours are those of Okabe and Ito (safe for colour-blind readers); line styles and markers differ as well, so that a
+grey print can be read. The page maps each colour to a variable, so that dark mode can use other colours.
 """
 
 from __future__ import annotations
@@ -127,19 +127,19 @@ PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a 
 
 
 def looks_of(names: Iterable[str]) -> dict[str, LineStyle]:
-    """Return the look of each name: its own where it has one, else the next of the numbered ones."""
+    """Return the style of each name: its own style if it has one, else the next numbered style."""
     numbers = count()
     return {name: STYLES[name] if name in STYLES else numbered(next(numbers), name) for name in dict.fromkeys(names)}
 
 
 def numbered(number: int, name: str = "") -> LineStyle:
-    """Return the style of a numbered series; from the second round on with empty markers."""
+    """Return the style of a numbered series; when the colours repeat, markers are hollow."""
     return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE), name=name)
 
 
 @contextmanager
 def styled() -> Iterator[Any]:
-    """Give matplotlib's pyplot-free figure module under our parameters, leaving the caller's untouched."""
+    """Yield matplotlib's figure module (without pyplot) with the report's parameters; the caller's are restored."""
     import matplotlib
     from matplotlib.figure import Figure
 

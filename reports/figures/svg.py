@@ -1,11 +1,11 @@
-"""From a matplotlib figure to an SVG string that repeats byte for byte and can stand inside a page.
+"""Convert a matplotlib figure to an SVG string that is reproducible byte for byte and can be embedded in a page.
 
-No date, no metadata, salted identifiers that are unique in the page, coordinates to 0.01 pt (or finer), colours as the
-page's variables (with the colour itself as fallback), text as text.
+The SVG has no date and no metadata. Its identifiers are salted and unique in the page, coordinates are rounded to
+0.01 pt (or finer), colours are variables of the page (with the colour itself as fallback), and text stays text.
 
-The page's script can read curves: their SVG tells where its axes are and which curve is which. The script needs no
-other copy of the values: it reads them from the paths, which hold every point that is farther than TOLERANCE from a
-straight line between its neighbours. Without the script it is the drawing that it was.
+The page's script can read values from curves: the SVG states the frame of its axes and the name of each curve. The
+script reads the values from the paths, which contain every point that is farther than TOLERANCE from a straight line
+between its neighbours. Without the script, the SVG is an ordinary drawing.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def to_svg(drawing: Any, key: str, decimals: int = 2) -> str:
 
 
 def _without_waste(text: str) -> str:
-    """Drop what draws nothing: turns by zero, blanks in paths and between tags; say the style of many markers once."""
+    """Remove rotations by zero and blanks in paths and between tags; state a style shared by many markers once."""
     text = _TURNED_BY_NOTHING.sub("", text)
     text = _PATH.sub(lambda path: " " + _COMMAND.sub(r"\1", path.group().strip()), text)
     text = _SAME_CLIP.sub(_clipped_once, re.sub(r">\s+<", "><", text))
@@ -71,7 +71,7 @@ def _rounded(number: str, decimals: int) -> str:
 
 
 def _fitted(text: str) -> str:
-    """Drop the fixed size: the page decides, the viewBox keeps the proportions."""
+    """Remove the fixed size: the page sets the size, and the viewBox keeps the proportions."""
     head, rest = text.split(">", 1)
     width = re.search(r'\swidth="([\d.]+)pt"', head)
     natural = round(float(width.group(1)) * 4 / 3) if width else 400
@@ -81,7 +81,7 @@ def _fitted(text: str) -> str:
 
 
 def _own_identifiers(text: str, key: str) -> str:
-    """Keep only the identifiers that something refers to: the figure's key and a number."""
+    """Keep only identifiers that are referred to, and rename each to the figure's key and a number."""
     referred = dict.fromkeys(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
     names = {old: f"{key}-{number}" for number, old in enumerate(referred)}
 
@@ -99,7 +99,7 @@ def _themed(text: str) -> str:
 
 
 def traced_svg(drawing: Any, key: str, kind: str = TIME) -> str:
-    """Return the SVG of a drawing with one pair of axes, with what a script needs to read values off it."""
+    """Return the SVG of a drawing with one pair of axes, with the data that the script needs to read values from it."""
     import matplotlib
 
     (axes,) = drawing.axes
@@ -115,7 +115,7 @@ def traced_svg(drawing: Any, key: str, kind: str = TIME) -> str:
 
 
 def _attributes(drawing: Any, axes: Any, kind: str) -> str:
-    """Return the frame of the axes in the drawing's points (left, top, right, bottom), their limits and names."""
+    """Return SVG attributes: the frame of the axes in points (left, top, right, bottom), their limits and names."""
     width, height = 72.0 * drawing.get_size_inches()
     place = axes.get_position()
     frame = (width * place.x0, height * (1.0 - place.y1), width * place.x1, height * (1.0 - place.y0))

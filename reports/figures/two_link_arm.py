@@ -1,7 +1,7 @@
-"""Figures 2 and 3: the two-link arm, and its kinetic energy before and after one frictionless collision, over e.
+"""Figures 2 and 3: the two-link arm, and its kinetic energy before and after a frictionless collision, against e.
 
 The arm is straight, q = (π/2, 0), q̇₀ = (1, 1) rad/s, and is struck perpendicular to the second link at A (0.7 m) or
-B (0.5 m). Which mass distribution the authors used is not printed, so both are drawn.
+B (0.5 m). The paper does not state the mass distribution, so both are drawn.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def mass_matrix(reading: str) -> Floats:
 
 
 def contact_row(distance: float) -> Floats:
-    """Return nᵀJ at `distance` along the second link, n against the motion of the straight arm."""
+    """Return nᵀJ at `distance` along the second link; n is opposite to the motion of the straight arm."""
     return -np.array([[LENGTH + distance, distance]])
 
 
@@ -67,7 +67,7 @@ def arm_energies() -> dict[str, Floats]:
     "The collision is at A or at B, perpendicular to the second link and without friction.",
 )  # fmt: skip
 def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
-    """Draw the arm from the resolved scene; the two differ in where it is struck."""
+    """Draw the arm from the resolved scene; the two scenes differ only in the contact point."""
     poses = list(body_placements(scene).values())[:2]
     ends = [frame.of((LENGTH, 0.0)) for frame in poses]
     pivot = poses[0].origin[:2]
@@ -101,7 +101,7 @@ def _link(axes: Any, frame: Placement, end: Any, number: int) -> None:
 
 
 def _blow(axes: Any, frame: Placement, name: str, distance: float) -> None:
-    """Draw the blow at `distance` along the link, against the motion."""
+    """Draw the impulse at `distance` along the link, opposite to the motion."""
     color = BLUE if name == "A" else VERMILION
     point, normal = frame.of((distance, 0.0)), -frame.rotation[:2, 1]
     arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
