@@ -92,7 +92,7 @@ class Plot:
 
 
 def plain_powers(axes: Any) -> None:
-    """Label logarithmic axes with powers of ten as plain text; matplotlib's mathematical text is not plain text in an SVG."""
+    """Label logarithmic axes with powers of ten as plain text, because mathematical text is not text in the SVG."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     for axis in (axis for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):

@@ -1,1 +1,1 @@
-"""The loop in real time (paper section VI): paced, watched, seen and held; see `reports.live.loop`."""
+"""The real-time loop (paper section VI) with deadlines, viewer and mouse input; see `reports.live.loop`."""

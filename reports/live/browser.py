@@ -1,8 +1,8 @@
-"""The viewer's process: a scene in a web browser by viser, and a handle for the mouse.
+"""The viewer's process: it shows a scene in a web browser with viser, and offers a handle for the mouse.
 
-Whoever reaches the page moves the hand. So the server listens on this machine only, and answers only those who name
-it as this machine (Host), know the random word in its address and, to open the web socket, come from its own page
-(Origin): another website that the browser has open can make it call here, but not with these three.
+Everybody who can open the page can move the hand. Therefore the server listens on this machine only. It answers a
+request only if the Host header names this machine and the address contains the random token; a web socket must also
+come from the server's own page (Origin header). Other websites in the same browser cannot meet these conditions.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
 
 
 def show_in_browser(name: str, numbers: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
-    """What the viewer's process does: serve the page of memory `name` until the loop's process is gone."""
+    """Serve the scene (in the viewer's process) with poses from shared memory `name` until the loop's process ends."""
     os.nice(_POLITENESS)
     parent = os.getppid()
     show(Window.opened(name, numbers), scene, port, ready, lambda: os.getppid() == parent)
 
 
 def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection, wanted: Callable[[], bool]) -> None:
-    """Serve the scene until nobody wants it any more; send the address when a browser can come."""
+    """Serve the scene while `wanted` returns True; send the address through `ready` once the server is running."""
     import viser
 
     # A browser opens connections that it never uses: a traceback each, were they logged where nobody has set up a log.
@@ -75,12 +75,14 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
 
 @contextmanager
 def _guarded(token: str) -> Iterator[None]:
-    """Let the server that viser starts inside refuse every request that is not `allowed`; viser has no way to say so.
+    """Make the server that viser starts inside this context refuse every request that is not `allowed`.
+
+    Viser has no option for this, so the start function of its websockets library is replaced meanwhile.
 
     Raises
     ------
     RuntimeError
-        It was started in another way, by another version of viser: it must not serve unguarded.
+        This version of viser started its server in another way, so that requests would not be checked.
     """
     from websockets.asyncio import server
 
@@ -106,7 +108,7 @@ def _guarded(token: str) -> Iterator[None]:
 
 
 def allowed(path: str, headers: Any, port: int, token: str) -> bool:
-    """Whether a request is for this machine, knows the token and, as a web socket, comes from our own page."""
+    """Return whether a request names this machine, has the token and, for a web socket, comes from the own page."""
     names = [[f"{host}:{port}"] for host in (HOST, "localhost")]
     origins = [[f"http://{name}"] for [name] in names] + ([] if headers.get_all("Upgrade") else [[]])
     word = path.partition("?")[0].split("/")[1:2]
@@ -127,7 +129,7 @@ def _draw(server: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _look(server: Any, scene: Mapping[str, Any]) -> None:
-    """Planar scenes from the front, scenes in space from aside; up is against gravity."""
+    """Set the camera: planar scenes from the front, scenes in space from the side; up is opposite to gravity."""
     low, high = extent(scene)
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     up = np.array([0.0, -1.0, 0.0] if is_turned(scene) else [0.0, 1.0, 0.0])
@@ -143,7 +145,7 @@ def _look(server: Any, scene: Mapping[str, Any]) -> None:
 
 
 class _Mouse:
-    """The handle: it stays with the tool until the mouse takes it, and then the tool is pulled after it."""
+    """The handle: it follows the tool until the mouse drags it; then it is the target to which the tool is pulled."""
 
     def __init__(self, server: Any, scene: Mapping[str, Any]) -> None:
         self.target: Floats | None = None
@@ -160,7 +162,7 @@ class _Mouse:
         server.on_client_disconnect(self._gone)
 
     def target_at(self, now: float) -> Floats | None:
-        """Where the mouse wants the hand; None once nobody has moved it for HOLD_SECONDS."""
+        """Return the target of the mouse; None if the mouse has not moved the handle for HOLD_SECONDS."""
         if now - self._moved_at > HOLD_SECONDS:
             self.target = None
         return self.target
@@ -173,6 +175,6 @@ class _Mouse:
         self.target = None  # a mouse that nobody moves any more holds nothing
 
     def follow(self, pose: Floats) -> None:
-        """Put the handle where the hand holds the tool, unless the mouse has it."""
+        """Move the handle to the held point of the tool, unless the mouse holds the handle."""
         if self._handle is not None and self.target is None:
             self._handle.position = held_point(self._scene, pose)

@@ -1,8 +1,8 @@
-"""How many rows an impact may use in the time that is left: the anytime resolver on a deadline.
+"""Row budgets: how many rows an impact may use in the time before the deadline (anytime resolver).
 
-The resolver takes the most violated row first, and whatever prefix of its work is done is passive (paper section V),
-so stopping early costs accuracy only. What a row takes is measured before the loop starts; what a step takes besides
-is the most that it took of late. The budgets given are recorded, so that a run can be done again exactly.
+The resolver takes the most violated row first. After each row the result is passive (paper section V), so stopping
+early reduces only the accuracy. The time per row is measured before the loop starts. The time of the rest of a step is
+estimated by its recent maximum. The budgets are recorded, so that a run can be repeated exactly.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ _CHEAPEST_ROW = 1e-8  # [s] a few dozen operations: less is what is left of nois
 
 
 class RowCost(NamedTuple):
-    """What a step takes [s]: `fixed`, and `per_row` for each row that an impact uses."""
+    """The time of a step [s]: `fixed`, plus `per_row` for each row that an impact uses."""
 
     fixed: float
     per_row: float
 
 
 class RowBudget:
-    """Turns time left into rows.
+    """Converts the remaining time into a number of rows.
 
     Parameters
     ----------
     cost : RowCost
     period : float [s]
-    dofs : rows that are never exceeded, for more cannot be independent.
-    islands : impacts that a step can have; the rows are shared out evenly among them.
+    dofs : largest number of rows of an impact, because more rows cannot be independent.
+    islands : largest number of impacts in a step; the rows are distributed evenly among them.
     """
 
     def __init__(self, cost: RowCost, period: float, dofs: int, islands: int) -> None:
@@ -45,20 +45,20 @@ class RowBudget:
         self._reserve, self._dofs, self._islands = _RESERVE * period, dofs, max(islands, 1)
 
     def rows(self, left: float) -> int:
-        """Return how many rows each impact may use where `left` [s] are left; at least the most violated one."""
+        """Return how many rows each impact may use in the remaining time `left` [s]; at least one row."""
         spare = left - self.fixed - self._reserve
         if spare >= self.per_row * self._dofs:
             return self._dofs
         return int(max(1, min(self._dofs, spare / self.per_row / self._islands)))
 
     def learn(self, seconds: float, rows: int) -> None:
-        """Take note of a step that took `seconds` and used `rows` rows."""
+        """Update the estimate of the fixed time with a step that took `seconds` and used `rows` rows."""
         fixed = seconds - self.per_row * rows
         self.fixed = max(fixed, self.fixed + _FORGETTING * (fixed - self.fixed))
 
 
 def calibrated(simulation: Simulation, period: float) -> RowBudget:
-    """Measure what a row takes on this machine in an impact as large as the scene can have."""
+    """Measure the time per row on this machine, in an impact of the largest size that is possible in the scene."""
     dofs = simulation.system.mechanism.nv
     count = int(np.clip(simulation.system.capacity, 1, _ROWS))
     cost = RowCost(0.0, _seconds_per_row(dofs, count))
@@ -66,7 +66,7 @@ def calibrated(simulation: Simulation, period: float) -> RowBudget:
 
 
 def _seconds_per_row(dofs: int, count: int) -> float:
-    """Slope of the time of one impact over the rows that it may use, by the fastest of some repetitions."""
+    """Return the time of an impact per additional row, from the fastest of some repetitions."""
     random = np.random.default_rng(0)
     rows, velocity = random.normal(size=(count, dofs)), random.normal(size=dofs)
     budgets = np.unique([1, min(dofs, count)])

@@ -1,11 +1,10 @@
-"""Deadlines of a loop at a fixed rate: when each tick was due, began and ended, and what a miss did.
+"""Deadlines of a loop at a fixed rate: when each tick was due, began and ended, and the effect of missed deadlines.
 
-A tick that ends after the next one was due has missed its deadline. Then the next tick begins at once and all later
-ones are due that much later: simulated time never jumps and never hurries, so that no step is left out and no two are
-crammed into the time of one, which the hand would feel as a blow. It falls behind the clock instead, and this is
-recorded: `Timetable.behind`.
+A tick that ends after the next one is due misses its deadline. Then the next tick begins at once, and all later ticks
+are postponed by the same delay. So no step is left out, and two steps never run in the time of one, which the hand
+would feel as a jerk. Instead, simulated time falls behind the clock, and `Timetable.behind` records by how much.
 
-The clock is asleep until shortly before an instant, and then watches for it.
+To wait for an instant, the clock sleeps until shortly before it, and then polls the time.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
 
 class Timetable(NamedTuple):
-    """What happened at n ticks; times in seconds since the first was due."""
+    """The times of n ticks, in seconds since the first tick was due, with their row budgets and wrenches."""
 
     period: float
     due: Floats  # (n,)
@@ -33,35 +32,35 @@ class Timetable(NamedTuple):
 
     @property
     def work(self) -> Floats:
-        """(n,) Time that each tick's work took."""
+        """Return the duration of each tick's work (n,) [s]."""
         return self.end - self.start
 
     @property
     def lateness(self) -> Floats:
-        """(n,) Time from due to begun: what the operating system and other programs cost."""
+        """Return the delay of each tick's start (n,) [s], which the operating system and other programs cause."""
         return self.start - self.due
 
     @property
     def missed(self) -> NDArray[np.bool_]:
-        """(n,) Whether the tick ended after the next one was due."""
+        """Return whether each tick (n,) ended after the next one was due."""
         return self.end > self.due + self.period
 
     @property
     def behind(self) -> float:
-        """Seconds by which simulated time fell behind the clock in all."""
+        """Return the total time [s] by which simulated time fell behind the clock."""
         late = self.end - (self.due + self.period)
         return float(late[self.missed].sum())
 
 
 class Deadlines:
-    """The timetable in the making, written without allocating anything.
+    """Records a timetable during the loop, without allocating memory.
 
     Parameters
     ----------
     period : float [s]
-    ticks : how many there can be.
-    first : float [s], the clock's time when the first one is due.
-    kept : so many of the last ticks are kept; default: all.
+    ticks : largest number of ticks.
+    first : float [s], clock time when the first tick is due.
+    kept : number of the last ticks that are kept; default: all.
     """
 
     def __init__(self, period: float, ticks: int, first: float, kept: int | None = None) -> None:
@@ -70,33 +69,33 @@ class Deadlines:
         self._rows = np.zeros((ticks if kept is None else kept, TICK_COLUMNS))
 
     def left(self, now: float) -> float:
-        """Time that the tick at hand may still take [s]."""
+        """Return the time [s] before the deadline of the current tick."""
         return self.due + self.period - now
 
     def note(self, budget: int, wrench: Floats) -> None:
-        """Keep what the step at hand was given: with this it can be done again."""
+        """Record the inputs of the current step, so that it can be repeated."""
         row = self._rows[self.done % len(self._rows)]
         row[3], row[4:] = budget, wrench
 
     def close(self, start: float, end: float) -> None:
-        """Enter a tick; the next one is due a period later or, after a miss, now."""
+        """Record the times of a tick; the next one is due a period later or, after a missed deadline, at `end`."""
         row = self._rows[self.done % len(self._rows)]
         row[0], row[1], row[2] = self.due - self.first, start - self.first, end - self.first
         self.done += 1
         self.due = max(self.due + self.period, end)
 
     def timetable(self, ticks: int) -> Timetable:
-        """The first `ticks` ticks."""
+        """Return the timetable of the first `ticks` ticks."""
         return timetable_of(self.period, self.rows(0, ticks))
 
     def rows(self, first: int, count: int) -> Floats:
-        """Return (count, TICK_COLUMNS) of the ticks from number `first` on: due, start, end, rows allowed, wrench."""
+        """Return rows (count, TICK_COLUMNS) from tick number `first` on: due, start, end, row budget, wrench (6)."""
         found: Floats = self._rows[np.arange(first, first + count) % len(self._rows)]
         return found
 
 
 def timetable_of(period: float, rows: Floats) -> Timetable:
-    """Return the timetable in rows of `Deadlines`."""
+    """Return the timetable that rows of `Deadlines` describe."""
     due, start, end, budget = rows[:, :4].T.copy()
     return Timetable(period, due, start, end, budget.astype(np.int64), rows[:, 4:].copy())
 
@@ -105,18 +104,18 @@ _EDGES = np.geomspace(1e-9, 1e5, 32_001)  # [s]; a thousandth apart
 
 
 class Spread:
-    """Times, any number of them, counted in bins: in constant memory, each to a thousandth of itself."""
+    """A histogram of any number of times, in constant memory and with a relative resolution of 1e-3."""
 
     def __init__(self) -> None:
         self._counts, self._worst = np.zeros(len(_EDGES) + 1, np.int64), 0.0
 
     def add(self, seconds: Floats) -> None:
-        """Count some times [s]."""
+        """Add times [s] to the histogram."""
         self._counts += np.bincount(np.searchsorted(_EDGES, seconds), minlength=len(self._counts))
         self._worst = max(self._worst, float(seconds.max(initial=0.0)))
 
     def percentiles(self) -> tuple[float, ...]:
-        """Return the times [s] at `PERCENTILES`, by the upper ends of their bins; the last is the worst, exactly."""
+        """Return the times [s] at `PERCENTILES`: upper ends of bins, except the last, which is the exact maximum."""
         below = np.cumsum(self._counts)
         bins = np.searchsorted(below, np.array(PERCENTILES) / 100.0 * below[-1])
         return tuple(min(float(_EDGES[min(each, len(_EDGES) - 1)]), self._worst) for each in bins[:-1]) + (self._worst,)
@@ -127,19 +126,19 @@ SPIN_SECONDS = 1e-4
 
 
 class Clock(Protocol):
-    """Anything that tells the time and waits; tests bring one of their own."""
+    """The interface of a clock, which tells the time and waits; tests use their own clock."""
 
     def now(self) -> float:
         """Return the time [s]; it never goes back."""
         ...
 
     def wait_until(self, instant: float) -> None:
-        """Return at `instant` [s] or, where that has passed, at once."""
+        """Return at `instant` [s], or at once if it has passed."""
         ...
 
 
 class MonotonicClock:
-    """CLOCK_MONOTONIC: the same in all processes of this machine, and nobody can set it."""
+    """CLOCK_MONOTONIC: it is the same in all processes of this machine, and it cannot be set."""
 
     def now(self) -> float:
         """Return the time [s] since some fixed instant."""

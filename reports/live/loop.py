@@ -2,11 +2,12 @@
 
     wait for the tick
         the device has moved meanwhile: read it, write the step that ends here
-        rows that the next step's impact may use, from the time left; where the hand pulls
+        compute the row budget of the next step from the time left, and read the hand's wrench
         begin the next step: coupling, contact law, the force goes to the device
-        publish where everything is, for whoever looks
+        publish the coordinates for the viewer
 
-Nothing in it waits for anybody: no lock, no file, no viewer, and Python's collector of garbage rests.
+The loop never waits for a lock or for the viewer. Python's garbage collector is off during the loop. Files are written
+only if enough time is left before the next tick.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ _TICKS_KEPT = 16 * 512  # more than the ticks of the chunks that wait
 
 
 class Audience(Protocol):
-    """Who looks on and may pull: must answer at once, whatever happens to the one behind it."""
+    """The interface of a viewer that may also pull the hand; its methods must return at once in any case."""
 
     def publish(self, q: Floats) -> None:
-        """Say where everything is."""
+        """Publish the coordinates q."""
         ...
 
     def pull(self, now: float) -> Floats:
@@ -51,7 +52,7 @@ class Audience(Protocol):
 
 @dataclass(frozen=True)
 class LiveRun:
-    """A run in real time, and its timetable; `device` says what device it had, empty = the compiled one."""
+    """A run in real time, and its timetable; `device` is the class of its device, empty = the compiled device."""
 
     run: Run
     timetable: Timetable
@@ -59,16 +60,16 @@ class LiveRun:
 
 
 class Loop:
-    """A simulation, paced.
+    """The real-time loop of a simulation.
 
     Parameters
     ----------
-    simulation : at its start; its step is the period of the ticks.
-    ticks : at most this many.
-    clock : default: this machine's.
-    budget : rows from the time left; None: always all.
-    audience : who looks on; None: nobody.
-    log : takes what is recorded while the loop is at work (`stream`); None: it is held in memory (`run`).
+    simulation : in its initial state; its time step is the period of the ticks.
+    ticks : largest number of ticks.
+    clock : default: the clock of this machine.
+    budget : computes the row budget from the time left; None: impacts use all rows.
+    audience : the viewer; None: no viewer.
+    log : receives the record during the loop (`stream`); None: the record stays in memory (`run`).
     """
 
     def __init__(self, simulation: Simulation, ticks: int, clock: Clock | None = None,
@@ -81,19 +82,19 @@ class Loop:
         self._interrupted = False
 
     def run(self, world: str = "") -> LiveRun:
-        """Do all ticks, or as many as there are before Ctrl-C or a failure: ``run.stopped`` says which.
+        """Run all ticks, or those before Ctrl-C or a failure; ``run.stopped`` gives the reason.
 
         Raises
         ------
         IapbError, KeyboardInterrupt
-            Stopped before the first step was done: there is nothing to return.
+            The loop was stopped before its first step was complete.
         """
         deadlines, stopped = self._paced(None)
         timetable = deadlines.timetable(self._tape.steps)
         return LiveRun(self._tape.run(world, stopped), timetable, name_of(self.simulation.link))
 
     def stream(self) -> str:
-        """Do all ticks as `run` does, into the log; return why they are not all done, "" where they are."""
+        """Run all ticks like `run`, but write them to the log; return why the loop stopped early, "" if it did not."""
         _, stopped = self._paced(_TICKS_KEPT)
         try:
             self._tape.write_log(all_of_it=True)
@@ -102,7 +103,7 @@ class Loop:
         return stopped
 
     def _paced(self, kept: int | None) -> tuple[Deadlines, str]:
-        """Do the ticks; return their timetable, of which the last `kept` are there, and what stopped them."""
+        """Run the ticks; return the timetable of the last `kept` ones, and why the loop stopped early."""
         stopped, dt = "", self.simulation.system.dt
         with self._until_interrupted(), _without_collector():
             deadlines = self._tape.deadlines = Deadlines(dt, self.ticks, self.clock.now() + dt, kept)
@@ -141,14 +142,14 @@ class Loop:
             self._tape.write_log()
 
     def _finish(self) -> None:
-        """End the step that is under way, and write it."""
+        """End the current step and record it."""
         if self._under_way:
             self._under_way = False
             self.simulation.end_step()
             self._tape.write()
 
     def _give(self, deadlines: Deadlines) -> None:
-        """Rows and hand of the next step; both are noted, so that the step can be done again."""
+        """Set the row budget and the hand's wrench of the next step; record both, so that it can be repeated."""
         simulation, now = self.simulation, self.clock.now()
         if self.budget is not None:
             self._rows = self.budget.rows(deadlines.left(now))
@@ -168,7 +169,7 @@ class Loop:
 
     @contextmanager
     def _until_interrupted(self) -> Iterator[None]:
-        """Ctrl-C ends the loop after the tick at hand; a step is never left half written."""
+        """Let Ctrl-C end the loop after the current tick, so that every recorded step is complete."""
         def stop(*_: Any) -> None:
             self._interrupted = True
 
@@ -185,7 +186,7 @@ class Loop:
 
 @contextmanager
 def _without_collector() -> Iterator[None]:
-    """Garbage is collected before and after, not in the middle of a step."""
+    """Collect garbage before the loop, and switch the collector off during the loop."""
     was_on = gc.isenabled()
     gc.collect()
     gc.disable()
@@ -197,18 +198,18 @@ def _without_collector() -> Iterator[None]:
 
 
 def name_of(link: Any) -> str:
-    """Return the class of a device of its own, "" where there is none."""
+    """Return the class name of the link's Python device; "" without a link."""
     return "" if link is None else f"{type(link.device).__module__}:{type(link.device).__qualname__}"
 
 
 class Tape:
-    """Lines of a `Recorder`, with the next chunk made beforehand, while there is time.
+    """Records steps in chunks of a `Recorder`, and allocates the next chunk in advance when there is time.
 
     Parameters
     ----------
-    simulation : at its start.
-    steps : how many there can be.
-    log : takes the chunks that are full, with their ticks of `deadlines`; None: the recorder holds them.
+    simulation : in its initial state.
+    steps : largest number of steps.
+    log : receives the full chunks, with their ticks from `deadlines`; None: the recorder keeps them.
     """
 
     def __init__(self, simulation: Simulation, steps: int, log: RunLog | None = None) -> None:
@@ -223,11 +224,11 @@ class Tape:
 
     @property
     def steps(self) -> int:
-        """Steps written."""
+        """Return the number of recorded steps."""
         return self._recorder.steps + self._line
 
     def write(self) -> None:
-        """Write the step that the simulation has just ended."""
+        """Record the step that the simulation has just ended."""
         if self._line == self._size:
             self._keep()
             self._record, self._size = self._spare or self._recorder.blank(self._total)
@@ -236,20 +237,20 @@ class Tape:
         self._line += 1
 
     def add_time(self, seconds: float) -> None:
-        """Work of a tick, for the run's own timings."""
+        """Add the working time of a tick to the timings of the run."""
         self._seconds += seconds
 
     @property
     def wants_spare(self) -> bool:
-        """Whether the next chunk should be made soon."""
+        """Return whether the next chunk should be allocated soon."""
         return self._spare is None and 2 * self._line > self._size and self._recorder.steps + self._size < self._total
 
     def make_spare(self) -> None:
-        """Make the next chunk; some tenths of a millisecond, so not while a tick is due."""
+        """Allocate the next chunk. This takes some tenths of a millisecond; call it only if no tick is due then."""
         self._spare = self._recorder.blank(self._total - self._size)
 
     def run(self, world: str, stopped: str) -> Run:
-        """Everything written so far as a Run."""
+        """Return everything recorded so far as a Run."""
         self._keep()
         return self._recorder.run(world, stopped)
 
@@ -265,11 +266,11 @@ class Tape:
 
     @property
     def wants_log(self) -> bool:
-        """Whether a full chunk waits for the log."""
+        """Return whether a full chunk is waiting to be written to the log."""
         return bool(self._waiting)
 
     def write_log(self, *, all_of_it: bool = False) -> None:
-        """Write the oldest chunk that waits; or all of them, and what there is of the next one."""
+        """Write the oldest waiting chunk to the log; with `all_of_it` all chunks, including the unfinished one."""
         if all_of_it:
             self._keep()
         while self._waiting and self._log is not None and self.deadlines is not None:

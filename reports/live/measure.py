@@ -1,4 +1,4 @@
-"""A scene made ready for a live run (rate, world, device), and paced runs in numbers for whoever measures."""
+"""Prepare a scene for a live run (rate, world, device), and measure how a live run keeps its rate."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -
 
     Parameters
     ----------
-    scene : its own rate is replaced.
+    scene : Scene; its own rate is replaced.
     world : law and coupling, see `reference.worlds`.
     rate : float [1/s]
-    device : ``module:factory`` of a device of one's own, ``simulated``, or empty for the compiled one.
+    device : ``module:factory`` of a user's device, ``simulated``, or empty for the compiled device.
     """
     scene = scene.with_values({"rate": rate})
     made = made_device(device, scene)
@@ -48,7 +48,7 @@ def made_device(name: str, scene: Scene) -> Device | None:
     Raises
     ------
     ArgumentError
-        There is no such factory, or what it makes is no device.
+        There is no such factory, or it does not return a device.
     """
     if not name:
         return None
@@ -66,7 +66,7 @@ def made_device(name: str, scene: Scene) -> Device | None:
 
 @dataclass(frozen=True)
 class Pace:
-    """How a scene kept to a rate; times at the percentiles of `reports.live.deadline.PERCENTILES` [s]."""
+    """How a live run kept its rate; times [s] at the percentiles of `reports.live.deadline.PERCENTILES`."""
 
     scene: str
     rate: float  # [1/s]
@@ -81,12 +81,12 @@ class Pace:
 
 
 def simulated_device(scene: Scene) -> SimulatedDevice:
-    """Return the Python twin of a scene's compiled device: its inertia, damping, delay, sensors and limits.
+    """Return the Python version of a scene's compiled device: its inertia, damping, delay, sensors and limits.
 
     Raises
     ------
     ArgumentError
-        A scene without a hand, or a tool whose mass matrix is not constant: only the compiled device has such.
+        The scene has no hand, or the tool's mass matrix is not constant, which only the compiled device supports.
     """
     system = System(scene)
     if system.tool_tree < 0:
@@ -105,16 +105,16 @@ def simulated_device(scene: Scene) -> SimulatedDevice:
 
 def pace(scene: Scene, rate: float, seconds: float, *, world: str = "IAPB", budgeted: bool = True,
          clock: Clock | None = None) -> Pace:
-    """Run a scene for some seconds of real time at a rate, and say how it went.
+    """Run a scene for some seconds of real time at a rate, and return how it kept the rate.
 
     Parameters
     ----------
     scene : Scene; its own rate is replaced by `rate`.
     rate : float [1/s]
-    seconds : float [s] of simulated and, without misses, of real time.
+    seconds : float [s] of simulated time, and of real time if no deadline is missed.
     world : one of `reference.worlds.WORLDS`.
-    budgeted : whether impacts get the rows that the time left allows, or all.
-    clock : default: this machine's.
+    budgeted : whether the time left limits the rows of an impact; otherwise impacts use all rows.
+    clock : default: the clock of this machine.
     """
     simulation = live_simulation(scene, find_world(world), rate)
     budget = calibrated(simulation, simulation.system.dt) if budgeted else None
@@ -123,14 +123,14 @@ def pace(scene: Scene, rate: float, seconds: float, *, world: str = "IAPB", budg
 
 
 def summary(live: LiveRun) -> Pace:
-    """The numbers of a live run."""
+    """Return the measured numbers of a live run."""
     tally = Tally()
     tally.add(live.run, live.timetable)
     return tally.pace()
 
 
 class Tally:
-    """The numbers of a live run that comes in parts, in constant memory."""
+    """Collects the numbers of a live run that is given in parts, in constant memory."""
 
     def __init__(self) -> None:
         self._scene, self._period, self._ticks, self._behind = "", 1.0, 0, 0.0
@@ -139,7 +139,7 @@ class Tally:
         self._least: int | None = None
 
     def add(self, run: Run, table: Timetable) -> None:
-        """Count a part of the run and the ticks that it is of."""
+        """Add a part of the run and the ticks of this part."""
         impacts = run.impacts
         given = table.budget[impacts.step[:] - self._ticks]
         short = (impacts.rank[:] >= given) & (given < run.v.shape[1])
@@ -154,7 +154,7 @@ class Tally:
         self._behind += table.behind
 
     def pace(self) -> Pace:
-        """Return what was counted."""
+        """Return the numbers of all parts."""
         return Pace(self._scene, 1.0 / self._period, self._ticks, self._work.percentiles(),
                     self._lateness.percentiles(), self._missed, self._behind, self._collisions, self._least or 0,
                     self._left_out)  # fmt: skip

@@ -1,7 +1,7 @@
-"""A scene as triangles for a browser, and where its bodies are at a pose that the engine tells.
+"""A scene as triangles for a browser, and the placements of its bodies at a pose from the engine.
 
-Planar scenes are drawn in the plane z = 0, their shapes as thick as a tenth of the scene. Quaternions here are w, x,
-y, z, as the viewer has them.
+Planar scenes are drawn in the plane z = 0; their shapes are a tenth of the scene's size thick. Quaternions here are w,
+x, y, z, as in the viewer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _RINGS = 12
 
 
 class Piece(NamedTuple):
-    """Triangles of one shape, in the frame of its body; ``""``: the world's."""
+    """Triangles of one shape, in the frame of its body; body ``""`` is the world."""
 
     body: str
     vertices: Floats  # (n, 3) [m]
@@ -47,7 +47,7 @@ def placements(scene: Mapping[str, Any], pose: Floats) -> dict[str, tuple[Floats
 
 
 def held_point(scene: Mapping[str, Any], pose: Floats) -> Floats | None:
-    """Return where the hand holds the tool (3,) [m]; None in a scene without a hand."""
+    """Return the point (3,) [m] at which the hand holds the tool; None in a scene without a hand."""
     hand = scene.get("hand")
     if hand is None:
         return None
@@ -55,7 +55,7 @@ def held_point(scene: Mapping[str, Any], pose: Floats) -> Floats | None:
 
 
 def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
-    """Return the lower and upper corner (3,) of everything that has an end, at the start."""
+    """Return the lower and upper corner (3,) [m] of all bounded shapes in the initial state."""
     places = geometry.body_placements(scene)
     points = [place.origin[None] for place in places.values()]
     for piece in _pieces({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0):
@@ -80,7 +80,7 @@ def _pieces(scene: Mapping[str, Any], size: float) -> Iterator[Piece]:
 
 
 def _extruded(name: str, corners: Floats, thickness: float) -> Piece:
-    """A prism over a convex outline, its middle at z = 0."""
+    """Return a prism over a convex outline, centred at z = 0."""
     x, y = corners[:, 0], corners[:, 1]
     if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
         corners = corners[::-1]
@@ -99,7 +99,7 @@ def _corners(size: Any) -> Floats:
 
 
 def _slab(wall: Mapping[str, Any], reach: float) -> Piece:
-    """What stands for everything behind a plane: a plate under it."""
+    """Return a plate below a plane; it represents the half-space behind the plane."""
     normal = np.asarray(wall["normal"], dtype=float)
     normal = normal / np.linalg.norm(normal)
     along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
@@ -111,7 +111,7 @@ def _slab(wall: Mapping[str, Any], reach: float) -> Piece:
 
 
 def _ball(name: str, center: Floats, radius: float) -> Piece:
-    """A globe of latitudes and longitudes."""
+    """Return a sphere with vertices on circles of latitude and longitude."""
     latitude, longitude = np.linspace(0.0, np.pi, _RINGS + 1), np.linspace(0.0, 2.0 * np.pi, 2 * _RINGS + 1)[:-1]
     t, p = np.meshgrid(latitude, longitude, indexing="ij")
     vertices = center + radius * np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)

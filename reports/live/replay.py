@@ -1,4 +1,4 @@
-"""A live run in two files, the run and its timetable; and done again from them: the same bits, without the clock."""
+"""Store a live run in two files (run and timetable), and repeat it from them, bit for bit and without the clock."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _timetable_of(run: Path) -> Path:
 
 
 def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks: int) -> RunLog:
-    """Return the log of a live run that is to become ``name.h5``; the folder becomes a store, so that repair acts."""
+    """Return the log of a live run that will become ``name.h5``; mark the folder as a store, so that repair works."""
     mark_store(folder)
     start = {name: values.tolist() for name, values in Recorder(simulation).start.items()}
     more = {"device": name_of(simulation.link), "period": simulation.system.dt, "start": start}
@@ -49,12 +49,12 @@ def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks:
 
 
 def finish_live(log: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path, Pace]:
-    """Write the run and the timetable in a log to their files, in constant memory; return both, and their numbers.
+    """Write the run and the timetable in a log to their files, in constant memory; return both and the measured pace.
 
     Raises
     ------
     RunFileError
-        Fewer ticks than `ticks` are whole in the log.
+        The log has fewer complete ticks than `ticks`.
     """
     head, _ = read_log(log)
     told, rows, tally = head["live"], list[Any](), Tally()
@@ -77,12 +77,12 @@ def finish_live(log: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path, Pa
 
 
 def is_live(log: Path) -> bool:
-    """Whether a log is one of a live run."""
+    """Return whether a log belongs to a live run."""
     return "live" in read_log(log)[0]
 
 
 def read_live(path: Path | str) -> LiveRun:
-    """Read a live run back from its two files; `path` is that of the run."""
+    """Read a live run from its two files; `path` is the file of the run."""
     path = Path(path)
     return LiveRun(read_run(path), *_timetable_and_device(path))
 
@@ -124,32 +124,32 @@ def _device_in(session: Table) -> str:
 
 
 class RecordedDevice:
-    """The device of a run: it was where it was, whatever it is told."""
+    """The device of a recorded run: it replays the recorded positions and ignores forces."""
 
     def __init__(self, run: Run) -> None:
         self._run, self._step = run, 0
 
     def read(self) -> DeviceReading:
-        """Return the reading that the run has at this instant."""
+        """Return the reading that was recorded for the current step."""
         return DeviceReading(self._run.device_q[self._step], self._run.device_v[self._step])
 
     def apply(self, force: ArrayLike) -> None:
-        """Let a step pass."""
+        """Advance to the next step; the force is ignored."""
         self._step += 1
 
 
 def replay(live: LiveRun) -> Run:
-    """Simulate a live run again with its budgets, its hand and, where it had one of its own, its device's readings.
+    """Simulate a live run again with its row budgets, its wrenches and, for a Python device, its recorded readings.
 
     Returns
     -------
     Run
-        With the content hash of ``live.run``, however late any of its ticks was.
+        It has the content hash of ``live.run``, also if ticks were late.
 
     Raises
     ------
     ArgumentError
-        Its law or coupling is not one of ours (`reports.resimulate`).
+        The law or coupling is not one of the project's (`reports.resimulate`).
     """
     run, timetable = live.run, live.timetable
     device = RecordedDevice(run) if live.device else None

@@ -1,9 +1,9 @@
-"""The scene in a browser at about 30 Hz, from a process of its own: the paper's graphics computer.
+"""The scene in a browser at about 30 Hz, shown by a separate process (the graphics computer in the paper).
 
-The loop only writes poses into a shared page and reads where the mouse wants the hand (`reports.live.window`).
-The viewer's process starts Python anew, so that it shares nothing else with the loop, and runs at lower priority.
+The loop only writes poses to a shared memory and reads the mouse's target for the hand (`reports.live.window`). The
+viewer's process is a new Python process, so it shares nothing else with the loop. It runs at lower priority.
 
-The mouse is the hand: a spring from the held point to where the mouse is, with a limited force.
+The mouse acts as the hand: a spring with limited force pulls the held point to the position of the mouse.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _ACCELERATION = 1.0  # [m/s²] that the largest force gives the tool, on top of 
 class SpringHand:
     """Pulls the held point towards a target: F = k (target − x) − b ẋ, with |F| limited and b critical.
 
-    k, b and the limit follow from the smallest effective mass at the held point, 1 / λ_max(J M⁻¹ Jᵀ): so the spring
-    is slow beside the step in any direction.
+    k, b and the limit follow from the smallest effective mass at the held point, 1 / λ_max(J M⁻¹ Jᵀ). Therefore the
+    spring is slow compared to the time step in every direction.
 
     Parameters
     ----------
-    simulation : whose scene has a hand.
+    simulation : a simulation of a scene with a hand.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -50,11 +50,11 @@ class SpringHand:
         self._last: Floats | None = None
 
     def point(self) -> Floats:
-        """Where the hand holds the tool (3,) [m]."""
+        """Return the point (3,) [m] at which the hand holds the tool."""
         return _held_point(self._simulation)
 
     def wrench(self, target: Floats | None) -> Floats:
-        """Return the scene's own wrench (6,) and, where there is a target (3,) [m], the spring's force."""
+        """Return the wrench (6,) of the scene's hand, plus the spring's force if there is a target (3,) [m]."""
         wrench = self._own.copy()
         if target is None:
             self._last = None
@@ -78,7 +78,7 @@ def _held_point(simulation: Simulation) -> Floats:
 
 
 def _effective_mass(simulation: Simulation) -> float:
-    """Smallest mass that the held point shows in any direction [kg]."""
+    """Return the smallest effective mass of the held point over all directions [kg]."""
     mechanism, q, port = simulation.system.mechanism, simulation.state.q, simulation.port
     jacobian = mechanism.point_jacobian(q, port.hand_body, _held_point(simulation))
     mobility = jacobian @ np.linalg.solve(mechanism.mass_matrix(q), jacobian.T)
@@ -90,12 +90,12 @@ _END_SECONDS = 3.0
 
 
 class Viewer:
-    """A process that shows a simulation, and the hand that it moves: the loop's `Audience`.
+    """The `Audience` of the loop: a process that shows a simulation and lets the mouse pull the hand.
 
     Parameters
     ----------
-    simulation : what is shown.
-    port : of the web server; the next free one where it is taken.
+    simulation : the simulation to show.
+    port : port of the web server; if it is taken, the next free port is used.
     """
 
     def __init__(self, simulation: Simulation, port: int = 8080) -> None:
@@ -109,7 +109,7 @@ class Viewer:
         self.process: Any = None
 
     def start(self) -> str:
-        """Start the process and return the address that it serves, which is secret; raise IapbError if it does not."""
+        """Start the process and return its secret address; raise IapbError if the process does not start."""
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self.window.name, self.window.numbers, self._scene, self._port, theirs)
@@ -126,21 +126,21 @@ class Viewer:
         raise IapbError("the viewer did not start; without --view the loop needs none")
 
     def publish(self, q: Floats) -> None:
-        """Say where everything is."""
+        """Write the poses at q to the shared memory."""
         self.window.publish(self._pose(q))
 
     def _pose(self, q: Floats) -> Floats:
         return self._mechanism.poses(q[None], self._planar).ravel()
 
     def pull(self, now: float) -> Floats:
-        """Return the wrench (6,) of the hand: the scene's own, and the mouse's while it holds the handle."""
+        """Return the wrench (6,) of the hand: that of the scene, plus that of the mouse while it holds the handle."""
         if self._hand is None:
             return self._own
         self._target = self.window.target(now, self._target)
         return self._hand.wrench(self._target)
 
     def stop(self) -> None:
-        """End the process, whatever it is doing, and give the page back."""
+        """End the process, by force if necessary, and release the shared memory."""
         if self.process is not None and self.process.is_alive():
             self.process.terminate()
             self.process.join(_END_SECONDS)

@@ -1,11 +1,11 @@
-"""What the loop and its viewer share: a page of memory that either may read while the other writes, without a lock.
+"""The shared memory of the loop and its viewer; either process may read while the other writes, without a lock.
 
-Each half has a sequence number, odd while its one writer is at work: the reader takes what it read only if the number
-was even and the same before and after. The loop tries once and goes on; only the viewer tries again. So a viewer that
-sleeps, hangs or dies, even in the middle of writing, costs the loop nothing; after `SILENCE_SECONDS` without a sign of
-life from it the hand lets go.
+Each half has one writer and a sequence number, which is odd during a write. A reader uses its data only if the number
+was even and did not change during the read. The loop tries once and continues; only the viewer tries again. So a
+viewer that sleeps, hangs or dies, even during a write, does not delay the loop. If the viewer does not write for
+`SILENCE_SECONDS`, the hand lets go.
 
-(Stores become visible in the order in which they are made: so it is on x86, and Python makes each one whole.)
+(This requires that writes become visible in program order, as on x86, and that each number is written atomically.)
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _WISHES = 5
 
 
 class Window:
-    """The shared page; make it with `made`, open it in the other process with `opened`."""
+    """The shared memory; create it with `made`, open it in the other process with `opened`."""
 
     def __init__(self, memory: SharedMemory, numbers: int, owner: bool) -> None:
         self._memory, self._owner, self.numbers = memory, owner, numbers
@@ -37,7 +37,7 @@ class Window:
 
     @classmethod
     def made(cls, numbers: int) -> Window:
-        """Make a page for poses of so many numbers; the maker closes it for all."""
+        """Create a shared memory for poses of `numbers` numbers; its creator removes it on `close`."""
         size = _WORD * (_HEAD + _WISHES + numbers)
         window = cls(SharedMemory(create=True, size=size), numbers, owner=True)
         window._sequence[:] = 0
@@ -47,26 +47,26 @@ class Window:
 
     @classmethod
     def opened(cls, name: str, numbers: int) -> Window:
-        """Open the page that another process has made."""
+        """Open the shared memory that another process has created."""
         return cls(SharedMemory(name), numbers, owner=False)
 
     @property
     def name(self) -> str:
-        """What the other process opens it by."""
+        """Return the name by which the other process opens the shared memory."""
         return self._memory.name
 
     # the loop's side
 
     def publish(self, pose: Floats) -> None:
-        """Write where everything is."""
+        """Write the current pose."""
         self._sequence[_SHOWN] += 1
         self._pose[:] = pose
         self._sequence[_SHOWN] += 1
 
     def target(self, now: float, before: Floats | None) -> Floats | None:
-        """Return where the hand should be (3,), None where it holds nothing or nobody has been there of late.
+        """Return the target of the hand (3,) [m]; None if the mouse holds nothing or the viewer is silent.
 
-        While the viewer writes, the answer is that of `before`.
+        While the viewer is writing, return `before`.
         """
         sequence = int(self._sequence[_WANTED])
         wishes = self._wishes.copy()
@@ -79,7 +79,7 @@ class Window:
     # the viewer's side
 
     def shown(self) -> Floats | None:
-        """Return the last pose published whole; None: the loop is gone, in the middle of writing."""
+        """Return the last complete pose; None if the loop died during a write."""
         for _ in range(_ATTEMPTS):
             sequence = int(self._sequence[_SHOWN])
             pose = self._pose.copy()
@@ -88,7 +88,7 @@ class Window:
         return None
 
     def want(self, target: Floats | None, now: float) -> None:
-        """Write where the hand should be (3,), None: it lets go; also the viewer's sign of life."""
+        """Write the target of the hand (3,) [m], or None to let go; the time `now` shows that the viewer is alive."""
         self._sequence[_WANTED] += 1
         self._wishes[_HELD], self._wishes[_BEAT] = float(target is not None), now
         if target is not None:
@@ -96,7 +96,7 @@ class Window:
         self._sequence[_WANTED] += 1
 
     def close(self) -> None:
-        """Give the page back; nobody may use it after its maker has closed it."""
+        """Release the shared memory; no process may use it after its creator has closed it."""
         del self._sequence, self._wishes, self._pose
         self._memory.close()
         if self._owner:

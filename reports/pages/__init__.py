@@ -1,1 +1,1 @@
-"""The pages of the report: records in, HTML out."""
+"""The pages of the report: convert records to HTML."""

@@ -1,4 +1,4 @@
-"""Put records and figures into the templates: the first page and one for each section; each needs nothing else."""
+"""Fill the templates with records and figures: a first page and one page for each section, all self-contained."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ FINDINGS = dict(
 
 
 def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dict[str, str]:
-    """Return the report: the HTML of the first page and of each section's, by their files' names.
+    """Return the report: the HTML of the first page and of each section, by file name.
 
     Parameters
     ----------
     evidence
-        What there is to show; what is not there is printed as "not computed in this run".
+        The evidence to show; missing evidence is printed as "not computed in this run".
     recipes
-        The figures; by default all of ours.
+        The recipes of the figures; by default all figures of the project.
 
     Returns
     -------
     dict
-        FIRST_PAGE first; every page links to the others, and needs no network and no script.
+        FIRST_PAGE is the first key. Every page links to the others and needs neither network nor script.
     """
     inputs = figure_inputs(evidence)
     figures: dict[str, list[Figure | NotComputed]] = {}
@@ -77,12 +77,12 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
 
 
 def link_across(pages: Mapping[str, str]) -> dict[str, str]:
-    """Turn each link to an id that another page has, ``href="#C10"``, into one to that page.
+    """Change each link to an id on another page, such as ``href="#C10"``, to a link to that page.
 
     Raises
     ------
     KeyError
-        If no page has the id.
+        No page has the id.
     """
     ids = {name: frozenset(re.findall(r'\sid="([^"]+)"', page)) for name, page in pages.items()}
     home = {id: name for name in reversed(list(pages)) for id in ids[name]}
@@ -99,7 +99,7 @@ def link_across(pages: Mapping[str, str]) -> dict[str, str]:
 
 
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
-    """Return everything that figures may ask for, by name: runs, scenes, and the tables among the evidence."""
+    """Return all possible inputs of figures by name: runs, scenes, and the tables of claims and topics."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
     tables = {f"{topic.key}/{name}": table for topic in (*evidence.claims, *evidence.topics)
               for name, table in topic.tables.items()}
@@ -107,13 +107,13 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
 
 
 def count_verdicts(found: Iterable[Finding | Part]) -> dict[str, int]:
-    """Return how many findings or parts have each verdict, those that occur only."""
+    """Return the number of findings or parts for each verdict that occurs."""
     given = [one.verdict for one in found]
     return {verdict: given.count(verdict) for verdict in VERDICTS if verdict in given}
 
 
 def map_of(claim: Finding) -> Figure | None:
-    """Where a claim holds, over its two telling conditions; None where it holds everywhere."""
+    """Return a map of where a claim holds, over its two decisive conditions; None if it holds everywhere."""
     table = claim.tables.get(claim.key)
     if not claim.axes or claim.verdict == REPRODUCED or table is None or not table.rows:
         return None
@@ -122,7 +122,7 @@ def map_of(claim: Finding) -> Figure | None:
 
 
 def first_map(claims: Sequence[Finding]) -> Figure | None:
-    """Where C10 holds, start by start on the full grid, for the first page; None where it was not computed."""
+    """Return the first page's map of where C10 holds, start by start on the full grid; None if not computed."""
     table = next((claim.tables.get(claim.key) for claim in claims if claim.key == "C10"), None)
     grid = table.where(threshold=FULL) if table and "threshold" in table.keys else None
     if grid is None or not grid.rows:
@@ -138,7 +138,7 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
 
 
 def _map(key: str, title: str, caption: str, table: Table, x: str, y: str, *split: str, ranked: bool = False) -> Figure:
-    """Draw the outcomes over two columns, in a panel for every combination of the values of others."""
+    """Draw the outcomes over the columns x and y, in one panel for every combination of the columns in `split`."""
     titles = {column.key: column.title for column in table.columns}
     panels = [", ".join(row[name] if isinstance(row[name], str) else f"{titles[name]}: {row[name]:g}" for name in split)
               for row in table.records()]  # fmt: skip
@@ -147,20 +147,20 @@ def _map(key: str, title: str, caption: str, table: Table, x: str, y: str, *spli
 
 
 def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
-    """Return the figure that plays a run, by the run's name among the inputs."""
+    """Return the key of the figure that plays each run, by the input name of the run."""
     drawn = [figure for group in figures.values() for figure in group if isinstance(figure, Figure)]
     return {name: figure.key for figure in drawn if figure.panels and figure.panels[0].film for name in figure.inputs}
 
 
 def badge_words(topic: Finding) -> str:
-    """Return what a topic amounts to in words, on the first page: how many of its findings fail."""
+    """Return the summary of a topic for the first page: how many of its findings fail."""
     failing = sum(part.verdict == REFUTED for part in topic.parts)
     counted = failing and len(topic.parts) > 1
     return f"{failing} of {len(topic.parts)} findings fail" if counted else FINDINGS[topic.verdict]
 
 
 def counted(part: Part) -> str:
-    """Return in how many trials a part holds, of those that could tell, how many could not, and a region's counts."""
+    """Return as text in how many of the decided trials a part holds, how many cannot tell, and its region's counts."""
     if not part.decided and not part.unknown:
         return ""
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
@@ -172,7 +172,7 @@ def counted(part: Part) -> str:
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
-    """Return the tables of a topic, with their names, that no figure was drawn from."""
+    """Return the names and tables of a topic that are not drawn in a figure."""
     drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
     return tuple((name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn)
 
@@ -201,5 +201,5 @@ def _labelled(panel: Any) -> Markup:
 
 
 def _film(panel: Any) -> Markup:
-    """Return a panel's film as text that cannot end the script element it stands in."""
+    """Return a panel's film as text that cannot close the script element that contains it."""
     return Markup(panel.film.replace("<", "\\u003c"))

@@ -1,6 +1,6 @@
-"""What the first page says before its pictures: the answer, and the facts that a reader asks for first.
+"""The text of the first page above its pictures: the answer, and the most important facts.
 
-Each sentence is made from findings; what was not computed is left out.
+Each sentence is made from findings; a sentence whose findings were not computed is left out.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ PEG_STEP = "peg_corner"  # the scene whose step stands for the time of a step
 
 @dataclass(frozen=True)
 class Fact:
-    """A line beside the answer; `id` is where the report says more, `marks` the quantities in it.
+    """A line beside the answer; `id` links to its details in the report, `marks` are the quantities in it.
 
-    items : lines of a list, each with the id that says more of it
+    items : lines of a list, each with the id of its details
     """
 
     label: str
@@ -42,14 +42,14 @@ class Fact:
 
 @dataclass(frozen=True)
 class Answer:
-    """What holds and what fails of the paper's promise, in sentences; "" where nothing is known."""
+    """What holds and what fails of the paper's main claim, in sentences; "" if nothing is known."""
 
     holds: str
     fails: str
 
 
 def answer(evidence: Evidence) -> Answer:
-    """Say whether an impulse makes a wall feel rigid, and whether one ever gained energy."""
+    """Return whether impulses make a wall feel more rigid, and whether any impact gained energy."""
     claims = {claim.key: claim for claim in evidence.claims}
     found = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
     if any(topic.key == "exact-energy" and topic.verdict == REPRODUCED for topic in evidence.topics):
@@ -85,7 +85,7 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
 
 
 def facts(evidence: Evidence) -> tuple[Fact, ...]:
-    """Return the lines: energy, time, the paper's errors, what we miss ourselves, and what made the report."""
+    """Return the lines: energy, time, errors in the paper, findings of the project that fail, and provenance."""
     topics = {topic.key: topic for topic in evidence.topics if topic.computed}
     found = []
     if (energy := topics.get("exact-energy")) is not None:
@@ -107,14 +107,14 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
 
 
 def _step(evidence: Evidence) -> Mark | None:
-    """The time of a step of the scene that stands for all."""
+    """Return the time of a step of the representative scene."""
     table = evidence.inputs.get("effect_steps")
     times = table.where(scene=PEG_STEP).column("step") if table is not None and table.rows else []
     return Mark("time of a peg step", f"{times[0]:.2g} µs") if times else None
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
-    """The gravest misses, a line each; the others stand with their topics, further down the page."""
+    """Return the most serious failing topics, one line each; the others are listed further down the page."""
     answered = [topic for topic in topics if topic.answer]
     missed = sorted((topic for topic in answered if topic.verdict in (MIXED, REFUTED)), key=_gravity)
     lines = [(_line(topic), topic.key) for topic in missed]
@@ -131,7 +131,7 @@ def _gravity(topic: Finding) -> int:
 
 
 def _line(topic: Finding) -> str:
-    """The first miss of a topic, and how many more it has; its verdict where no part says what it misses."""
+    """Return the first failure of a topic and the number of further ones; its verdict if no part names a failure."""
     clauses = [part.miss for part in topic.parts if part.miss] or [f"{topic.title}: {topic.verdict}"]
     more = f", and {len(clauses) - 1} more" if len(clauses) > 1 else ""
     return clauses[0][:1].upper() + clauses[0][1:] + more

@@ -1,4 +1,4 @@
-"""LaTeX to MathML, at build time: the page shows formulas without any script. And numbers in sentences."""
+"""Convert LaTeX to MathML at build time, so that formulas need no script, and format numbers in sentences."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def formula(latex: str, display: str = "block") -> Markup:
 
 
 def _shortened(mathml: str) -> str:
-    """The same formula in half the bytes: signs as themselves, no group of one, no namespace that HTML implies."""
+    """Return the same formula in half the bytes: plain characters, no groups of one element, no implied namespace."""
     text = _REFERENCE.sub(lambda reference: str(escape(chr(int(reference.group(1), 16)))), mathml)
     text = _GROUP_OF_ONE.sub(r"\1", text.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
     return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
 
 
 def prose(text: str, marks: tuple[Mark, ...] = ()) -> Markup:
-    """Return text with its ``$...$`` formulas as MathML, powers of ten as people write them, the rest escaped.
+    """Return text with its ``$...$`` formulas as MathML, powers of ten as 10ⁿ, and the rest escaped.
 
-    marks : the quantities that it says
+    marks : the quantities in the text
     """
     pieces = _INLINE.split(text)
     return Markup("").join(

@@ -1,7 +1,7 @@
-"""The page's own script, and the policy under which a browser runs it: this script, and no request to anywhere.
+"""The page's script, and its Content-Security-Policy: the browser runs only this script and makes no requests.
 
-Each file of `scripts/` is written into the page, in the order below. Without it the page is whole: drawings stand
-still.
+Each file of `scripts/` is written into the page, in the order below. Without the script the page is complete, but its
+drawings are static.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ SCRIPTS = ("plot.js", "traces.js", "player.js", "printing.js")
 
 
 def script() -> Markup:
-    """Return the text of the page's script; the files share one scope, which nothing outside sees."""
+    """Return the text of the page's script; its files share one scope, which is hidden from other code."""
     folder = files("reports.pages").joinpath("scripts")
     parts = [folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS]
     return Markup("(() => {\n\"use strict\";\n" + "\n".join(parts) + "})();\n")

@@ -1,4 +1,4 @@
-"""Hard cases at a glance: a row per case, first those that we miss; a column per method or world; verdicts in words."""
+"""Overview of the hard cases: a row per case (failures of the engine first) and a column per method or world."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Matrix:
-    """One kind of case: `rows` are a case and its cell for each of the `methods`, (mark, class, words, decade)."""
+    """The matrix of one kind of case. Each row is a case and, for each of the `methods`, a cell.
+
+    A cell is (mark, class, words, decade).
+    """
 
     title: str
     methods: tuple[str, ...]
@@ -31,12 +34,12 @@ class Matrix:
 
 
 def matrices(numbers: Table) -> tuple[Matrix, ...]:
-    """Return a matrix of the impacts and one of the motions, from a row per case and method."""
+    """Return a matrix of the impacts and one of the motions, from a table with a row per case and method."""
     return tuple(_matrix(title, rows) for kind, title in KINDS.items() if (rows := numbers.where(kind=kind).records()))
 
 
 def worst_first(cases: Sequence[Finding]) -> list[Finding]:
-    """Return the cases in the order of the matrix; those without a table last."""
+    """Return the cases in the order of the matrix; cases without a table are last."""
     rows = {case.key: case.tables[case.key].records() for case in cases if case.key in case.tables}
     return sorted(cases, key=lambda case: _rank(rows[case.key]) if case.key in rows else (9, 0.0, 0))
 
@@ -52,7 +55,8 @@ def _matrix(title: str, rows: Sequence[Row]) -> Matrix:
 
 
 def _rank(rows: Sequence[Row]) -> tuple[int, float, int]:
-    """What the engine fails first, then by the largest share that it takes of what is allowed, then by who fails."""
+    """Return a sort key: failures of the engine first, then the largest ratio of its error or energy gain to the
+    allowed one, then the number of failing methods."""
     ours = [row for row in rows if row["method"] in ENGINE]
     failing = sum(row["outcome"] != STABLE for row in rows)
     return (int(all(row["outcome"] == STABLE for row in ours)), -max(map(_share, ours), default=0.0), -failing)
@@ -72,5 +76,5 @@ def _cell(row: Row | None) -> tuple[str, str, str, str] | None:
 
 
 def decade(value: float | None) -> str:
-    """The power of ten at or below an error or gain, as text; a zero or none at all is no number."""
+    """Return the power of ten at or below an error or gain, as text; "" for zero and None."""
     return power_of_ten(10.0 ** math.floor(math.log10(value))) if value is not None and value > 0.0 else ""

@@ -1,7 +1,7 @@
-"""Quantities that several pages quote: each is marked where it is said, with its verdict, and has one of both.
+"""Quantities that several pages quote. They are marked in the HTML, to check that value and verdict agree everywhere.
 
-A Part or Finding names the quantities that its sentence says; nothing here recognises words. So are the verdicts of
-findings and of their parts marked, which stand on more than one page.
+A Part or Finding names the quantities in its sentence; nothing here recognises words. The verdicts of findings and of
+their parts, which also appear on several pages, are marked in the same way.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _JUDGED = re.compile(r'data-of="([^"]+)" data-verdict="([^"]+)"')
 
 
 class Mark(NamedTuple):
-    """A quantity in a sentence: its name, its value as said there, and its verdict; "" where none is given."""
+    """A quantity in a sentence: its name, its value as written there, and its verdict ("" without a verdict)."""
 
     name: str
     value: str
@@ -27,9 +27,10 @@ class Mark(NamedTuple):
 
 
 def marks(said: Part | Finding) -> tuple[Mark, ...]:
-    """Return what to mark in the sentence of a part, or in the answer of a finding.
+    """Return the quantities to mark in the sentence of a part, or in the answer of a finding.
 
-    The verdict is that of the part, and in an answer that of the part which has the quantity, else the finding's.
+    In the sentence of a part, the verdict is that of the part. In an answer, it is the verdict of the part that has the
+    quantity, or that of the finding if no part has it.
     """
     if isinstance(said, Part):
         return tuple(Mark(name, value, said.verdict) for name, value in said.quantities)
@@ -38,7 +39,7 @@ def marks(said: Part | Finding) -> tuple[Mark, ...]:
 
 
 def marked(text: str, given: tuple[Mark, ...]) -> str:
-    """Return escaped text with its quantities: ``<data value="impacts certified" data-verdict="mixed">12</data>``."""
+    """Return escaped text with marks such as ``<data value="impacts certified" data-verdict="mixed">12</data>``."""
     for name, value, verdict in given:
         verdict = f' data-verdict="{verdict}"' if verdict else ""
         text = said_as(str(escape(value))).sub(rf'<data value="{name}"{verdict}>\g<0></data>', text)
@@ -46,12 +47,12 @@ def marked(text: str, given: tuple[Mark, ...]) -> str:
 
 
 def judged(key: str, verdict: str) -> Markup:
-    """Return the attributes that say whose verdict an element shows."""
+    """Return the HTML attributes that state which verdict an element shows, and of what."""
     return Markup('data-of="{}" data-verdict="{}"').format(key, verdict)
 
 
 def contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Return what the pages give more than one value or verdict, with all of them."""
+    """Return the quantities for which the pages give different values or verdicts, with all of these."""
     said: dict[str, set[str]] = {}
     for page in pages.values():
         for name, verdict, text in _MARKED.findall(page):
@@ -64,6 +65,6 @@ def contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
 
 
 def unsaid(pages: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the quantities that no page says: a check of them would see nothing."""
+    """Return the quantities that appear on no page, so that `contradictions` does not check them."""
     said = {name for page in pages.values() for name, _, _ in _MARKED.findall(page)}
     return tuple(name for name in QUANTITIES if name not in said)

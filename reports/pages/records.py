@@ -1,7 +1,7 @@
-"""What the report is built from: plain records. Every field of Evidence may be empty; an empty one is printed
+"""The plain records from which the report is built. Every field of Evidence may be empty; an empty field is printed
 as "not computed in this run", never as a number.
 
-Findings and proofs come from the studies as they are; the pages know nothing else.
+Findings and proofs come unchanged from the studies; the pages use no other data.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from verification.proofs.statement import ProofRecord
 
 @dataclass(frozen=True)
 class StoredFile:
-    """One line of the manifest: a run or table file, what it holds, and the command that makes it again.
+    """One line of the manifest: a run or table file, its content, and the command that reproduces it.
 
-    used_by : the claims, figures' inputs and topics made from a run; nobody for a table
-    status : "complete", "partial" where a simulation gave up, "absent" where the file is gone since
-    made_on : processor, BLAS kernel and optional code of numpy that computed it, where its file says so
+    used_by : the claims, figure inputs and topics that use a run; empty for a table
+    status : "complete", "partial" if the simulation gave up, "absent" if the file was removed later
+    made_on : processor, BLAS kernel and optional numpy code of the computation, if the file states them
     """
 
     name: str
@@ -36,7 +36,7 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class FailedCases:
-    """What could not be computed of a stage, and the file with the tracebacks."""
+    """The cases of a stage that could not be computed, and the file with their tracebacks."""
 
     stage: str
     failures: tuple[Failure, ...]
@@ -45,8 +45,8 @@ class FailedCases:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything the report may show. `inputs` holds runs, resolved scenes and tables by the names that the figures
-    ask for (`needs` of each recipe)."""
+    """Everything that the report may show. `inputs` holds runs, resolved scenes and tables by the names that the
+    figures use (`needs` of each recipe)."""
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
     scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name

@@ -10,10 +10,10 @@ from reports.pages.records import Evidence
 
 @dataclass(frozen=True)
 class Section:
-    """`ready` tells whether there is something to show; otherwise the page says that it was not computed.
+    """A section. `ready` returns whether there is evidence to show; if not, the page says that it was not computed.
 
     group : heading in the contents
-    tables : names of the manifest's tables that its numbers are kept in
+    tables : names of the manifest's tables that store the section's numbers
     """
 
     group: str
@@ -25,7 +25,7 @@ class Section:
 
     @property
     def page(self) -> str:
-        """Its file, from the folder of the report."""
+        """Return the path of the section's file, relative to the folder of the report."""
         return f"report/{self.id}.html"
 
     @property

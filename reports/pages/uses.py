@@ -1,4 +1,4 @@
-"""The runs of the manifest, gathered by what was made from them."""
+"""The runs of the manifest, grouped by the claim, topic or figure input that uses them."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ class RunsOf:
 
     @property
     def id(self) -> str:
-        """Where the page lists them."""
+        """Return the id of the place where the page lists the runs."""
         return anchor(self.user)
 
     @property
     def size(self) -> int:
-        """Bytes of all of them."""
+        """Return the total size of the runs [bytes]."""
         return sum(run.size or 0 for run in self.runs)
 
     @property
     def missing(self) -> int:
-        """How many are not whole files: the simulation gave up, or the file was removed."""
+        """Return the number of incomplete or missing runs: the simulation gave up, or the file was removed."""
         return sum(run.status != "complete" for run in self.runs)
 
 
 def anchor(user: str) -> str:
-    """Return the id of the line of the manifest that lists a user's runs."""
+    """Return the id of the manifest line that lists the runs of a user (a claim, topic or figure input)."""
     return "runs-" + re.sub(r"[^A-Za-z0-9]+", "-", user)
 
 
 def runs_by_user(files: Sequence[StoredFile]) -> tuple[RunsOf, ...]:
-    """Return one entry per user, in the order of first use; a run stands under each of its users."""
+    """Return one entry per user, in the order of first use; a run is listed under each of its users."""
     users = dict.fromkeys(user for run in files for user in run.used_by)
     return tuple(RunsOf(user, tuple(run for run in files if user in run.used_by)) for user in users)
