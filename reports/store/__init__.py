@@ -1,4 +1,4 @@
-"""Runs and tables on the disk: HDF5 files that are whole or not there, found again by what they were made from."""
+"""Runs and tables on disk: HDF5 files that are either complete or absent, and are found by the hash of their inputs."""
 
 from reports.store.folder import Checkpoint, RunStore
 from reports.store.keys import content_hash, run_key

@@ -1,8 +1,8 @@
-"""Care of stores: which files are whole, which can be trusted, which nothing needs any more.
+"""Maintenance of stores: find files that are incomplete, damaged or no longer needed.
 
-Only what lies in a marked store (`reports.store.io.mark_store`) is ever renamed or removed, and of that only files of
-ours: whatever has no seal of iapb and says nowhere that it is a run or a table of iapb is left alone. A damaged file is
-set aside under another name, so that it is computed again; what `gc` removes can be computed again from its inputs.
+Only files in a marked store (`reports.store.io.mark_store`) are ever renamed or removed, and only files of iapb: a file
+without iapb's seal whose header does not name iapb's formats is never touched. A damaged file is renamed, so that it is
+computed again. All results that `gc` removes can be computed again from their inputs.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ WHOLE, DAMAGED, PARTIAL, FOREIGN, STALE, LEFTOVER = "whole", "damaged", "partial
 
 @dataclass(frozen=True)
 class FileState:
-    """One file: its state and why it is thought to be in it."""
+    """The state of a file, and the reason for it."""
 
     path: Path
     state: str
@@ -49,14 +49,14 @@ class FileState:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Return the size of the file [bytes]."""
         return self.path.stat().st_size if self.path.is_file() else 0
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Read every result file below a folder, marked or not (or this file) whole, seals and hashes included.
+    """Read every result file below a folder (or a single file) completely, and check its seal and hashes.
 
-    `progress` is called as progress(files read, files in all).
+    The folder need not be a marked store. `progress` is called as progress(files read, total files).
     """
     paths, states = list(_files(Path(folder))), list[FileState]()
     for path in paths:
@@ -99,7 +99,7 @@ def _state(path: Path) -> FileState:
 
 
 def is_run(path: Path) -> bool:
-    """Whether a file is a run, or a damaged file of ours; a table or somebody else's file is not."""
+    """Return whether a file is a run or a damaged file of iapb; tables and foreign files are not."""
     try:
         with opened(path, expected_format=None) as file:
             return file.attrs.get("format") == FORMAT
@@ -113,7 +113,7 @@ def stores_below(folder: Path | str) -> tuple[Path, ...]:
     Raises
     ------
     ArgumentError
-        There is none.
+        There is no marked store.
     """
     found = tuple(mark.parent for mark in sorted(Path(folder).rglob(MARK_NAME)) if is_store(mark.parent))
     if not found:
@@ -123,7 +123,7 @@ def stores_below(folder: Path | str) -> tuple[Path, ...]:
 
 
 def mark_stores(folder: Path | str) -> tuple[Path, ...]:
-    """Mark every folder, this one and those below, that has a whole run or table of ours; return those marked now."""
+    """Mark every folder at or below `folder` that has a complete run or table of iapb; return the newly marked ones."""
     new: list[Path] = []
     for path in _files(Path(folder)):
         if not (path.is_symlink() or is_store(path.parent)) and _is_whole(path):
@@ -137,9 +137,9 @@ def _is_whole(path: Path) -> bool:
 
 
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Set damaged files aside and write the index anew, in stores; return the state of every file before that.
+    """Rename damaged files and rebuild the index, in all stores; return the earlier state of every file.
 
-    A file that was set aside is computed again when it is next asked for.
+    A renamed file is computed again when it is next requested.
     """
     stores = stores_below(folder)
     states = check_store(folder, progress)
@@ -154,10 +154,10 @@ def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[
 
 
 def garbage(folder: Path | str) -> tuple[FileState, ...]:
-    """Return the files of stores that nothing needs: leftovers, partial runs that were finished, results of older code.
+    """Return the files in stores that nothing needs: leftovers, partial runs of finished runs, results of older code.
 
-    Results of somebody's own code (`RunStore(folder, code=…)`), of versions that did not say their code, and what is
-    young enough for a writer to be at work on are none.
+    Results of user code (`RunStore(folder, code=…)`), results of versions that did not record their code, and files so
+    young that a process may still be writing them do not belong to these.
     """
     return tuple(state for store in stores_below(folder) for state in _garbage(store))
 
@@ -183,7 +183,7 @@ def _garbage(store: Path) -> Iterator[FileState]:
 
 
 def _useless(log: Path) -> str:
-    """Why nobody can go on from a log; "" where somebody can."""
+    """Return why a log cannot be used to resume a run; "" if it can."""
     if _is_whole(log.with_name(log.name.removesuffix(LOG_SUFFIX))):
         return "the log of a run that is finished"
     try:
@@ -193,7 +193,7 @@ def _useless(log: Path) -> str:
 
 
 def _stale(path: Path) -> str:
-    """Whether older code of ours made a file, as "run" or "table"; "" for any other, a damaged one too."""
+    """Return "run" or "table" if an older version of iapb made the file; "" for all other files and damaged ones."""
     try:
         with opened(path, expected_format=None) as file:
             kind, code = file.attrs.get("format"), str(file.attrs.get("code", ""))
@@ -205,6 +205,6 @@ def _stale(path: Path) -> str:
 
 
 def collect_garbage(found: Iterable[FileState]) -> None:
-    """Remove what `garbage` has found."""
+    """Remove the files that `garbage` has found."""
     for state in found:
         remove_unless_locked(state.path)

@@ -1,14 +1,14 @@
-"""RunStore: a folder of runs, one HDF5 file each, in which nothing is computed twice.
+"""RunStore: a folder of runs, one HDF5 file each; no run is computed twice.
 
     store = RunStore("out/runs")
     run = store.get_or_run(inputs, lambda checkpoint: simulate(scene, law))
 
-A file is named by a label and its run key, the hash of everything that determines the run. While a run is under
-way its last checkpoint is ``<name>.h5.partial``: a whole file, replaced in one step, so that it can be read at any
-moment, also after the process was killed. A finished file is never written again.
+A file is named by a label and its run key, the hash of everything that determines the run. During a run its last
+checkpoint is ``<name>.h5.partial``: a complete file, replaced atomically, so that it can be read at any time, also
+after the process was killed. A finished file is never written again.
 
-Writing whole checkpoints, rather than flushing a growing file, is what makes "readable" certain; that it costs a
-fixed share of the time at most is the checkpoint's own business (see `Checkpoint`).
+Each checkpoint is a complete file, because a growing file that is only flushed might be unreadable after a kill.
+`Checkpoint` limits the time for writing to a fixed share of the computing time.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ _PAUSE_PER_WRITE = 20.0
 
 @dataclass
 class Checkpoint:
-    """Saves an unfinished run now and then: call it as often as you like with the run so far.
+    """Saves an unfinished run from time to time. Call it with the current run as often as you like.
 
-    ``checkpoint.due`` says whether the next call would write, for callers to whom making a Run costs something.
-    ``checkpoint(run, force=True)`` writes at once (before giving up, say).
+    ``checkpoint.due`` is whether the next call would write; check it first if making a Run takes time.
+    ``checkpoint(run, force=True)`` writes at once, for example before the simulation gives up.
     """
 
     path: Path
@@ -61,7 +61,7 @@ class Checkpoint:
 
     @property
     def due(self) -> bool:
-        """Whether enough time has passed since the last checkpoint."""
+        """Return whether enough time has passed since the last checkpoint."""
         return time.monotonic() >= self._next
 
     def __call__(self, run: Run, *, force: bool = False) -> bool:
@@ -77,14 +77,14 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run belongs: its key, its file, and the file of its last checkpoint while it is under way."""
+    """The place of a run in a store: its key, its file, and the file of its last checkpoint."""
 
     key: str
     path: Path
 
     @property
     def partial(self) -> Path:
-        """File of the last checkpoint."""
+        """Return the file of the last checkpoint."""
         return self.path.with_name(self.path.name + PARTIAL_SUFFIX)
 
 
@@ -94,10 +94,10 @@ class RunStore:
     Parameters
     ----------
     folder
-        Made if it does not exist.
+        Folder of the runs; it is created if it does not exist.
     code
         Code version that enters the run keys; by default a hash of the engine's and the references' sources.
-        Runs of a law of your own: add its version here, or in the inputs.
+        For runs with your own law, add the version of the law here or in the inputs.
     """
 
     def __init__(self, folder: Path | str, code: str | None = None) -> None:
@@ -113,7 +113,7 @@ class RunStore:
     def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
         """Return the key of `inputs`, and the file that their run has or will have.
 
-        `label` starts the name, for people; it is no part of the key, and a run is found under any label.
+        The file name starts with `label`. The label is not part of the key: a run is found under any label.
         """
         key = run_key(inputs, self.code)
         found = sorted(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"))
@@ -132,7 +132,7 @@ class RunStore:
         Raises
         ------
         RunFileError
-            If its file is damaged. It is never replaced in silence: remove it to have the run computed again.
+            Its file is damaged. A damaged file is not replaced automatically: remove it to compute the run again.
         """
         found = self._read(self.place_of(inputs))
         return None if found is None else found[0]
@@ -148,26 +148,27 @@ class RunStore:
     def get_or_run(
         self, inputs: Mapping[str, Any], compute: Callable[[Checkpoint], Run], label: str = "run"
     ) -> Run:
-        """Return the run of `inputs`: from its file if there is one, else computed and stored.
+        """Return the run of `inputs`: read it from its file if there is one, else compute and store it.
 
         Parameters
         ----------
         inputs
             Everything that determines the run, as mappings, sequences, arrays, numbers and texts.
         compute
-            Makes the run. It may call the `Checkpoint` it is given with the run so far.
+            Computes the run. It may call the `Checkpoint` that it gets with the unfinished run.
         label
             Start of the file's name.
 
         Returns
         -------
         Run
-            With ``complete=False`` where `compute` gave up early: stored as partial, computed again next time.
+            It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and computed again next
+            time.
         """
         return self.fetch(self.place_of(inputs, label), compute)[0]
 
     def fetch(self, place: Place, compute: Callable[[Checkpoint], Run]) -> tuple[Run, RunEntry]:
-        """Return the run that belongs in a place, and what its file says of itself; see `get_or_run`."""
+        """Return the run of a place and the index entry of its file; see `get_or_run`."""
         stored = self._read(place)
         if stored is not None:
             return stored
@@ -180,7 +181,7 @@ class RunStore:
         return run, self._keep(place, run)
 
     def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
-        """Store a finished run, and return its file; a file that is already there stays as it is."""
+        """Store a finished run and return its file; an existing file is not changed."""
         if not run.complete:
             raise ArgumentError("run.complete", run.complete, "True: unfinished runs are kept by Checkpoint")
         place = self.place_of(inputs, label)
@@ -208,12 +209,12 @@ class RunStore:
 
 
 def file_name(label: str, key: str) -> str:
-    """Return the name of a run's file: a label for people, and the start of the run key."""
+    """Return the name of a run's file: a label for readers, and the start of the run key."""
     return (re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run") + f"-{key[:_KEY_DIGITS]}.h5"
 
 
 def read_index(folder: Path) -> tuple[RunEntry, ...]:
-    """Return the entries of all run files in `folder`, by file name; the files decide, not the index."""
+    """Return the entries of all run files in `folder`, by file name; correct the index if it differs from the files."""
     listed = {}
     for record in read_lines(folder / INDEX_NAME):
         with suppress(TypeError):  # no entry

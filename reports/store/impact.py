@@ -1,12 +1,12 @@
-"""An impact that broke a law, as a run file: a run that ends in its first impact, and what was struck beside it.
+"""An impact that broke a law, as a run file: a run that ends in its first impact, with the input of the impact.
 
-The laws are put to impacts of bare numbers, M, J, v and e; no scene gave rise to them. So the run has no step, no
-configuration, no body and no contact place: only its first state, the velocity before, and in /impacts the velocity
-after, once for each budget of rows that the law tries. What nobody said is not made up: rank and closing rows are −1
-or counted, the clamp NaN, the unit of a velocity 1. Group /struck holds the rest:
+The laws are tested on impacts given only by numbers, M, J, v and e, without a scene. So the run has no step, no
+configuration, no body and no contact point. It has only its first state with the velocity before the impact, and in
+/impacts the velocity after it, once for each row budget that the law tests. Unknown values are marked: the rank is −1,
+the number of closing rows is counted or −1, the clamp is NaN, the unit of a velocity is 1. Group /struck has the rest:
 
     mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution (c,)   the input
-    velocity_after (k, d), residual, tolerance                                     what came of it
+    velocity_after (k, d), residual, tolerance                                     the result
     translations (t, d)                                                            motions z with J z = 0, where known
     law, statement, found, test                                                    texts: `found` is JSON
 """
@@ -37,8 +37,8 @@ _TEXTS = ("law", "statement", "found", "test")
 class BrokenImpact:
     """An impact, the law it breaks, and how it was found.
 
-    found : what draws the impact again (resolver, seed, part, number), as a mapping of plain values.
-    value, tolerance : of the law's residual when it was found; test : source of a test, to paste.
+    found : the data that draw the impact again (resolver, seed, part, index), as a mapping of plain values.
+    value, tolerance : residual of the law when the impact was found, and its tolerance; test : source code of a test.
     """
 
     struck: Struck
@@ -51,18 +51,18 @@ class BrokenImpact:
     test: str
 
     def words(self) -> str:
-        """In one line: which law, by how much, and what the resolver said."""
+        """Return one line: the broken law, the residual, and the message of the resolver."""
         said = f"; {self.struck.complaint}" if self.struck.complaint else ""
         return f"the impact breaks {self.law}: {self.value:.3g} where {self.tolerance:.3g} is allowed{said}"
 
 
 def write_broken_impact(path: Path, broken: BrokenImpact) -> Path:
-    """Write one run file; the same one again is the same file."""
+    """Write one run file; the same impact again gives the same file."""
     return write_run(path, impact_run(broken), replace=True, more=lambda file: _write(file, broken))
 
 
 def impact_run(broken: BrokenImpact) -> Run:
-    """Return the run that such an impact is: it stops where its first step has struck."""
+    """Return the impact as a run that stops in the impact of its first step."""
     case, after = broken.struck.case, broken.struck.velocity_after
     d = case.coordinates
     lengths = {"time": 1, "step": 0, "step_edge": 1, "contact": 0, "axis": 3, "coordinate": 0, "velocity": d,
@@ -80,7 +80,7 @@ def impact_run(broken: BrokenImpact) -> Run:
 
 
 def _impacts(case: ImpactCase, rows: tuple[int, ...], velocity_after: Floats) -> ImpactTable:
-    """One line per velocity after; the impulse is M (v⁺ − v⁻), whoever made it."""
+    """Return an impact table with one row per velocity after; the impulse is M (v⁺ − v⁻) for every resolver."""
     k, v, after = len(rows), np.array(case.velocity, np.float64), np.array(velocity_after, np.float64)
     with np.errstate(over="ignore", invalid="ignore"):  # a broken impact may be of any size
         impulse = (after - v) @ np.asarray(case.mass_matrix, np.float64).T
@@ -96,7 +96,8 @@ def _impacts(case: ImpactCase, rows: tuple[int, ...], velocity_after: Floats) ->
 
 
 def _energy_lost(mass: Floats, before: Floats, after: Floats) -> float:
-    """½ v⁻·M v⁻ − ½ v⁺·M v⁺ of these numbers, exactly, rounded once: a gain may be a rounding of either energy."""
+    """Return ½ v⁻·M v⁻ − ½ v⁺·M v⁺, computed exactly and rounded once, because a gain can be as small as the rounding
+    error of either energy."""
     a, b = ([Fraction(float(x)) for x in v] for v in (before, after))
     terms = (Fraction(float(m)) * (a[i] * a[j] - b[i] * b[j]) for (i, j), m in np.ndenumerate(mass))
     lost = sum(terms, Fraction(0)) / 2
@@ -137,7 +138,7 @@ def read_broken_impact(path: Path | str) -> BrokenImpact | None:
     Raises
     ------
     RunFileError
-        If the file is absent, damaged or no run.
+        The file is absent, damaged or not a run.
     """
     with opened(path) as file:
         if STRUCK not in file:

@@ -1,9 +1,9 @@
-"""Files of results: whole or not there, sealed by a checksum, HDF5 with units and dimension scales.
+"""Result files: HDF5 with units and dimension scales, written atomically and sealed with a checksum.
 
-A file is written aside, synced and renamed. Its seal is a checksum of the whole file, behind its end: HDF5's own
-checksums cover chunks of numbers and some metadata, and one wrong byte elsewhere can make the HDF5 library itself
-crash (seen: a double free, which ends the process). So a file is judged before the library sees it. HDF5 and
-everything built on it ignore what stands behind the end that the file states.
+A file is written under a temporary name, synced and renamed. Its seal is a checksum of the whole HDF5 content, appended
+after it. HDF5's own checksums cover only chunks of numbers and some metadata, and one wrong byte elsewhere can crash
+the HDF5 library (we have seen a double free, which ends the process). Therefore the seal is checked before the library
+opens the file. HDF5 and all software based on it ignore bytes after the end that the file states.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ def sync(path: Path) -> None:
 
 @contextmanager
 def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
-    """Give a path to write to; afterwards move it to `target` in one step.
+    """Yield a temporary path to write to; afterwards move it to `target` atomically.
 
-    A crash at any moment leaves `target` as it was. With ``replace=False`` a target that exists by then
-    stays, and what was written aside is dropped: the first of two writers wins.
+    A crash at any time leaves `target` unchanged. With ``replace=False`` a target that exists at the end is kept, and
+    the temporary file is removed: the first of two writers wins.
     """
     aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
     lock = _locked(aside)
@@ -80,7 +80,7 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
 
 
 def _locked(path: Path) -> int:
-    """Open a file and lock it, until it is closed or the process ends; wait for whoever just asks `is_locked`."""
+    """Open a file and lock it until it is closed or the process ends; wait if `is_locked` holds the lock briefly."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -91,7 +91,7 @@ def _locked(path: Path) -> int:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds a file that it writes; False where the file is gone."""
+    """Return whether a process is writing a file and holds its lock; False if the file does not exist."""
     try:
         file = os.open(path, os.O_RDWR)
     except OSError:
@@ -106,7 +106,10 @@ def is_locked(path: Path) -> bool:
 
 
 def remove_unless_locked(path: Path) -> bool:
-    """Remove a file that no process writes, under its lock: nobody can start to meanwhile; whether it is gone."""
+    """Remove a file if no process is writing it; return whether it was removed.
+
+    The file is locked meanwhile, so that no process can start to write it.
+    """
     try:
         file = os.open(path, os.O_RDWR)
     except OSError:
@@ -132,7 +135,7 @@ def _move_if_absent(aside: Path, target: Path) -> None:
 
 
 def mark_store(folder: Path) -> None:
-    """Make a folder, if it is not there, and say in it that it is a store: only there is a file ever removed."""
+    """Create a folder if necessary, and mark it as a store; files are only ever removed from marked stores."""
     folder.mkdir(parents=True, exist_ok=True)
     if not is_store(folder):
         with written_aside(folder / MARK_NAME, replace=False) as aside:
@@ -140,7 +143,7 @@ def mark_store(folder: Path) -> None:
 
 
 def is_store(folder: Path) -> bool:
-    """Whether a folder is marked as a store of a format that this version knows."""
+    """Return whether a folder is marked as a store with a format that this version supports."""
     try:
         mark = json.loads((folder / MARK_NAME).read_text(encoding="utf-8"))
         return bool(mark["format"] == _STORE["format"] and mark["format_version"] <= _STORE["format_version"])
@@ -149,28 +152,28 @@ def is_store(folder: Path) -> bool:
 
 
 def is_old(path: Path) -> bool:
-    """Whether a file is older than any writer takes; False where it is gone."""
+    """Return whether a file is so old that no process can still be writing it; False if it does not exist."""
     with suppress(FileNotFoundError):
         return time.time() - path.stat().st_mtime > _ABANDONED_AFTER_SECONDS
     return False
 
 
 def abandoned(folder: Path) -> list[Path]:
-    """Return what killed writers left in a store, by the names that writers give.
+    """Return the temporary files that killed writers left in a store; they are recognised by their names.
 
-    Files still written are younger; and locked, however long it takes.
+    Files that are still being written are not returned, because they are younger and locked.
     """
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
     return [path for path in found if is_aside(path) and not path.is_symlink() and is_old(path) and not is_locked(path)]
 
 
 def is_aside(path: Path) -> bool:
-    """Whether a file has the name that our writers give to one that is not yet whole."""
+    """Return whether a file has the name of a temporary file of `written_aside`."""
     return _ASIDE.fullmatch(path.name) is not None
 
 
 def is_ours(path: Path) -> bool:
-    """Whether a file is a run or a table of iapb, whole or damaged: it ends in a seal, or its HDF5 header says so."""
+    """Return whether a file is a run or table of iapb, complete or damaged: it has a seal, or its HDF5 head says so."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
         file.seek(max(path.stat().st_size - _LENGTH, 0))
@@ -179,12 +182,12 @@ def is_ours(path: Path) -> bool:
 
 
 def sealed(content: bytes) -> bytes:
-    """Return a file's content with its checksum behind it."""
+    """Return a file's content with its checksum appended."""
     return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def append_line(path: Path, record: Mapping[str, Any]) -> None:
-    """Append a record as a line of JSON, in one write: two processes at once do not mix their lines."""
+    """Append a record as a line of JSON with a single write, so that the lines of two processes are not mixed."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
     try:
         size = os.fstat(handle).st_size
@@ -195,14 +198,14 @@ def append_line(path: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_lines(path: Path) -> Iterator[Any]:
-    """Yield the records of a file of lines; none where there is no file, and a line that is cut off does not count."""
+    """Yield the records of a file of JSON lines; skip incomplete lines, and yield nothing if there is no file."""
     for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
         with suppress(ValueError):
             yield json.loads(line)
 
 
 def check_seal(path: Path) -> None:
-    """Raise RunFileError unless `path` is an HDF5 file that is, to the byte, as it was sealed."""
+    """Raise RunFileError unless `path` is an HDF5 file whose every byte agrees with its seal."""
     with path.open("rb") as file:
         if file.read(len(_HDF5_SIGNATURE)) != _HDF5_SIGNATURE:
             raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
@@ -228,14 +231,14 @@ def _checksum(path: Path, size: int) -> str:
 
 @contextmanager
 def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
-    """Give an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` in one step.
+    """Yield an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` atomically.
 
-    It is filled in memory, so that a disk that fails meets our write, not one somewhere inside the HDF5 library.
+    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library.
 
     Raises
     ------
     RunFileError
-        If the disk or the folder does not take it; then nothing at `path` was changed.
+        The file cannot be written; then nothing at `path` was changed.
     """
     import h5py
 
@@ -254,9 +257,9 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
 
 @contextmanager
 def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
-    """Give an HDF5 file to fill that may be larger than memory; else as `new_file`.
+    """Yield an HDF5 file to fill that may be larger than memory; apart from that, it works like `new_file`.
 
-    It is filled on the disk: where that fails, the HDF5 library says so.
+    It is filled on disk, so disk errors come from the HDF5 library.
     """
     import h5py
 
@@ -276,12 +279,12 @@ def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
 
 @contextmanager
 def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
-    """Open a file of this project for reading; a format of None takes any.
+    """Open a file of this project for reading; with `expected_format` None, any format is accepted.
 
     Raises
     ------
     RunFileError
-        If the file is absent, is no HDF5 file, has another format, or fails in any way while it is read.
+        The file is absent, is not an HDF5 file, has another format, or cannot be read.
     """
     import h5py
 
@@ -378,7 +381,7 @@ def write_scale(group: Any, dimension: str, values: Any, unit: str, *, growing: 
 def write_quantity(
     group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str, *, growing: bool = False
 ) -> Any:
-    """Write one quantity; the scales of its dimensions must be in `group` already."""
+    """Write one quantity; `group` must already have the scales of its dimensions."""
     dataset = write_values(group, name, values, growing=growing)
     dataset.attrs["units"] = unit
     dataset.attrs["long_name"] = meaning
@@ -388,7 +391,7 @@ def write_quantity(
 
 
 def mark_plottable(group: Any, signal: str, axes: Sequence[str]) -> None:
-    """Make `group` an NXdata, so that a viewer knows what to draw; ``"."`` is an axis without values."""
+    """Make `group` an NXdata group, which tells a viewer what to plot; ``"."`` is an axis without values."""
     import h5py
 
     group.attrs["NX_class"] = "NXdata"
@@ -402,7 +405,7 @@ def read_values(group: Any, name: str, path: str) -> Any:
     Raises
     ------
     RunFileError
-        If there is no such dataset, or it states more values than its bytes can hold.
+        There is no such dataset, or it states more values than its bytes can hold.
     """
     import h5py
 
@@ -414,7 +417,7 @@ def read_values(group: Any, name: str, path: str) -> Any:
 
 
 def dataset_of(group: Any, name: str, path: str) -> Any:
-    """Return a dataset of `group` as it is in its file; raises as `read_values`."""
+    """Return a dataset of `group` without reading its values; it raises the errors of `read_values`."""
     import h5py
 
     within = isinstance(group, h5py.Group)  # "get" would read a dataset through, however long it says it is
@@ -427,7 +430,7 @@ def dataset_of(group: Any, name: str, path: str) -> Any:
 
 
 def blocks(values: Any) -> Iterator[np.ndarray]:
-    """Yield an array, or a dataset in a file, in blocks of rows of a megabyte; an empty one as it is."""
+    """Yield an array or a dataset in blocks of rows of about a megabyte; an empty one is yielded unchanged."""
     width = max(int(np.prod(values.shape[1:])) * values.dtype.itemsize, 1)
     rows = max(_BLOCK // width, 1)
     for first in range(0, max(len(values), 1), rows):

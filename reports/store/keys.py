@@ -1,4 +1,4 @@
-"""The two hashes of a run: the key says what was asked for, the content hash what came out."""
+"""The two hashes of a run: the run key identifies its inputs, the content hash its results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
 
 
 def plain(value: Any) -> Any:
-    """Return `value` made of what JSON knows: arrays become lists, numpy scalars numbers, tuples lists."""
+    """Return `value` in the types of JSON: arrays and tuples become lists, numpy scalars become numbers."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -44,7 +44,7 @@ def plain(value: Any) -> Any:
 
 
 def canonical_json(value: Any) -> str:
-    """Return the one JSON text of `value`: keys sorted, floats by their shortest exact form."""
+    """Return the canonical JSON text of `value`: sorted keys, and floats in their shortest exact form."""
     return json.dumps(plain(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
@@ -52,8 +52,8 @@ def canonical_json(value: Any) -> str:
 def code_version() -> str:
     """Return a hash of everything that can change a run's numbers.
 
-    Sources rather than a commit: it also tells apart uncommitted changes, and does not change with a change of the
-    report. Taken once per process, when first asked for.
+    It is a hash of sources rather than a commit, so it also distinguishes uncommitted changes and does not depend on
+    the code of the report. It is computed once per process, at the first call.
     """
     packages = [f"{package} {version(package)}" for package in _NUMERIC_PACKAGES]
     return hash_of([*packages, *(sources_hash(package) for package in _SOURCES)])
@@ -61,22 +61,22 @@ def code_version() -> str:
 
 @cache
 def evidence_version() -> str:
-    """Hash of everything that can change a verdict: engine, references, verification, its stages, and the scenes."""
+    """Return a hash of everything that can change a verdict: engine, references, verification, stages and scenes."""
     files = sorted(path for path in scene_folder().rglob("*") if path.is_file())
     scenes = {path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8") for path in files}
     return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes])
 
 
 def hash_of(value: Any) -> str:
-    """Return sha256 of the one JSON text of `value`, in hexadecimal."""
+    """Return sha256 of the canonical JSON text of `value`, in hexadecimal."""
     return hashlib.sha256(canonical_json(value).encode()).hexdigest()
 
 
 @cache
 def sources_hash(folder: str) -> str:
-    """Return a hash of the Python files below a folder of the checkout: their code without comments and docstrings.
+    """Return a hash of the code of all Python files below a folder of the checkout, without comments and docstrings.
 
-    To parse all sources takes seconds, so what a file's bytes lead to is remembered beside the compiled modules.
+    Parsing all sources takes seconds, so the hash of each file's code is cached beside the compiled modules.
     """
     files = {path.relative_to(_ROOT).as_posix(): path.read_bytes() for path in (_ROOT / folder).rglob("*.py")}
     if not files:
@@ -100,7 +100,7 @@ def _remembered(kept: Path) -> dict[str, str]:
 
 
 def code_hash(source: bytes) -> str:
-    """Return a hash of Python code that comments, docstrings and layout do not enter."""
+    """Return a hash of Python code that does not depend on comments, docstrings and layout."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
@@ -117,18 +117,18 @@ def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
     inputs
         Everything that determines the run: resolved scene, law, settings, coupling, duration …
     code
-        Version of the code; the engine's by default. Give your own to cover a law of your own.
+        Version of the code; by default the engine's version. Pass another version to include the code of your own law.
     """
     return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
 
 
 def code_label(code: str | None = None) -> str:
-    """Return what a run file says of its code: the engine's version, or the label that its store was given."""
+    """Return the code entry of a run file: the engine's version, or the label given to its store."""
     return f"{_ENGINE} {code_version()}" if code is None else code
 
 
 def is_older_engine(label: str) -> bool:
-    """Whether a run file's code is the engine's, in another version; never for a label of somebody's own."""
+    """Return whether a run file was made by another version of the engine; False for a user's own label."""
     return label.startswith(f"{_ENGINE} ") and label != code_label()
 
 
@@ -141,7 +141,7 @@ def add_array(digest: Any, name: str, array: Any) -> None:
 
 
 def content_hash(run: Run) -> str:
-    """Return sha256 of the results alone: no timings, no provenance; equal bit for bit on a repeat."""
+    """Return sha256 of the results, without timings and provenance; an exact repetition gives the same hash."""
     digest = hashlib.sha256()
     digest.update(canonical_json(list(result_head(run).values())).encode())
     for name, values in results_of(run):
@@ -150,7 +150,7 @@ def content_hash(run: Run) -> str:
 
 
 def result_head(run: Run) -> dict[str, Any]:
-    """Return what the content hash covers besides arrays, by name."""
+    """Return everything that the content hash covers besides arrays, by name."""
     names = ("dt", "complete", "tool_dofs", "coordinate_names", "velocity_names", "body_names")
     return {name: getattr(run, name) for name in names}
 

@@ -1,13 +1,13 @@
-"""A run in the making, on disk: a log that only grows, so that a kill loses no more than its last block.
+"""The log of an unfinished run on disk: data are only appended, so that a kill loses at most the last block.
 
-    a line of JSON: what this is, and what run it is of
-    blocks, each a line of JSON (kind, counts, bytes that follow) and its numbers:
-        chunk   lines of the loop's record: the columns of `iapb.recording`, one after another
+    a line of JSON: the format of the file, and the inputs of the run
+    blocks, each a line of JSON (kind, counts, number of bytes that follow) and its numbers:
+        chunk   steps of the loop's record: the columns of `iapb.recording`, one after another
         state   everything that the next step depends on (`Simulation.arrays`), after the chunks before it
 
-Each line holds a sha256 of itself, its numbers and the sha256 before it: what is changed, lost or exchanged shows.
-A block that is cut off or damaged ends the log. Who writes holds a lock that the kernel releases with the process.
-The log is for going on and for recovery (`reports.streaming`); results are read from run files alone.
+Each line has a sha256 of itself, its numbers and the previous sha256, so changed, lost or exchanged data are detected.
+An incomplete or damaged block ends the log. The writing process holds a lock, which the kernel releases when the
+process ends. The log is used to resume and to recover runs (`reports.streaming`); results are only read from run files.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _LONGEST_LINE = 1 << 24  # bytes of a line of JSON: a scene of ten thousand bodi
 
 @dataclass(frozen=True)
 class Block:
-    """One whole block of a log: its line, its numbers as bytes, and where it starts and ends in the file."""
+    """One complete block of a log: its line, its numbers as bytes, and its start and end in the file."""
 
     line: Mapping[str, Any]
     numbers: bytes
@@ -51,22 +51,22 @@ class Block:
 
 
 class LogLocked(RunFileError):
-    """Another process writes the log."""
+    """Another process is writing the log."""
 
 
 class RunLog:
-    """A log that is open, and locked, for writing.
+    """A log that is open and locked for writing.
 
     Parameters
     ----------
-    path : made if it does not exist; what a killed writer cut off is overwritten.
-    head : what the run is of, for a new log.
-    anew : whether what the log holds is given up.
+    path : created if it does not exist; an incomplete block of a killed writer is overwritten.
+    head : inputs of the run, for a new log.
+    anew : whether the contents of an existing log are discarded.
 
     Raises
     ------
     LogLocked
-        Another process writes it.
+        Another process is writing it.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any], *, anew: bool = True) -> None:
@@ -85,12 +85,12 @@ class RunLog:
             self._write({"format": _FORMAT, "format_version": _VERSION, **head}, b"")
 
     def go_on(self, block: Block) -> None:
-        """Continue behind a block; what follows it is dropped."""
+        """Continue after a block; all data after it are removed."""
         os.ftruncate(self._file, block.end)
         self.steps, self.end, self._seal = int(block.line["steps"]), block.end, block.line[_SEAL]
 
     def write_chunk(self, record: Any, steps: int, seconds: float, more: Sequence[NDArray[Any]] = ()) -> None:
-        """Append the lines of a chunk of which `steps` are written; `more`: further columns, of the caller's."""
+        """Append the first `steps` steps of a chunk; `more` are additional columns of the caller."""
         contacts, impacts = (int(count) for count in record.used)
         columns = [getattr(record.steps, each.name)[:steps] for each in (*STATES, *STEPS)]
         columns.append(record.contact_count[:steps])
@@ -105,7 +105,7 @@ class RunLog:
         self._write_block({"kind": STATE, "steps": self.steps}, arrays)
 
     def sync(self) -> None:
-        """Wait until all that is written is on the disk, so that no power cut takes it."""
+        """Wait until all written data are on the disk, so that they survive a power failure."""
         try:
             os.fdatasync(self._file)
             sync(self.path.parent)
@@ -117,7 +117,7 @@ class RunLog:
         self._write({**line, "bytes": len(numbers)}, numbers)
 
     def _write(self, line: Mapping[str, Any], numbers: bytes) -> None:
-        """Write a line and its numbers at the end: until they are whole, the next ones overwrite them."""
+        """Write a line and its numbers at the end; after a failed write, the next write overwrites them."""
         seal = _seal_of(self._seal, line, numbers)
         self.end = self._put(self.end, _line({**line, _SEAL: seal}) + numbers)
         self._seal = seal
@@ -137,7 +137,7 @@ class RunLog:
                             "last state in it")  # fmt: skip
 
     def close(self, *, remove: bool = False) -> None:
-        """Give up the lock; with `remove` the file too."""
+        """Release the lock; with `remove`, also remove the file."""
         if remove:
             self.path.unlink(missing_ok=True)
         os.close(self._file)
@@ -148,7 +148,7 @@ def _line(record: Mapping[str, Any]) -> bytes:
 
 
 def _seal_of(before: str, line: Mapping[str, Any], numbers: bytes) -> str:
-    """Return what the line of a block says of all that it covers; `before` is what the line before it says."""
+    """Return the seal of a block: sha256 of the previous seal `before`, the line and its numbers."""
     unsealed = {name: value for name, value in line.items() if name != _SEAL}
     digest = hashlib.sha256(before.encode() + _line(unsealed))
     digest.update(numbers)
@@ -156,7 +156,7 @@ def _seal_of(before: str, line: Mapping[str, Any], numbers: bytes) -> str:
 
 
 def is_log(path: Path) -> bool:
-    """Whether a file is a log of ours."""
+    """Return whether a file is a log of iapb."""
     try:
         with path.open("rb") as file:
             return file.read(len(_BEGINNING)) == _BEGINNING
@@ -165,12 +165,12 @@ def is_log(path: Path) -> bool:
 
 
 def read_log(path: Path) -> tuple[dict[str, Any], Iterator[Block]]:
-    """Return the head of a log, and its whole blocks one by one, up to the first that is cut off or damaged.
+    """Return the head of a log, and its complete blocks one by one, up to the first incomplete or damaged block.
 
     Raises
     ------
     RunFileError
-        The file is no log that this version knows, or its head is damaged.
+        The file is not a log that this version supports, or its head is damaged.
     """
     if not is_log(path):
         raise RunFileError(f"{path}: no log of a run")
@@ -185,7 +185,7 @@ def read_log(path: Path) -> tuple[dict[str, Any], Iterator[Block]]:
 
 
 def _blocks_from(path: Path, start: int, before: str) -> Iterator[Block]:
-    """Yield the blocks of a log that are whole; `before` is the seal of its head."""
+    """Yield the complete blocks of a log; `before` is the seal of its head."""
     size = path.stat().st_size
     with path.open("rb") as file:
         file.seek(start)
@@ -201,7 +201,7 @@ def _blocks_from(path: Path, start: int, before: str) -> Iterator[Block]:
 
 
 def is_damaged(path: Path) -> bool:
-    """Whether a log holds more than its whole blocks and one that is cut off, as a kill or a full disk leaves it."""
+    """Return whether a log has more than complete blocks and one block cut off by a kill or a full disk."""
     end = 0
     for block in read_log(path)[1]:
         end = block.end
@@ -228,9 +228,9 @@ def _is_block(line: Mapping[str, Any]) -> bool:
 
 
 def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 0) -> tuple[Any, NDArray[np.float64]]:
-    """Return the chunk in a block as a record that `Recorder.keep` takes, and the `more` columns of the caller's.
+    """Return the chunk in a block as a record that `Recorder.keep` accepts, and the `more` columns of the caller.
 
-    `lengths` are those of the dimensions along which quantities go in this scene.
+    `lengths` are the lengths of the dimensions that depend on the scene.
     """
     steps, contacts, impacts = (int(block.line[name]) for name in ("steps", "contacts", "impacts"))
     rows = {**lengths, "time": steps, "step": steps, "contact": contacts, "impact": impacts, "axis": 3}
@@ -259,12 +259,12 @@ def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 
 
 
 def put_back(path: Path, block: Block, arrays: Sequence[NDArray[Any]]) -> None:
-    """Copy a state into the arrays that it was written from.
+    """Copy a state from a block into the arrays of the simulation.
 
     Raises
     ------
     RunFileError
-        It is of another scene.
+        The state belongs to another scene.
     """
     numbers, place = block.numbers, 0
     if len(numbers) != sum(array.nbytes for array in arrays):

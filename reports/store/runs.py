@@ -1,4 +1,4 @@
-"""A Run as a file: written, read back, and judged whether it can be trusted."""
+"""A Run as a file: write it, read it back, and check it for damage."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from reports.store.schema import (
 
 @dataclass(frozen=True)
 class RunEntry:
-    """What a run file says of itself, without its arrays: a line of the index."""
+    """The description of a run in its file, without arrays; it is also a line of the index."""
 
     file: str  # name within the folder
     title: str  # scene and world
@@ -59,20 +59,20 @@ def write_run(
     replace: bool = False,
     more: Callable[[Any], None] | None = None,
 ) -> Path:
-    """Write one run: aside first, synced, then moved to `path` in one step.
+    """Write one run to a temporary file, sync it, and move it to `path` atomically.
 
     Parameters
     ----------
     path
-        The file to make.
+        The file to write.
     key
-        Run key (`reports.store.keys.run_key`), empty for a run that belongs to no store.
+        Run key (`reports.store.keys.run_key`), empty for a run outside of a store.
     provenance
         Texts by name; `collect_provenance()` by default.
     replace
-        Whether a file at `path` is replaced. Otherwise an existing file stays as it is.
+        Whether a file at `path` is replaced. Otherwise an existing file is not changed.
     more
-        Writes groups of its own into the open file; who reads the run passes over them.
+        Writes additional groups into the open file; readers of the run ignore them.
     """
     store_run(path, run, key=key, provenance=provenance, replace=replace, more=more)
     return Path(path)
@@ -88,7 +88,7 @@ def store_run(
     replace: bool = False,
     more: Callable[[Any], None] | None = None,
 ) -> RunEntry:
-    """Write one run as `write_run` does, with the label of its code; return what the new file says of itself."""
+    """Write one run like `write_run`, with the label of its code; return the entry of the new file."""
     path = Path(path)
     with new_file(path, replace=replace) as file:
         _write_run(file, run, key, code, provenance)
@@ -101,9 +101,9 @@ def store_run(
 def store_parts(
     path: Path | str, parts: Iterator[Run], *, stopped: str = "", key: str, code: str = "", replace: bool = False
 ) -> RunEntry:
-    """Write a run that comes in parts, each going on from the one before: in constant memory, to the same content hash.
+    """Write a run that is given in consecutive parts, in constant memory; the content hash is that of the whole run.
 
-    `stopped` says why the run is not complete.
+    `stopped` is the reason why the run is incomplete, or "".
     """
     path = Path(path)
     with new_large_file(path, replace=replace) as file:
@@ -137,7 +137,7 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
 
 
 def _append(file: Any, part: Run) -> None:
-    """Append a part whose first state is the last one in the file."""
+    """Append a part; its first state equals the last one in the file."""
     for name, (quantities, record_of, _) in GROUPS.items():
         group = file[name]
         for quantity in quantities:
@@ -154,7 +154,7 @@ def _append(file: Any, part: Run) -> None:
 
 
 def _lengthen_scales(group: Any, dimensions: Mapping[str, str], part: Run) -> None:
-    """Bring the scales along the first dimensions to the length of what goes along them."""
+    """Extend the dimension scales of growing dimensions to the length of their quantities."""
     for dimension, name in dimensions.items():
         scale, length = group[dimension], len(group[name])
         extend(scale, part.time[1:] if dimension == "time" else np.arange(len(scale), length))
@@ -231,18 +231,18 @@ def _write_effects(group: Any, run: Run) -> None:
 def read_run(path: Path | str) -> Run:
     """Return the run in a file, partial or complete.
 
-    The seal is checked first and the content hash last, so a file that was changed is never taken for a run.
+    The seal is checked first and the content hash last, so a changed file is never accepted as a run.
 
     Raises
     ------
     RunFileError
-        If the file is absent, damaged or not a run.
+        The file is absent, damaged or not a run.
     """
     return read_stored(path)[0]
 
 
 def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
-    """Return the run in a file and what the file says of itself; raises as `read_run`."""
+    """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
     with opened(path) as file:
         entry = _entry(file, path)
         return _judged(Run(**_texts(file, path), **_head(file), **_arrays(file, path, read_values)), entry, path), entry
@@ -256,9 +256,9 @@ def _judged(run: Run, entry: RunEntry, path: Path | str) -> Run:
 
 @contextmanager
 def opened_run(path: Path | str) -> Iterator[tuple[Run, RunEntry]]:
-    """Give a run whose arrays stay in its file, to be read in `blocks`, and what the file says of itself.
+    """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
-    The file is judged as `read_stored` does, in constant memory.
+    The file is checked like in `read_stored`, but in constant memory.
     """
     with opened(path) as file:
         run, entry = _run_in(file, path), _entry(file, path)
@@ -270,12 +270,12 @@ def _run_in(file: Any, path: Path | str) -> Run:
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
-    """Return where a run or a table comes from, as texts by name.
+    """Return the provenance of a run or a table, as texts by name.
 
     Raises
     ------
     RunFileError
-        If the file is damaged, or an entry is no text.
+        The file is damaged, or an entry is not a text.
     """
     with opened(path, expected_format=None) as file:
         group = _group(file, "provenance", path)
@@ -287,7 +287,7 @@ def read_provenance(path: Path | str) -> dict[str, str]:
 
 
 def _group(file: Any, name: str, path: Path | str) -> Any:
-    """Return a group; a dataset in its place could be gone through for ever."""
+    """Return a group; raise RunFileError for a dataset in its place, because iterating over it might never end."""
     import h5py
 
     if not isinstance(file.get(name), h5py.Group):
@@ -296,12 +296,12 @@ def _group(file: Any, name: str, path: Path | str) -> Any:
 
 
 def read_entry(path: Path | str) -> RunEntry:
-    """Return what a run file says of itself. Reads no array.
+    """Return the entry of a run file, without reading an array.
 
     Raises
     ------
     RunFileError
-        If the file is absent, damaged, no run, or does not say it.
+        The file is absent, damaged or not a run, or its entry is incomplete.
     """
     with opened(path) as file:
         return _entry(file, path)
@@ -340,7 +340,7 @@ def _head(file: Any) -> dict[str, Any]:
 
 
 def _arrays(file: Any, path: Path | str, read: Callable[[Any, str, str], Any]) -> dict[str, Any]:
-    """Return names and arrays, these as `read` gives them: read_values, or dataset_of."""
+    """Return the names and arrays of a run; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
     place = str(path)
     group = {
         name: {quantity.name: _numbers(read, file[name], quantity.name, place) for quantity in quantities}
@@ -368,7 +368,7 @@ def _arrays(file: Any, path: Path | str, read: Callable[[Any, str, str], Any]) -
 
 
 class _Truths:
-    """Numbers 0 and 1, in a file or in memory, as the truth values that they stand for."""
+    """An array of booleans that are stored as numbers 0 and 1, in a file or in memory."""
 
     dtype = np.dtype(np.bool_)
 

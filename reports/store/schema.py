@@ -1,16 +1,16 @@
-"""Where a run file holds what: the groups that the writer and the reader share, of the quantities of `iapb.run`.
+"""The layout of a run file: the groups of the quantities of `iapb.run`, shared by writer and reader.
 
     /scene, /law, /coupling   texts: name, YAML source, every setting as JSON
     /trajectory               states at n + 1 instants
     /steps                    forces, impulse and contact state of the n steps between them
     /contacts                 ragged: those of step k are the rows offsets[k]:offsets[k + 1]
     /impacts                  one row per step and island of a colliding group
-    /energy                   the ledger, on instants and on steps
-    /effects                  what was on, and why
-    /struck                   only where an impact of bare numbers broke a law: see reports.store.impact
-    /timings, /provenance     outside the content hash: they differ from one machine to the next
+    /energy                   the energy balance, at instants and over steps
+    /effects                  the active effects, and the reasons
+    /struck                   only if an impact given by numbers broke a law: see reports.store.impact
+    /timings, /provenance     outside of the content hash, because they depend on the machine
 
-Each group carries its own dimension scales, so that it opens as one xarray dataset.
+Each group has its own dimension scales, so that it opens as one xarray dataset.
 """
 
 from __future__ import annotations

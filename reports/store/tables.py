@@ -41,7 +41,7 @@ ROW = "row"
 
 @dataclass(frozen=True)
 class Column:
-    """One column: numbers or truth values (an array), or texts (a tuple), all of one length.
+    """One column: an array of numbers or booleans, or a tuple of texts; all columns of a table have the same length.
 
     `unit` is in SI, ``"1"`` for a pure number or a text.
     """
@@ -54,9 +54,9 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Named columns of one length.
+    """Named columns of equal length.
 
-    `runs` names the run files that the numbers come from, `command` the one that makes the table again.
+    `runs` are the names of the run files behind the numbers, `command` is the command that reproduces the table.
     """
 
     name: str
@@ -74,19 +74,19 @@ class Table:
 
 
 def write_table(path: Path | str, table: Table, provenance: Mapping[str, str] | None = None) -> Path:
-    """Write one table to a file of its own, in the place of an older one. See `write_tables`."""
+    """Write one table to its own file, replacing an older file. See `write_tables`."""
     return write_tables(path, (table,), provenance)
 
 
 def write_tables(
     path: Path | str, tables: Sequence[Table], provenance: Mapping[str, str] | None = None
 ) -> Path:
-    """Write tables to one file, a group each, in one step.
+    """Write tables to one file atomically, each to its own group.
 
     Raises
     ------
     ArgumentError
-        If the columns of a table differ in length, or two things have one name.
+        The columns of a table differ in length, or two tables or two columns have the same name.
     """
     path = Path(path)
     _check_names("tables", [table.name for table in tables])
@@ -101,10 +101,10 @@ def write_tables(
 
 @contextmanager
 def growing_table(path: Path, others: Sequence[Table]) -> Iterator[Callable[[Table], None]]:
-    """Give a function that appends a part of a table of numbers; the others are written behind it, whole.
+    """Yield a function that appends a part of a numeric table; afterwards the tables `others` are written.
 
-    The parts have one name and the same columns, of which the first counts up. They come to the file of `write_tables`
-    in constant memory.
+    All parts have the same name and the same columns; the first column increases. The result is the file that
+    `write_tables` would write, but made in constant memory.
     """
     with new_large_file(path, replace=True) as file:
         parts: list[Table] = []
@@ -140,7 +140,7 @@ def read_table(path: Path | str, name: str | None = None) -> Table:
     Raises
     ------
     RunFileError
-        If the file is absent, damaged, no file of tables, or has no such table.
+        The file is absent, damaged or not a file of tables, or it has no such table.
     """
     tables = read_tables(path)
     if name is None:
@@ -151,7 +151,7 @@ def read_table(path: Path | str, name: str | None = None) -> Table:
 
 
 def read_tables(path: Path | str) -> dict[str, Table]:
-    """Return all tables of a file by name, the one to show first at the start; raises as `read_table`."""
+    """Return all tables of a file by name, the default table first; it raises the errors of `read_table`."""
     with opened(path, TABLE_FORMAT) as file:
         names = sorted(set(file) - {"provenance"}, key=lambda name: name != file.attrs["default"])
         tables = {name: _read(file[name], str(path)) for name in names}
@@ -174,7 +174,7 @@ def _is_text(values: Any) -> bool:
 
 
 def _hashable(values: Any) -> Any:
-    """What a column is after a trip to a file: texts as bytes, truth values as small integers."""
+    """Return a column in its stored form: texts as bytes, booleans as small integers."""
     if _is_text(values):
         return np.frombuffer("\0".join(values).encode(), np.uint8)
     array = values if hasattr(values, "dtype") else np.asarray(values)  # what is in a file stays there
@@ -195,7 +195,7 @@ def _check_columns(table: Table) -> None:
 
 
 def _write(group: Any, table: Table, *, growing: bool = False) -> None:
-    """Write a table; a `growing` one has no texts, and counts up in its first column."""
+    """Write a table; a `growing` table has no texts, and its first column increases."""
     first = table.columns[0]
     distinct = not _is_text(first.values) and len(np.unique(first.values)) == len(first.values) > 0
     dimension = first.name if distinct else ROW
@@ -237,7 +237,7 @@ _OUTCOMES, _KIND = "holds", "kind of "
 
 
 def columns_of(name: str, table: finding.Table) -> tuple[Table, dict[str, Any]]:
-    """Return a finding's table as columns to be stored, and the words that go with them; see `finding_table`."""
+    """Return a finding's table as columns to store, and its texts (titles, notes); see `finding_table`."""
     rows = [[plain(cell) for cell in row] for row in table.rows]
     columns: list[Column] = []
     for index, column in enumerate(table.columns):
@@ -251,7 +251,7 @@ def columns_of(name: str, table: finding.Table) -> tuple[Table, dict[str, Any]]:
 
 
 def finding_table(stored: Table | None, words: Mapping[str, Any]) -> finding.Table:
-    """Return the finding's table that `columns_of` took apart: equal in every cell, its type included."""
+    """Return the finding's table that `columns_of` converted; every cell has its original value and type."""
     columns = tuple(finding.Column(**column) for column in words["columns"])
     cells = [_decoded(stored, f"{index:02d} {safe_name(column.key)}") if stored else []
              for index, column in enumerate(columns)]  # fmt: skip
@@ -261,12 +261,15 @@ def finding_table(stored: Table | None, words: Mapping[str, Any]) -> finding.Tab
 
 
 def safe_name(text: str) -> str:
-    """Return a text as a name within a file."""
+    """Return a text as a valid name in a file."""
     return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_") or "table"
 
 
 def _encoded(name: str, cells: list[Any], unit: str, description: str) -> list[Column]:
-    """One column, numbers where all are, else texts; and the kind of every cell where that is not all of it."""
+    """Return cells as one column, of numbers if all are numbers, else of texts.
+
+    If the types of the cells do not follow from this column, return a second column with the type of each cell.
+    """
     if wrong := [cell for cell in cells if type(cell) not in _KINDS]:
         raise ArgumentError(f"cell of {name}", wrong[0], "a number, a text, a truth value or None")
     kinds = {type(cell) for cell in cells}

@@ -1,2 +1,2 @@
-"""Sweeps: one scene, many values. A study says which (`study`), `points` spells them out, `work` computes one of
-them into a run file, `schedule` hands them to processes or to a cluster, `sweep` keeps the results."""
+"""Sweeps: one scene simulated for many values. Module `study` reads a study and lists its points; module `sweep`
+computes each point to a run file, in this process, in worker processes or on a cluster, and stores the results."""

@@ -1,4 +1,4 @@
-"""Study: what a sweep file may say, where it is found, and its points. Read like a scene: every mistake at once."""
+"""Study: the contents of a sweep file, its location, and its points. Reading it reports all mistakes, as for a scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Values = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MAX_VALUES)
 
 
 class Range(Part):
-    """Evenly spaced values, on a line or by a factor."""
+    """Values with equal differences or equal ratios."""
 
     start: Number = Field(alias="from", description="first value")
     stop: Number = Field(alias="to", description="last value")
@@ -46,7 +46,7 @@ class Range(Part):
         return []
 
     def values(self) -> tuple[float, ...]:
-        """The values, ends exact."""
+        """Return the values; the first and the last are exact."""
         shares = [i / (self.count - 1) for i in range(self.count)]
         if self.scale == "log":
             ratio = self.stop / self.start
@@ -61,7 +61,7 @@ class Range(Part):
 
 
 class Span(Part):
-    """Where random values lie."""
+    """The interval of random values."""
 
     start: Number = Field(alias="from", description="least value")
     stop: Number = Field(alias="to", description="largest value")
@@ -75,7 +75,7 @@ class Span(Part):
 
 
 class Draws(Part):
-    """Random points: each draws every one of its values, evenly between two ends."""
+    """Random points: each value of a point is drawn from a uniform distribution on its interval."""
 
     count: Annotated[int, Field(ge=1, le=MAX_POINTS, strict=True)] = Field(description="how many points")
     seed: Annotated[int, Field(ge=0, le=2**63 - 1, strict=True)] = Field(0, description="of the random numbers")
@@ -100,12 +100,12 @@ class Study(Part):
 
     @property
     def size(self) -> int:
-        """Number of points."""
+        """Return the number of points."""
         combinations = math.prod(len(values) for values in self.axes().values())
         return len(self.worlds) * combinations * (self.random.count if self.random else 1)
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
-        """The values of each axis of the grid."""
+        """Return the values of each axis of the grid."""
         return {path: axis.values() if isinstance(axis, Range) else axis for path, axis in self.grid.items()}
 
 
@@ -117,7 +117,7 @@ def load_study(path: str | Path) -> Study:
     ArgumentError
         The file cannot be read.
     SceneError
-        It is not a study, or one of more than MAX_POINTS points; carries all of its mistakes.
+        The file is not a study, or has more than MAX_POINTS points; the error lists all mistakes.
     """
     try:
         with open(path, "rb") as file:
@@ -142,7 +142,7 @@ def study_from_text(text: str, file: str = "(text)") -> Study:
 
 
 def study_names() -> tuple[str, ...]:
-    """The studies that come with the project."""
+    """Return the names of the studies that come with the project."""
     return tuple(sorted(path.stem for path in (scene_folder() / "sweeps").glob("*.yaml")))
 
 
@@ -152,7 +152,7 @@ def find_study(name: str) -> Path:
     Raises
     ------
     ArgumentError
-        If there is neither; the message lists the studies there are.
+        There is no such file or study; the message lists the available studies.
     """
     path, ours = Path(name), scene_folder() / "sweeps" / f"{name}.yaml"
     if path.is_file():
@@ -163,17 +163,17 @@ def find_study(name: str) -> Path:
 
 
 def scene_of(study: Study, path: Path) -> Path:
-    """Return the scene file of a study: in its folder or below, or one that comes with the project.
+    """Return the scene file of a study: in the study's folder or below, or a scene that comes with the project.
 
     Parameters
     ----------
-    study : as read from its file
-    path : of that file
+    study : the study read from the file
+    path : path of the study's file
 
     Raises
     ------
     ArgumentError
-        The scene lies elsewhere, or there is none.
+        The scene is in another place, or it does not exist.
     """
     folder = path.resolve().parent
     if study.scene in scene_names():
@@ -195,7 +195,7 @@ def scene_of(study: Study, path: Path) -> Path:
 
 @dataclass(frozen=True)
 class Point:
-    """One simulation of a sweep: plain values, so that it travels to another machine.
+    """One simulation of a sweep, as plain values that can be sent to another machine.
 
     scene : path of the scene's file or its name; values : by scene path; law : settings of the law by name
     """
@@ -208,13 +208,13 @@ class Point:
     law: dict[str, Any]
 
     def key(self, code: str) -> str:
-        """Hash of what is asked for, by the given version of code and scene."""
+        """Return a hash of the point and of the given version of code and scene."""
         asked = {"world": self.world, "rendering": self.rendering, "values": self.values, "law": self.law}
         return hash_of({"asked": asked, "code": code})[:32]
 
 
 def points_of(study: Study, scene: str) -> Iterator[Point]:
-    """Yield the points: worlds outermost, then the grid in the order of its axes, the draws innermost."""
+    """Yield the points; the outer loop is over the worlds, then over the grid axes in order, then over the draws."""
     axes = study.axes()
     combinations = itertools.product(study.worlds, itertools.product(*axes.values()))
     index = 0
@@ -228,7 +228,7 @@ def points_of(study: Study, scene: str) -> Iterator[Point]:
 
 
 def draws(study: Study) -> Iterator[dict[str, float]]:
-    """Yield the random values; draw number i has a generator of its own, so that more draws change none before."""
+    """Yield the random values; each draw has its own generator, so additional draws do not change earlier ones."""
     if study.random is None:
         yield {}
         return

@@ -1,4 +1,4 @@
-"""Run a sweep: what is done stays done, whatever kills it; the results do not depend on order or workers.
+"""Run a sweep: finished points are kept if it is killed, and the results do not depend on order or workers.
 
     out/sweeps/<study>/runs/*.h5        one run file per point
     out/sweeps/<study>/results.jsonl    a line per finished point, appended as it comes
@@ -41,7 +41,7 @@ _MEASURES = {"impacts": "1", "energy_lost": "J", "penetration": "m", "kinetic_en
 
 @dataclass(frozen=True)
 class Result:
-    """What came of one point; the measures are None where it failed, and `note` says why."""
+    """The result of one point; for a failed point the measures are None, and `note` is the reason."""
 
     index: int
     point: str  # key of the point
@@ -59,7 +59,7 @@ class Result:
 class SweepOutcome:
     """A finished sweep.
 
-    results : by index of the point; reused : how many were there already; content_hash : of all results together
+    results : by index of the point; reused : number of points finished before; content_hash : hash of all results
     """
 
     folder: Path
@@ -69,7 +69,7 @@ class SweepOutcome:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """Points without a run, each with its reason."""
+        """Return the failed points, each with its reason."""
         return tuple(result for result in self.results if result.status == FAILED)
 
 
@@ -77,15 +77,15 @@ def run_sweep(
     study: Study, scene: str, out: Path | str = "out/sweeps", scheduler: Scheduler = here,
     progress: Callable[[int, int], None] | None = None,
 ) -> SweepOutcome:
-    """Compute every point of a study that is not there yet.
+    """Compute every point of a study that has no result yet.
 
     Parameters
     ----------
-    study : what to vary
-    scene : path of its scene file
-    out : folder of all sweeps; this one goes into the folder of its name
-    scheduler : who computes (`reports.batches`)
-    progress : called as progress(points done, points in all)
+    study : the values to vary
+    scene : path of the scene file
+    out : folder of all sweeps; this sweep is stored in a subfolder with its name
+    scheduler : distributes the points (`reports.batches`)
+    progress : called as progress(points done, total points)
     """
     folder = Path(out).resolve() / study.name
     mark_store(folder)
@@ -109,12 +109,12 @@ def run_sweep(
 
 
 def _code(scene: str) -> str:
-    """Version of code and scene: both decide what a point gives."""
+    """Return the version of code and scene, which both determine the result of a point."""
     return hashlib.sha256(code_version().encode() + Path(scene).read_bytes()).hexdigest()
 
 
 def _journal(folder: Path) -> dict[str, Result]:
-    """Finished points by key; a line cut off by a crash, a failure and a run whose file is gone do not count."""
+    """Return the finished points by key; incomplete lines, failed points and runs without a file are left out."""
     found: dict[str, Result] = {}
     there = {entry.name for entry in os.scandir(folder / RUNS)}
     for record in read_lines(folder / JOURNAL):
@@ -126,7 +126,7 @@ def _journal(folder: Path) -> dict[str, Result]:
 
 
 def _hash(results: tuple[Result, ...]) -> str:
-    """One hash of all contents, in the order of the points."""
+    """Return one hash of all results, in the order of the points."""
     digest = hashlib.sha256()
     for result in results:
         digest.update(f"{result.index} {result.status} {result.content_hash}\n".encode())
@@ -134,7 +134,7 @@ def _hash(results: tuple[Result, ...]) -> str:
 
 
 def _write_summary(path: Path, study: Study, points: list[Point], results: tuple[Result, ...]) -> None:
-    """A row per point: what was changed, what came of it, and in which file it is."""
+    """Write a table with a row per point: the changed values, the results, and the run file."""
     columns = [Column("point", np.arange(len(points)), "1", "index of the point")]
     columns += [Column("world", tuple(point.world for point in points), "1", "world")]
     columns += list(_changed(points))
@@ -158,17 +158,17 @@ def _numbers(results: tuple[Result, ...], name: str) -> np.ndarray:
 
 
 def compute_point(point: Point, folder: str, code: str) -> Result:
-    """Compute a point, or read its run where there is one.
+    """Compute a point, or read its run if it exists.
 
     Parameters
     ----------
-    folder : of the run files, which this machine must see
-    code : version that the sweep is made with; a worker of another version may not take part
+    folder : folder of the run files; this machine must have access to it
+    code : code version of the sweep; a worker with another version is refused
 
     Raises
     ------
     IapbError
-        This process runs another version of the code, or does not see the folder.
+        This process runs another version of the code, or cannot access the folder.
     """
     if code_version() != code:
         raise IapbError("a worker runs another version of iapb: install the same one on every machine")
@@ -183,7 +183,7 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
 
 
 def _run(point: Point, folder: Path) -> tuple[Run, RunEntry]:
-    """The run of a point and its file's entry; BLAS on one thread, or the sums would depend on the machine's cores."""
+    """Return the run of a point and its file's entry; BLAS uses one thread, so sums do not depend on the cores."""
     scene = _scene(point.scene).with_values(point.values)
     world = find_world(point.world, point.rendering)
     law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
@@ -208,7 +208,7 @@ def _scene(name: str) -> Scene:
 
 
 def _with_settings(law: Any, settings: dict[str, Any]) -> Any:
-    """The law with other settings; an unknown one is refused by name."""
+    """Return the law with other settings; raise ArgumentError for an unknown setting."""
     known = [field.name for field in fields(law)] if is_dataclass(law) else []
     for name, value in settings.items():
         if name not in known:
