@@ -1,4 +1,4 @@
-"""Study: the contents of a sweep file, its location, and its points. Reading it reports all mistakes, as for a scene."""
+"""Study: the contents of a sweep file, its location, and its points. Reading reports all mistakes, as for a scene."""
 
 from __future__ import annotations
 
