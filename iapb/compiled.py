@@ -40,15 +40,21 @@ from numpy.typing import NDArray
 
 from iapb.inlining import compile_as_whole
 
+# Files without kernels that decide what is compiled: how, and constants that kernels read.
+_READ_BY_KERNELS = ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays.py", "geometry.py")
+
+
+def _stamped_files() -> list[Path]:
+    """All files of the engine whose text decides what is compiled."""
+    return [path for path in sorted(Path(__file__).parent.rglob("*.py"))
+            if path.name in _READ_BY_KERNELS or b"@kernel" in path.read_bytes()]
+
 
 def _source_stamp() -> str:
-    """Hash all files with kernels. Numba alone would keep a cached kernel after a change of a kernel that it calls."""
+    """Hash these files. Numba alone would keep a cached kernel after a change of a kernel that it calls."""
     digest = hashlib.sha256()
-    folder = Path(__file__).parent
-    for path in sorted(folder.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@kernel" in text or path.name in ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays.py"):
-            digest.update(str(path.relative_to(folder)).encode() + b"\0" + text)
+    for path in _stamped_files():
+        digest.update(str(path.relative_to(Path(__file__).parent)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 

@@ -18,7 +18,7 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
-from iapb.compiled import Block, address_of, block, copy_into, kernel
+from iapb.compiled import Block, _stamped_files, address_of, block, copy_into, kernel
 
 ENGINE = Path(iapb.run.__file__).parent
 
@@ -221,6 +221,32 @@ def test_copy_into_copies(values):
     source, target = np.array(values, float), np.zeros(len(values))
     copy_into(target, source)
     assert np.array_equal(source, target)
+
+
+def test_the_stamp_of_kernels_covers_every_file_whose_constants_they_read():
+    """Else a changed constant would leave the machine code made with the old one in use."""
+    engine, stamped = Path(iapb.run.__file__).parent, {str(path) for path in _stamped_files()}
+    stale = [f"{path.relative_to(engine)} reads {name} of {module}"
+             for path in engine.rglob("*.py") for name, module in _read_by_kernels(ast.parse(path.read_text()))
+             if not stamped & {str(engine.parent / f"{module.replace('.', '/')}{end}")
+                               for end in (".py", "/__init__.py")}]
+    assert stamped >= {str(engine / "contact" / "geometry.py"), str(engine / "run.py")}
+    assert not stale
+
+
+def _read_by_kernels(tree: ast.Module) -> list[tuple[str, str]]:
+    """Names imported from the engine that the kernels of a file read, themselves or in its constants; their modules."""
+    read = {name for node in tree.body if isinstance(node, ast.FunctionDef)
+            and any(ast.unparse(each) == "kernel" for each in node.decorator_list) for name in _names(node)}
+    for node in reversed(tree.body):  # constants stand behind what they are made of
+        if isinstance(node, ast.Assign | ast.AnnAssign) and read & _names(node):
+            read |= _names(node)
+    return [(name.name, node.module) for node in tree.body if isinstance(node, ast.ImportFrom)
+            and str(node.module).startswith("iapb") for name in node.names if (name.asname or name.name) in read]
+
+
+def _names(node: ast.AST) -> set[str]:
+    return {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
 
 
 def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(tmp_path):
