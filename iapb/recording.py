@@ -272,10 +272,14 @@ class Recorder:
         """Continue the count from a number of steps that were done and stored before."""
         self.first = self.steps = steps
 
-    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
-        """Return the columns of `steps`, `contacts` or `impacts` over all chunks; `before` gives a first line."""
+    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None,
+               copied: bool = False) -> dict[str, Any]:
+        """Return the columns of `steps`, `contacts` or `impacts` over all chunks.
+
+        `before` gives a first line; `copied` gives arrays that share no memory with the chunks.
+        """
         table, ahead = list(_LINES).index(lines), before or {}
-        if self._room is not None and self._room.chunks == len(self.records):
+        if not copied and self._room is not None and self._room.chunks == len(self.records):
             used = self._room.used[table]
             found = {each.name: _filled(getattr(self._room.lines[lines], each.name), used) for each in _LINES[lines]}
             return found | {name: np.concatenate([first[None], found[name]]) for name, first in ahead.items()}
@@ -308,13 +312,14 @@ class Recorder:
     def _part(self, world: str, stopped: str) -> tuple[Run, Callable[[Run], dict[str, Floats]]]:
         """Return the Run, and the function that computes all its energies."""
         simulation, system = self.simulation, self.simulation.system
-        steps = self.joined("steps", self.start)
+        more = bool(stopped)  # a run may go on, and whoever has this part may change it
+        steps = self.joined("steps", self.start, copied=more)
         states = {each.name: steps.pop(each.name) for each in STATES}
         counts = self._counts()
         offsets = np.zeros(len(counts) + 1, np.int64)
         np.cumsum(counts, out=offsets[1:])
         law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
-        impacts = self.joined("impacts")
+        impacts = self.joined("impacts", copied=more)
         struck = states["q"][impacts["step"] - self.first]
         device = system.device_mechanism() if coupling.name != "none" else None
         ledger = _once(partial(energy_of_run, mechanism=mechanism, gravity=system.gravity, device=device,
@@ -336,7 +341,7 @@ class Recorder:
             velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
             body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states, **steps,
-            contacts=ContactTable(offsets, **self.joined("contacts")),
+            contacts=ContactTable(offsets, **self.joined("contacts", copied=more)),
             impacts=ImpactTable(**impacts, mass_digest=digests(mechanism.mass_matrices(struck))),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks, **later,

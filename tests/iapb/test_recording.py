@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.recording import Recorder, chunk_steps
+from iapb.run import quantities
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
@@ -74,6 +75,27 @@ def test_a_run_that_fits_into_a_room_is_neither_joined_nor_holds_what_is_empty()
     assert np.shares_memory(recorder.joined("steps")["impulse"], room.lines["steps"].impulse)
     recorder.keep(recorder.blank(2000)[0], 0, 0.0)  # a chunk from elsewhere: all are joined again
     assert recorder._room is None and len(recorder.joined("steps")["impulse"]) == recorder.steps == STEPS + 512
+
+
+def values_of(run):
+    """The bytes of everything that the loop recorded, but for the time it took."""
+    return {each.name: getattr(record, each.name).tobytes() for record in (run, run.contacts, run.impacts)
+            for each in quantities(type(record)) if each.name != "chunk_seconds"}
+
+
+def test_changing_the_run_of_a_checkpoint_changes_no_other_run():
+    class Careless:
+        due, runs = True, 0
+
+        def __call__(self, run):
+            self.runs += 1
+            for record in (run, run.contacts, run.impacts):
+                for each in quantities(type(record)):
+                    getattr(record, each.name)[...] = 1
+
+    scene, careless = load_scene(find_scene("peg_corner")), Careless()
+    changed = simulate(scene, steps=STEPS + 512, checkpoint=careless)
+    assert careless.runs and values_of(changed) == values_of(simulate(scene, steps=STEPS + 512))
 
 
 def test_rendered_force_is_contact_forces_and_impulse_over_the_step():
