@@ -52,8 +52,8 @@ def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
     """Return the value of a key in a cache, made if it is absent; the cache keeps the last `_KEPT` used values."""
     found = store.pop(key, None)
     store[key] = found = make() if found is None else found
-    while len(store) > _KEPT:
-        store.pop(next(iter(store)), None)
+    for old in [*store][:-_KEPT]:  # of a list, for another thread may change the store meanwhile
+        store.pop(old, None)
     return found
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from iapb.errors import SceneError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import angles_of, rotation_of
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text
-from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.mechanism import kept, mechanism_of, pairs_of, shapes_of, start_of
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
 CHAIN = scene_from_text("""\
@@ -246,3 +248,26 @@ def test_neighbouring_links_of_the_arm_are_no_pairs() -> None:
     bodies = {tuple(sorted((int(shapes.body[a]), int(shapes.body[b])))) for a, b in pairs_of(scene, shapes)}
     assert not joined & bodies
     assert (names.index("arm_upper_arm"), names.index("arm_tool")) in bodies
+
+
+def test_threads_may_share_what_is_kept():
+    """Where one thread drops what was asked for long ago, another may add to the store."""
+    store, failures, before = {}, [], sys.getswitchinterval()
+
+    def ask(first):
+        try:
+            for k in range(first, first + 20_000):
+                assert kept(store, k, lambda k=k: [k]) == [k]
+        except Exception as error:  # a thread's own would be lost
+            failures.append(error)
+
+    sys.setswitchinterval(1e-6)
+    try:
+        threads = [threading.Thread(target=ask, args=(100_000 * i,)) for i in range(4)]
+        for each in threads:
+            each.start()
+        for each in threads:
+            each.join()
+    finally:
+        sys.setswitchinterval(before)
+    assert not failures and len(store) <= 8 + len(threads)
