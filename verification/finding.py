@@ -36,13 +36,13 @@ LEAST_SHARE = 0.5
 LEAST_CONFIRMING = LEAST_DECIDED = 10
 SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
 _MOST_ENDS = 8  # above the number of ends of two intervals
-_DECADES = 1e3  # a condition that spans more is measured by decades
+_DECADES = 1e3  # a condition with a larger ratio of its ends is measured in decades
 _LISTED = 8  # if there are more values, only the smallest and largest are printed
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
-HOLDS = "holds"  # heading of the outcomes, where a table is printed
-WORDS = {True: "yes", False: "no", None: "cannot tell"}  # of an outcome
+HOLDS = "holds"  # heading of the outcomes in printed tables
+WORDS = {True: "yes", False: "no", None: "cannot tell"}  # words for the outcomes
 FAILED_CASES = "not computed"  # name of the table of cases that failed
 # Quantities that several pages quote: in a report each has one value and one verdict. To add one, add its name here;
 # the Part or Finding whose sentence quotes it lists the name with the value as printed.
@@ -198,7 +198,7 @@ def titled(
 class Region:
     """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
 
-    bounds : condition, its unit, lowest and highest value; None if the tested range has no bound on that side
+    bounds : condition, its unit, lowest and highest value; None if the region extends to the end of the tested range
     searched : number of trials inside, from the half in which the region was found; others : from the other half
     fresh : number of trials drawn for the confirmation
     share : share of the tested range that the region covers, by length or by decades
@@ -236,7 +236,7 @@ class Part:
     timed : True if measured times enter
     optional : True if the part needs software that the project does not include, such as another engine; if that
         software is absent, the other parts decide the verdict
-    miss : one short clause for the first page that says where our method falls short; "" if it does not
+    miss : one short clause for the first page that says where our method falls short; otherwise ""
     quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
     """
 

@@ -139,7 +139,7 @@ class ImpactCase:
 
     @cached_property
     def largest_noise(self) -> float:
-        """Largest singular value of the unit rows that counts as rounding; 0 where there is none."""
+        """Largest singular value of the unit rows that counts as rounding; 0 if there is none."""
         values = self._svd[0]
         return float(np.max(values[values <= ROUNDING_BELOW], initial=0.0))
 
@@ -466,9 +466,9 @@ def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
     return np.vstack([basis, mixing @ basis])
 
 
-# Impacts on which equalities and complementarity have the same exact answer, so that both can be measured: the approach
-# is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes at every contact, so that the equality law (21) and
-# Newton's LCP have one and the same v⁺ (to the rounding of v⁻ in nearly dependent directions).
+# Impacts for which equalities and complementarity have the same exact answer, so that both errors can be measured.
+# The velocity is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes at every contact, so the equality law
+# (21) and Newton's LCP have the same v⁺ (up to the rounding of v⁻ in nearly dependent directions).
 TIMED_HARDNESS = tuple((condition, closeness) for condition in (1e0, 1e3, 1e6) for closeness in (1.0, 1e-3, 1e-6))
 
 

@@ -148,7 +148,7 @@ def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | N
                 kept = counts.setdefault(law, RunningCount()).add(residual)
                 if not kept and sum(one.law == law for one in found) < STORED_PER_LAW:
                     struck = strike(batch.part, case, subject.resolver)
-                    # replaced by itself: a copy without what its laws have worked out
+                    # replace() makes a copy without the cached answers of the laws
                     found.append(Found(law, batch.part, index, residual, replace(case), run, struck))
             if progress is not None:
                 progress(index + 1 - batch.first)

@@ -394,7 +394,7 @@ def _refuse_signature(resolver: Resolver, contract: str) -> None:
     except TypeError as error:
         raise ArgumentError("resolver", name_of(resolver), f"a function called as ({', '.join(wanted)}): {error}"
                             ) from None
-    except ValueError:  # a compiled function need not say what it takes
+    except ValueError:  # a compiled function may have no signature
         return
 
 

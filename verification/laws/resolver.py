@@ -12,7 +12,7 @@ from iapb.errors import IapbError
 from verification.impacts import Floats, ImpactCase
 
 Resolver = Callable[..., Any]  # called with `ImpactCase.given()`
-SUSPICIOUS = 1e-9  # relative gain in plain doubles; for κ(M) above 1e4 the kit's bounds allow more than this
+SUSPICIOUS = 1e-9  # relative gain in plain doubles; for κ(M) well above 1e4 the kit's bounds allow more than this
 
 
 class ResolverFault(IapbError):
@@ -81,7 +81,7 @@ def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> F
     """Return a copy of v⁺, or the fault of an unusable answer; raise ResolverFault if the resolver raises."""
     try:
         answer = resolver(*given)
-    except Exception as error:  # anybody's resolver: whatever it raises is the finding
+    except Exception as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
         raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
     velocity = np.asarray(getattr(answer, "velocity", answer))
     if velocity.dtype.kind not in "fiu" or velocity.shape != case.velocity.shape:

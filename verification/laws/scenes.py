@@ -140,7 +140,7 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     }  # fmt: skip
     if rng.random() < 0.4:
         friction = round(rng.uniform(0.05, 1.0), 3)
-        law = "regularised" if round(1e3 * friction) % 3 == 0 else "coulomb"  # no draw: all else stays as it was
+        law = "regularised" if round(1e3 * friction) % 3 == 0 else "coulomb"  # no draw: all other values stay the same
         contact |= {"friction": friction, "friction_velocity": 1e-2, "friction_law": law}
     if rng.random() < 0.5:
         contact["coherence_distance"] = 1e-2

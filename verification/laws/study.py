@@ -41,16 +41,16 @@ from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory
 
 IMPACTS = {"quick": 100_000, "full": 1_000_000}
-COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # of the variants shown beside it
+COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # impacts of the compared variants
 KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
-ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60  # cases of a law; of one that simulates each; with a fault
+ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60  # cases per law, per simulating law, with a fault
 TRAJECTORIES, IN_SPACE, TRAJECTORY_STEPS = 60, 40, 300
-COUNTER_IMPACTS, SEARCH = 500, 300  # of the search for a counterexample
+COUNTER_IMPACTS, SEARCH = 500, 300  # for the search of a counterexample
 SEED = 20050601
 COLUMNS = (
     Column("law"), Column("cases"), Column("worst", prose=True), Column("bound"), Column("holds"), Column("fault"),
     Column("fault caught"),
-)  # the worst of random cases depends on rounding: it is shown, not compared
+)  # the worst of random cases depends on rounding, so it is printed but not compared
 BULK = (
     "method", "condition of M from", "impacts", "largest relative energy gain", "gain / (10 d ε √κ)", "gain / (d ε κ)",
     "above 10 d ε √κ", "largest restitution residual",
@@ -100,7 +100,7 @@ def _impact_laws(failures: list[Failure]) -> Iterator[Row]:
 def _engine_law(name: str) -> Iterator[Row]:
     cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
     verdict, (fault, make) = judge_engine_law(name, cases=cases, seed=SEED), PLANTED_ENGINE_FAULTS[name]
-    with np.errstate(all="ignore"):  # the faults compute with what overflows
+    with np.errstate(all="ignore"):  # the faulty subjects may overflow
         caught = not judge_engine_law(name, make(), cases=min(cases, FAULT_CASES), seed=SEED).passed
     yield _row(verdict.statement, verdict.checked, verdict.worst, verdict.passed, fault, caught)
 

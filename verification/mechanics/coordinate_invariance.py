@@ -33,7 +33,7 @@ from verification.mechanics.planar_arm import Contact, PlanarArm
 Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(np.float64).eps)
-AGREEMENT = 1e-10  # of the velocity in the kinetic metric, where the conditions are moderate:
+AGREEMENT = 1e-10  # tolerance relative to the velocity in the kinetic metric, for moderate condition numbers:
 MODERATE = 1e4  # largest kappa(M) and kappa(df/dr)^2 there
 SEPARATED = 0.1  # and least sigma_min of independent rows of unit length
 CONSTANT = 10.0  # C of the bound, times d: a Cholesky factor, two solves and a projection

@@ -30,7 +30,7 @@ def stretch(start: Floats, reach: float) -> Path:
 
 
 def across(start: Floats, reach: float) -> Path:
-    """Return a line through the base to the other side and back: the arm folds, and its hand passes the base."""
+    """Return a line through the base to the other side and back: near the base the arm folds."""
     return along([start, -0.9 * reach * start / np.linalg.norm(start), start])
 
 

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 # Initial gaps that order the contacts for the event-driven reference; its gaps change linearly, so any size works.
 _GAP = 1e-3
-# Relative change of energy or momentum that is rounding: some thousand roundings of numbers of order one.
+# Largest relative change of energy or momentum due to rounding: some thousand roundings of numbers of order one.
 CONSERVED = 1e-12
 RELATIVE, PER_BODY = "simultaneous, relative rows (12)", "simultaneous, per-body rows (13)-(14)"
 SEQUENTIAL = "event-driven"

@@ -138,7 +138,7 @@ def _condition(mass: Floats) -> float:
 
 
 def judged(table: Table) -> Table:
-    """Judge each row: the median order must be the declared one, and a share LEAST_SHARE of the trees must show one."""
+    """Judge each row: the median order must be the declared one, and at least half of the trees must show an order."""
     return table.judged(_holds)
 
 

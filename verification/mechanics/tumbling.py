@@ -40,7 +40,7 @@ COARSEST = {
     "commutator_free_4": 100,
 }  # steps: small enough to show the order
 HALVINGS = {"quick": 4, "full": 6}
-ORDER_TOLERANCE = 0.15  # what the next error term adds at these steps
+ORDER_TOLERANCE = 0.15  # size of the next error term at these steps
 ROUNDING = 1e-10  # smaller errors contain the rounding of some thousand steps (1e-12) and show no order
 
 COLUMNS = (

@@ -166,7 +166,7 @@ class _Script:
             self._lemma(name, claim, step.cofactors)
         elif isinstance(step, Cancelling | Dividing):
             self._inference(name, step)
-        elif not isinstance(step, Exact):  # numbers are compared, nothing is expanded
+        elif not isinstance(step, Exact):  # Exact steps compare numbers: there is nothing to expand
             raise NotExportable(f"a step of kind {type(step).__name__}")
 
     def _inference(self, name: str, step: Cancelling | Dividing) -> None:

@@ -86,7 +86,7 @@ def energy_book(run: Run) -> dict[str, float]:
             for name, values in parts.items() for when, place in (("start", 0), ("end", -1))}  # fmt: skip
     book |= {
         "work of the hand": float(ledger["hand_work"][-1]), "work of the coupling": float(ledger["coupling_work"][-1]),
-        "lost in impacts": float(series.lost_impacts[-1]) + 0.0,  # + 0.0: no minus before nothing
+        "lost in impacts": float(series.lost_impacts[-1]) + 0.0,  # + 0.0 turns −0.0 into 0.0
         "lost in contact damping": float(series.lost_damping[-1]) + 0.0,
         "lost in friction": float(series.lost_friction[-1]) + 0.0,
         "open: motion": float(ledger["integration_residual"][-1]),

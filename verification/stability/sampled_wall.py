@@ -102,7 +102,7 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
         force = wall.answer(x)
         acceleration = (loop.push - force) / loop.mass
         x, v = x + moved * v + held * acceleration, free * v + moved * acceleration
-        diverged = ~(np.abs(x) < 1e3)  # metres: the loop has lost it, and would overflow
+        diverged = ~(np.abs(x) < 1e3)  # metres: the motion diverges and would overflow
         x, v = np.where(diverged, 1e3, x), np.where(diverged, 1e3, v)
         positions[k], speeds[k], forces[k] = x, v, force
     return _watched(loop, positions, speeds, forces)

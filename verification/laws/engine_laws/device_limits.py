@@ -27,7 +27,7 @@ class LimitedImpact:
     impact: ImpactCase
     impulse: Floats  # (d,) [N s, N m s]
     dt: float
-    force_limit: Floats  # (d,) [N, N m], infinite where there is none
+    force_limit: Floats  # (d,) [N, N m], infinite for no limit
 
 
 def draw(rng: np.random.Generator) -> LimitedImpact:

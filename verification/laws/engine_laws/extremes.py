@@ -59,6 +59,6 @@ def finite_or_named(case: ImpactCase, subject: Resolver) -> LawResidual:
         fine = v_plus.shape == case.velocity.shape and bool(np.all(np.isfinite(v_plus)))
     except IapbError:
         fine = True
-    except Exception:  # whatever else is raised is the finding
+    except Exception:  # any other exception breaks the law
         fine = False
     return LawResidual("extremes", 0.0 if fine else 1.0, 0.0)

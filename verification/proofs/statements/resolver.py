@@ -273,7 +273,7 @@ ANY_TRUNCATION_CASE = instance({"Q₁": [[1], [0]], "Q₂": [[0], [1]], "u": [1,
 
 
 def any_truncation() -> Statement:
-    """The anytime form: every truncation of the factored form is passive, and the missing energy loss is known."""
+    """The anytime form: every truncation of the factored form is passive at a known distance from the full answer."""
     q1, q2, u = matrix("Q₁", "d", "k"), matrix("Q₂", "d", "m"), vector("u", "d")
     early, full = vector("u₁", "d"), vector("u₂", "d")
     names = (
