@@ -22,7 +22,7 @@ from iapb.mechanics.kernels.cholesky import cholesky
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
 # part cancels; the Cholesky factor is that of the symmetric part.
 _SYMMETRY_TOLERANCE = 1e-9
-_LOWEST_EXPONENT = -100_000  # exponent of zeros, so that they are never the maximum
+_LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
 _EXACT = 1000  # largest difference of binary exponents from the largest entry that still scales exactly
 
 # Reasons to refuse an impact, returned with their place: (reason, i, j).

@@ -22,7 +22,7 @@ from iapb.mechanics.kernels.cholesky import solve_tree_blocks
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
 
-SWEEPS = 30  # at most in a step: contacts that have not converged slip, and the next step continues from there
+SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
 STILL = 1e-6  # share of the fastest slip: a sweep that changes velocities by less is the last one
 
 

@@ -156,7 +156,7 @@ def passive_share(u, change, moved):
 # Largest number of rounds. Convergence usually takes 3 to 30; an iteration that has not converged by then oscillates or
 # diverges (no solution), or no non-negative impulses exist.
 ROUNDS = 200
-UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way, then a fifth: large μ can make them oscillate
+UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way only, then a fifth: large μ can make them swing
 HALF, FIFTH = 0.5, 0.2
 STRIDE = 10.0  # largest over-relaxation of a limit, for friction that loads its own contact, μ ∂p_n/∂p_t → 1
 AT_LIMIT = 0.99  # share of a limit: a contact below it sticks
@@ -166,7 +166,7 @@ STILL = 1e-12
 MET = 1e-10
 # Sweeps of p_t in a round, in which the limits move anyway: until one changes velocities by a tenth of the first.
 SWEEPS, SETTLED = 10, 0.1
-HELD_SWEEPS = 200  # sweeps with constant limits
+HELD_SWEEPS = 200  # with the limits held for good
 PUSHES = 1e-9  # share of the normal impulse that non-negative impulses may miss: rounding of the active set
 # Of the largest normal impulse: friction may exceed a limit by this, the rounding of impulses that cancel.
 CONE_ROUNDING = 1e-12
@@ -372,9 +372,9 @@ SINGULAR = 1e-12
 
 @kernel
 def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, still):
-    """Sweep over the contacts: set p_i to make w_i = 0 if |p_i| ≤ radius_i allows it, else to proj(p_i − w_i / ρ_i).
+    """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i − w_i / ρ_i).
 
-    w = slip + B Bᵀ p is the tangential velocity, proj the projection on the disc |p_i| ≤ radius_i; p changes in place.
+    w = slip + B Bᵀ p is the tangential velocity, proj projects on the disc of radius radius_i; p changes in place.
 
     free : (k m, d) rows B: tangential impulses change u by Bᵀ p and keep the normal velocities
     slip : (k m,) tangential velocity without friction; radius : (k,) μ p_n; inertia : (k,) ρ ≥ ‖B_i B_iᵀ‖
