@@ -135,7 +135,7 @@ class Table:
 
     @property
     def keys(self) -> list[str]:
-        """Key of each column."""
+        """Keys of the columns."""
         return [column.key for column in self.columns]
 
     @property
@@ -341,7 +341,7 @@ def check_depth(depth: str) -> None:
 
 
 def worst(verdicts: Iterable[str]) -> str:
-    """Return the worst of some verdicts; NOT_COMPUTED for none."""
+    """Return the worst verdict; NOT_COMPUTED if there is none."""
     return min(verdicts, key=WORST_FIRST.index, default=NOT_COMPUTED)
 
 

@@ -57,17 +57,17 @@ class ImpactCase:
 
     @property
     def coordinates(self) -> int:
-        """d."""
+        """Number of coordinates d."""
         return len(self.velocity)
 
     @property
     def contacts(self) -> int:
-        """c."""
+        """Number of contacts c."""
         return len(self.contact_jacobian)
 
     @property
     def redundancy(self) -> int:
-        """Rows beyond the rank of J."""
+        """Number of rows beyond the rank of J."""
         return self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian)) if self.contacts else 0
 
     @property
@@ -121,7 +121,7 @@ class ImpactCase:
 
     @cached_property
     def is_separated(self) -> bool:
-        """No singular value of the unit rows lies between rounding and motion: the rank is beyond doubt."""
+        """Whether no singular value of the unit rows lies between rounding and motion, so that the rank is certain."""
         values = self._svd[0]
         return not np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE))
 
@@ -145,11 +145,11 @@ class ImpactCase:
 
     @cached_property
     def speed(self) -> float:
-        """|u| = √(vᵀMv)."""
+        """Kinetic norm |u| = √(vᵀMv)."""
         return float(np.linalg.norm(self.lower.T @ self.velocity))
 
     def distance(self, one: Floats, other: Floats) -> float:
-        """Distance of two velocities in the kinetic metric, relative to |u|."""
+        """Distance between two velocities in the kinetic metric, relative to |u|."""
         length = float(np.linalg.norm(self.lower.T @ (one - other)))
         return length / self.speed if self.speed > 0.0 else (0.0 if length == 0.0 else np.inf)
 

@@ -54,7 +54,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Batch:
-    """Cases first … first + count − 1 of a part."""
+    """A batch of the cases first … first + count − 1 of a part."""
 
     part: str
     first: int

@@ -221,7 +221,7 @@ def units_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
 
 # C06: other coordinates q' = T⁻¹q give the same motion, v'⁺ = T⁻¹v⁺.
 def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of v⁺ from T v'⁺ with T = 1 + a cyclic shift / 2, of condition at most 3."""
+    """Distance of v⁺ from T v'⁺, where T = I + (cyclic shift)/2 has a condition number of at most 3."""
     if not case.is_separated:
         return None
     d = case.coordinates

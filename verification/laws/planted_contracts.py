@@ -16,12 +16,12 @@ def _pushing(M: Floats, J: Floats, v: Floats, factor: float) -> Floats:
 
 
 def newton(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988); p/(1 + e) minimizes |u + Aᵀp|."""
+    """Newton's law 0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988), where p/(1 + e) = q minimizes |u + Aᵀq|."""
     return _pushing(M, J, v, 1.0 + e)
 
 
 def poisson(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra 1997)."""
+    """Poisson's law 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra 1997)."""
     return _pushing(M, J, newton(M, J, v, e), 1.0)
 
 
@@ -115,7 +115,7 @@ def _pulls(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> 
 
 
 def _strikes_what_separates(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """The convex relaxation (Anitescu and Tasora 2010) at e = 0: a sliding contact opens at μ|v_t|."""
+    """The convex relaxation (Anitescu and Tasora 2010) at e = 0: a sliding contact separates with velocity μ|v_t|."""
     if not len(J):
         return v
     rows = np.concatenate([J[:, None], T], axis=1).reshape(-1, len(v))

@@ -102,7 +102,7 @@ def cradle(balls: int = 5) -> LinkedBalls:
 
 
 def bernoulli(degrees: float = 30.0) -> LinkedBalls:
-    """Bernoulli's three balls: ball 0 arrives along +x, balls 1 and 2 lie at ± the angle and touch at 30°."""
+    """Bernoulli's three balls: ball 0 arrives along +x; balls 1 and 2 lie at ±`degrees` and touch each other at 30°."""
     angle = math.radians(degrees)
     normals = np.array([[-math.cos(angle), -math.sin(angle)], [-math.cos(angle), math.sin(angle)], [0.0, 1.0]])
     velocity = np.zeros((3, 2))

@@ -68,7 +68,7 @@ DEFINITE_COLUMNS = (
 def power_balance(
     depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
 ) -> Table:
-    """Measure the order with which the power balance closes, for every integrator and size of tree."""
+    """Measure the order with which the defect of the power balance falls, for every integrator and tree size."""
     check_depth(depth)
 
     def rows_of(case: tuple[Integrator, int]) -> list[dict[str, Any]]:
@@ -150,7 +150,7 @@ def _holds(row: Row) -> bool:
 def positive_definite(
     depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
 ) -> Table:
-    """Judge the least eigenvalue of random trees' mass matrices, scaled to a unit diagonal."""
+    """Check that the least eigenvalue of random trees' mass matrices, scaled to a unit diagonal, is positive."""
     check_depth(depth)
     rows = of_each(SIZES, lambda joints: [_definite(joints, 10 * TREES[depth], seed)], failures,
                    lambda joints: f"{joints} joints")  # fmt: skip

@@ -188,7 +188,7 @@ def scene_mechanisms() -> Iterator[tuple[str, Mechanism]]:
 def compare_written(
     depth: str = "quick", seed: int = SEED, reader: Reader = model_from_urdf, failures: list[Failure] | None = None
 ) -> Table:
-    """Compare the project's own robots and random URDF texts, read by the engine and by Pinocchio's parser."""
+    """Compare the project's robots and random URDF texts, as read by the engine and by Pinocchio's parser."""
     check_depth(depth)
 
     def rows_of(case: tuple[tuple[str, list[Path]], bool]) -> list[dict[str, Any]]:

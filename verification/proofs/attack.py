@@ -50,7 +50,8 @@ class Impacts(NamedTuple):
 
 @dataclass(frozen=True)
 class Attack:
-    """Outcome: the largest ratio gain / bound per family and per decade of κ(M), and the impact that reached it."""
+    """Result of an attack: the largest gain / bound per family and per decade of κ(M), and the impact with the largest.
+    """
 
     count: int
     seconds: float

@@ -33,7 +33,7 @@ REORTHOGONALISED_OVERLAP = 2.0**-10
 
 
 def gain_bound(d: int, kappa: float) -> float:
-    """Largest relative gain of kinetic energy that the clamped resolver can show.
+    """Return the largest relative gain of kinetic energy that the clamped resolver can have.
 
     (KE⁺ − KE⁻)/KE⁻ ≤ (65/64)(12u + 6u√κ) + 13τ + 10u²κ with τ = 16 (d+1) √d u² κ; see the module's derivation.
 
@@ -56,7 +56,7 @@ def gain_bound(d: int, kappa: float) -> float:
 
 
 def promised_bound(d: int, kappa: float) -> float:
-    """10 d ε √κ, the bound promised by the design; never below `gain_bound` for κ ≤ 10²⁴/d (fp_promise)."""
+    """Return 10 d ε √κ, the guaranteed bound; it is at least `gain_bound` for κ ≤ 10²⁴/d (fp_promise)."""
     _check(d, kappa)
     return 10.0 * d * EPSILON * math.sqrt(kappa)
 
@@ -100,7 +100,7 @@ def radius_margins(d: int) -> tuple[Fraction | int, Fraction | int, Fraction | i
 
 @dataclass(frozen=True)
 class _Linear:
-    """w W + change η Σ|Δᵢ| + one η."""
+    """The linear form w W + change η Σ|Δᵢ| + one η."""
 
     w: Fraction | int
     change: Fraction | int

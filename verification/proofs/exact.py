@@ -149,7 +149,7 @@ def _sizes(value: Expression, given: Instance) -> dict[str, int]:
 
 
 def holds(fact: Fact, given: Instance, backend: Any = FlintBackend) -> bool:
-    """Decide a fact on an instance, exactly."""
+    """Whether a fact holds on an instance, by exact arithmetic."""
     match fact:
         case Equation():
             return all(entry == 0 for row in evaluate(fact.difference, given, backend) for entry in row)

@@ -36,7 +36,7 @@ RELATIONS = {"=": operator.eq, "≠": operator.ne, "<": operator.lt, "≤": oper
 
 
 class Refused(IapbError):
-    """A step does not follow from its certificate."""
+    """Error: a step does not follow from its certificate."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def deepest_penetration(trace: Trace) -> float:
 
 
 def largest_separation(trace: Trace) -> Floats:
-    """Return the largest difference of tool and device per coordinate (3,)."""
+    """Return the largest difference between tool and device per coordinate (3,)."""
     return np.max(np.abs(trace.tool - trace.device), axis=0)
 
 

@@ -45,7 +45,7 @@ COLUMNS = titled((
 
 
 def device_port_leaks(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Measure every wall, sensor and kind of motion."""
+    """Measure the energy leak for every wall, sensor and kind of motion."""
 
     def leak(case: tuple[tuple[str, float, float], str, str]) -> list[dict[str, Any]]:
         wall, sensors, kind = case

@@ -49,7 +49,7 @@ class Loop:
 
     @property
     def step(self) -> float:
-        """T [s]."""
+        """Step T [s]."""
         return 1.0 / self.rate
 
     def passive_damping(self, stiffness: Floats) -> Floats:

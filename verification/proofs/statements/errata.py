@@ -47,7 +47,7 @@ def erratum_half() -> Statement:
 
 
 def erratum_symmetric() -> Statement:
-    """Erratum: after (32) the paper concludes "symmetric, hence positive semi-definite"."""
+    """Erratum: after (32) the paper concludes "symmetric, hence positive semi-definite", which does not follow."""
     mass, x, form = matrix("D", "d", "d"), matrix("X", "d", "d"), matrix("S", "d", "d")
     name = equation("the matrix of the loss, with X = J̄ J", form, x.T * mass * x)
     definite = Definite("D is positive definite", mass)
