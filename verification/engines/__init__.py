@@ -1,4 +1,4 @@
-"""Engines side by side on the fixed scenes: what each did with energy, momentum and overlap, at which settings."""
+"""Compare engines on the fixed scenes by energy, momentum and overlap, at two choices of settings."""
 
 from verification.engines.record import EngineRecord
 from verification.engines.study import SETTINGS, compare_engines, installed

@@ -1,6 +1,6 @@
-"""The runs: engines × fixed scenes × settings (each engine's own, and one step for all).
+"""Run all engines on all fixed scenes, with each engine's own settings and with the same step for all.
 
-The numbers of a trajectory are the same for every engine, computed from its positions and velocities alone.
+All engines are measured in the same way, from the positions and velocities of their trajectories alone.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from verification.finding import Failure, attempt
 OWN, MATCHED = "own", "matched"
 SETTINGS = (OWN, MATCHED)
 MATCHED_STEP = 1e-3  # [s] the haptic rate
-# At depth "quick" a resting scene lasts so long [s]: a minute at 1 ms takes some engines a minute.
+# Duration of a resting scene at depth "quick" [s]; a full minute at 1 ms takes some engines a minute.
 QUICK_REST, QUICK_STACK = 1.0, 0.25
 
 Progress = Callable[[int, int], None]
 
 
-OUR_OWN = ("iapb", "rigid")  # simulators made of this project: what they raise is a fault of ours
+OUR_OWN = ("iapb", "rigid")  # simulators of this project: their exceptions are faults of this project
 
 
 def installed() -> dict[str, str]:
-    """Name of every engine that is here, with its version."""
+    """Return name and version of every installed engine."""
     found = {}
     for name in SIMULATORS:
         try:
@@ -60,11 +60,11 @@ def compare_engines(
 
     Parameters
     ----------
-    engines, scenes : names; default: all. An engine that is not installed gets records that say so.
-    depth : "quick" shortens the resting scenes
-    failures : receives what raises outside of the engines themselves; what an engine raises in a run is a result
+    engines, scenes : names; by default all. An engine that is not installed gets records that say so.
+    depth : "full", or "quick" with shorter resting scenes
+    failures : receives exceptions outside of the other engines; an exception of another engine in a run is a result
 
-    Where an engine's own settings are the matched ones, one run makes both records.
+    If an engine's own settings equal the matched ones, one run gives both records.
     """
     if depth not in ("quick", "full"):
         raise ArgumentError("depth", depth, "quick or full")
@@ -102,9 +102,9 @@ def _both(name: str, simulator: Simulator, scene_name: str, depth: str) -> list[
 
 
 def _outcome(name: str, simulator: Simulator, scene: Any, settings: Any, duration: float) -> dict[str, Any]:
-    """Measures, or what stopped the run: another engine's errors are of every kind, and each is a result.
+    """Return the measures of a run, or the failure that stopped it; engines raise exceptions of any type.
 
-    An error of our own engines is no result: it is raised, and the case counts as failed.
+    An exception of our own engines propagates, and the case counts as failed.
     """
     if name in OUR_OWN:
         return measured(scene, simulator.run(scene, settings, settings.step, duration))
@@ -117,7 +117,7 @@ def _outcome(name: str, simulator: Simulator, scene: Any, settings: Any, duratio
 
 
 def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
-    """The measures of an `EngineRecord`; only a failure where a number is not finite."""
+    """Return the measures of an `EngineRecord`; if a number is not finite, return only a failure."""
     if not motion.finite:
         first = int(np.argmin(np.isfinite(motion.velocity).all(axis=(1, 2))))
         return {"failure": f"not a number from {motion.time[first]:.4g} s on"}

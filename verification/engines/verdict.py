@@ -1,4 +1,4 @@
-"""What the engines did on the fixed scenes: whether a run met its scene's law, a sentence per engine, the finding."""
+"""The verdicts on the engines' runs: whether a run met its scene's law, one sentence per engine, and the finding."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ COLUMNS = titled((
     "velocity error", "overlap / size", "drift [m]", "creep [m]", "simulated [s]", "failure",
 )).columns  # fmt: skip
 
-# A peer with springs for contacts cannot be exact; a hundredth of the start's energy, momentum and speed is what a
-# user of the engine would not notice, and what no engine misses by rounding.
+# An engine with springs as contacts cannot be exact. A hundredth of the initial energy, momentum and speed is an error
+# that a user would not notice, and far above rounding.
 CLOSE = 1e-2
 STAYS = 1e-3  # [m] a hundredth of the bodies' size
-NEVER_RISES = 1e-6  # share of energy: what rounding leaves of 60 000 steps, with room
+NEVER_RISES = 1e-6  # relative rise of energy: above the rounding of 60 000 steps
 
 MET, MISSED, FAILED, MISSING = "met", "missed", "failed", "not installed"
 
 
 def verdict(record: EngineRecord) -> str:
-    """One of MET, MISSED, FAILED and MISSING."""
+    """Return one of MET, MISSED, FAILED and MISSING."""
     if record.missing:
         return MISSING
     if record.failure:
@@ -58,7 +58,7 @@ def verdict(record: EngineRecord) -> str:
 
 
 def sentence(records: Sequence[EngineRecord]) -> str:
-    """What one engine's runs with one choice of settings came to."""
+    """Return the results of one engine at one choice of settings in one sentence."""
     first = records[0]
     if first.missing:
         return f"{first.title} is not installed here: {first.missing}"
@@ -79,7 +79,7 @@ def sentence(records: Sequence[EngineRecord]) -> str:
 
 
 def _worst(record: EngineRecord) -> str:
-    """The number that misses, in words."""
+    """Return the measure with the largest error in words, or the failure."""
     if record.failure:
         return "failed: " + record.failure.rstrip(".")
     if record.rests:
@@ -90,7 +90,7 @@ def _worst(record: EngineRecord) -> str:
 
 
 def engines(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Compare all engines that are here, and name those that are not; `run` is not asked for anything."""
+    """Compare all installed engines and name those that are not installed; `run` is not used."""
     failures: list[Failure] = []
     return finding(compare_engines(depth=depth, progress=progress, failures=failures), failures)
 
@@ -103,7 +103,7 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
         groups.setdefault((record.engine, record.choice), []).append(record)
     parts = [Part(sentence(group), REPRODUCED if _met(group) == len(group) else MIXED) for group in groups.values()]
     ours = [k for k, group in enumerate(groups.values()) if _our_misses(group)]
-    if ours:  # one clause on both settings
+    if ours:  # one clause for both choices of settings
         parts[ours[0]] = replace(parts[ours[0]], miss=_our_misses(present))
     absent = sorted({record.title for record in records if record.missing})
     if absent:
@@ -121,7 +121,7 @@ def finding(records: Sequence[EngineRecord], failures: Sequence[Failure] = ()) -
 
 
 def _misses(records: Sequence[EngineRecord]) -> str:
-    """Whose every miss is, ours first; "" where there is none."""
+    """Return all misses by engine, ours first; "" if there is none."""
     missed: dict[str, list[str]] = {}
     for record in sorted(records, key=lambda record: (not record.title.endswith("(ours)"), record.title)):
         if verdict(record) != MET:
@@ -132,7 +132,7 @@ def _misses(records: Sequence[EngineRecord]) -> str:
 
 
 def _our_misses(records: Sequence[EngineRecord]) -> str:
-    """What ours misses, a clause per scene; "" where it misses nothing."""
+    """Return the misses of our engines, one clause per scene; "" if there is none."""
     missed: dict[str, list[str]] = {}
     for record in records:
         if record.title.endswith("(ours)") and verdict(record) != MET:
@@ -149,7 +149,7 @@ def _met(records: Sequence[EngineRecord]) -> int:
 
 
 def errors_table(records: Sequence[EngineRecord]) -> Table:
-    """A row per engine, scene and choice of settings; an engine that is not installed keeps its rows."""
+    """Return the errors, one row per engine, scene and choice of settings, also for engines that are not installed."""
     note = ("Errors are relative to the kinetic energy at the start, to the sum of m |v| and to the largest speed; in "
             "resting scenes the rise of energy is relative to m g times the bodies' size. Law met: all errors are at "
             "most 1 %, or, in resting scenes, nothing moves by more than 1 mm.")
@@ -167,7 +167,7 @@ def _row(record: EngineRecord) -> dict[str, Any]:
 
 
 def settings_table(records: Sequence[EngineRecord]) -> Table:
-    """What every engine was run with, and where."""
+    """Return the settings of every engine and the scenes in which they were used."""
     uses: dict[tuple[str, str, str, str], list[str]] = {}
     for record in records:
         key = (record.title, record.version or MISSING, record.settings, record.note)

@@ -1,4 +1,4 @@
-"""Named impacts and motions that break solvers: each with source, reason, certain truth, and a verdict per method."""
+"""Named impacts and motions on which solvers fail, each with source, reason, exact truth and a verdict per method."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Collisions with a certain answer in closed form: cradle, break shot, rocking block, superball, stack, wedge, rod.
+"""Collisions with a known answer in closed form: cradle, break shot, rocking block, superball, stack, wedge, rod.
 
-Bodies in space have the coordinates (x, y, z, ω) of their centre of mass in world axes; what they strike holds the
-point in all three directions (rows along z, x, y).
+The coordinates of bodies in space are the position (x, y, z) of the centre of mass and ω, in world axes. The obstacle
+stops the contact point in all three directions (rows along z, x, y).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from verification.impacts import cradle_rows
 
 
 def touching_cradle_impact() -> HardCase:
-    """Five equal balls in a row that touch: all four contacts in one impact."""
+    """Five equal balls that touch in a row; all four contacts are in one impact."""
     return HardCase(
         "Newton's cradle, all contacts at once",
         "textbook; paper (12) with assumption (i)",
@@ -26,7 +26,7 @@ def touching_cradle_impact() -> HardCase:
 
 
 def break_shot() -> HardCase:
-    """A ball strikes two that touch, along normals of the triangle 3-4-5; those two do not approach each other."""
+    """A ball strikes two touching balls along normals of the triangle 3-4-5; the two do not approach each other."""
     n, t = Fraction(4, 5), Fraction(3, 5)
     exact = np.array([[n, t, -n, -t, 0, 0], [n, -t, 0, 0, -n, t]], dtype=object)
     return HardCase(
@@ -39,10 +39,10 @@ def break_shot() -> HardCase:
 
 
 def rocking_block() -> HardCase:
-    """A block of half sides 3 and 4 that turns about one lower corner, as the other strikes."""
+    """A block of half sides 3 and 4 that rotates about one lower corner when the other corner strikes."""
     half, high = 3.0, 4.0
     inertia = (half**2 + high**2) / 3.0
-    turning = np.array([-high, half, 1.0])  # about the corner at (−half, −high), one radian a second
+    turning = np.array([-high, half, 1.0])  # rotation about the corner at (−half, −high) at 1 rad/s
     return HardCase(
         "Rocking block, one rock",
         "Housner, Bull. Seismological Society of America 53 (1963)",
@@ -54,7 +54,7 @@ def rocking_block() -> HardCase:
 
 
 def superball() -> HardCase:
-    """A ball of radius 1/8 whose point of contact returns along and across the wall."""
+    """A ball of radius 1/8 whose contact point reverses its velocity along and across the wall."""
     radius = 0.125
     return HardCase(
         "Superball with grip",
@@ -67,7 +67,7 @@ def superball() -> HardCase:
 
 
 def stack_of_mass_ratio() -> HardCase:
-    """Eight bodies in a column, heavy and a million times lighter by turns, stopped against each other."""
+    """A column of eight bodies, alternately heavy and a million times lighter, in a plastic impact."""
     masses = np.array([1.0, 1e-6] * 4)
     return HardCase(
         "Stack of eight bodies, mass ratio 1e6",
@@ -79,7 +79,7 @@ def stack_of_mass_ratio() -> HardCase:
 
 
 def wedge() -> HardCase:
-    """A point driven into the corner of two walls that open by 4e-6: a triangle of whole numbers."""
+    """A point that moves into a corner of two walls with an angle of 4e-6; their normals are exact fractions."""
     m = 10**6
     n, t = Fraction(m * m - 1, m * m + 1), Fraction(2 * m, m * m + 1)
     exact = np.array([[n, t], [-n, t]], dtype=object)
@@ -93,7 +93,7 @@ def wedge() -> HardCase:
 
 
 def painleve_impact() -> FrictionalCase:
-    """The rod of Painlevé struck at its lower end, sliding, at μ = 2."""
+    """Painlevé's rod: its lower end strikes the floor while sliding, with μ = 2."""
     sine, cosine = 0.8, 0.6
     return FrictionalCase(
         "Painlevé's rod, its impact",
@@ -107,13 +107,13 @@ def painleve_impact() -> FrictionalCase:
 
 
 def _at_a_point(r: tuple[Fraction | int, ...]) -> np.ndarray:
-    """Rows (3, 6) of the velocities along z, x, y of a point at r from the centre of mass, in fractions."""
+    """Return the rows (3, 6), in fractions, of the velocity along z, x, y of a point at r from the centre of mass."""
     x, y, z = (Fraction(part) for part in r)
     return np.array([[0, 0, 1, y, -x, 0], [1, 0, 0, 0, z, -y], [0, 1, 0, -z, 0, x]], dtype=object)
 
 
 def sleeping_top() -> HardCase:
-    """A top that spins upright at 1,000 rad/s and sinks on its tip at 1 cm/s."""
+    """An upright top that spins at 1,000 rad/s and lands on its tip at 1 cm/s."""
     exact = _at_a_point((0, 0, Fraction(-1, 2)))
     return HardCase(
         "Sleeping top set on its tip",
@@ -140,7 +140,7 @@ def rolling_coin() -> HardCase:
 
 
 def rattleback() -> HardCase:
-    """A celt struck on its end: axes of inertia turned by the angle of 3-4-5 against those of its shape."""
+    """A celt struck on its end; its axes of inertia are rotated by the angle of the triangle 3-4-5 from its shape."""
     exact = _at_a_point((Fraction(1, 2), 0, Fraction(-1, 4)))
     mass = np.diag([100.0, 100.0, 100.0, 52.0, 73.0, 120.0])
     mass[3, 4] = mass[4, 3] = -36.0  # 25 R diag(1, 4) Rᵀ

@@ -1,4 +1,4 @@
-"""Hard cases: what a resolver or a world is given, what is meant exactly, and what a verdict holds."""
+"""Hard cases: the input of a resolver or a world, the exact truth, and the verdict."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Floats = NDArray[np.floating[Any]]
 Exact = NDArray[np.object_] | Floats
 EPS = float(np.finfo(float).eps)
 
-NEWTON_COULOMB = "Newton with Coulomb"  # friction at an impact as Kane and Levinson found it
-COULOMB = "ideal with friction"  # the rigid world with Coulomb's law; the paper's rigid worlds have no friction
-RESTITUTION_TOLERANCE = 1e-8  # as the kit asks of anybody's resolver
-NO_GAIN = 1e-12  # rounding of the ledger's sums over the run's steps
+NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
+COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none
+RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
+NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
 DEPENDS_ON_ROUNDING = "depends on rounding"
 _NONE = float("nan")
 
 
 class CaseAbsent(IapbError):
-    """A case whose files are not at hand; the message says which."""
+    """The files of a case are absent; the message names them."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The exact outcome: v⁺ (d fractions), rank, κ(M), κ of M scaled to a unit diagonal, κ(A) of what is meant."""
+    """The exact outcome: v⁺ (d fractions), rank, κ(M), κ of M scaled to a unit diagonal, κ(A) of the exact rows."""
 
     velocity: tuple[Fraction, ...]
     rank: int
@@ -50,12 +50,12 @@ class HardCase:
 
     Attributes
     ----------
-    name, source, why_hard, expected : for the report; `expected` says what a sound method does with it.
-    mass_matrix, contact_jacobian, velocity : as the resolver is given them (doubles).
+    name, source, why_hard, expected : texts for the report; `expected` is the outcome of a correct method.
+    mass_matrix, contact_jacobian, velocity : arguments of the resolver, in doubles.
     restitution : scalar, or one e per contact (Poisson's law).
-    exact_jacobian : (c, d) of fractions where the doubles are only rounded geometry; None = the doubles are meant.
-    well_posed : False where the exact answer hangs on digits that doubles do not have: the motion is not judged.
-    methods : names to try; None = all of them.
+    exact_jacobian : (c, d) fractions if the doubles are rounded geometry; None if the doubles are exact.
+    well_posed : False if the exact answer depends on digits that doubles do not have; then v⁺ is not judged.
+    methods : names of the methods to judge; None for all methods.
     """
 
     name: str
@@ -73,17 +73,17 @@ class HardCase:
 
     @property
     def meant_jacobian(self) -> Exact:
-        """J as it is meant, in fractions or doubles."""
+        """The exact J, in fractions or doubles."""
         return self.contact_jacobian if self.exact_jacobian is None else self.exact_jacobian
 
     @property
     def all_rows(self) -> Exact:
-        """Every row that takes an impulse, tangents included: the answer is as sensitive as all of them together."""
+        """All rows that carry an impulse, tangents included; their condition number bounds the error of v⁺."""
         return self.meant_jacobian
 
     @cached_property
     def truth(self) -> Truth:
-        """Exact v⁺ of the case's law, with the condition numbers that bound what doubles can know of it."""
+        """Exact v⁺ of the case's law, with the condition numbers that bound the error of v⁺ in doubles."""
         velocity, rank = self.exact_outcome()
         scale = 1.0 / np.sqrt(np.diag(self.mass_matrix))
         scaled = condition_number(scale[:, None] * self.mass_matrix * scale)
@@ -91,7 +91,7 @@ class HardCase:
         return Truth(velocity, rank, condition_number(self.mass_matrix), scaled, rows)
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
-        """v⁺ of (21), or of Poisson's law where restitution differs; and the rank, or how many contacts push."""
+        """Return v⁺ and rank by (21); for one e per contact, v⁺ and the number of pushing contacts by Poisson's law."""
         mass, rows = self.mass_matrix, self.meant_jacobian
         if np.ndim(self.restitution):
             return exact_poisson(mass, rows, self.velocity, np.asarray(self.restitution))
@@ -101,7 +101,7 @@ class HardCase:
 
 @dataclass(frozen=True)
 class FrictionalCase(HardCase):
-    """One contact with its tangent row (1, d) and coefficient μ."""
+    """An impact at one contact with its tangent row (1, d) and coefficient of friction μ."""
 
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
@@ -109,33 +109,33 @@ class FrictionalCase(HardCase):
 
     @property
     def all_rows(self) -> Exact:
-        """Normal and tangent."""
+        """The normal row and the tangent row."""
         return np.vstack([self.contact_jacobian, self.tangent])
 
     @property
     def impact(self) -> FrictionalImpact:
-        """The impact in fractions."""
+        """The impact in rational arithmetic."""
         return FrictionalImpact(self.mass_matrix, self.contact_jacobian, self.tangent, self.velocity,
                                 float(self.restitution), self.friction)  # fmt: skip
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
-        """v⁺ up to the certified root."""
+        """Return v⁺, exact except for the certified root, and the rank 1."""
         impact = self.impact
         return impact.velocity(impact.passive_share()), 1
 
     def newton_with_coulomb(self) -> tuple[Fraction, ...]:
-        """v⁺ without the reduction: what Kane and Levinson's equations say."""
+        """Return v⁺ by Kane and Levinson's equations, without reduced friction."""
         return self.impact.velocity(Fraction(1))
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a trajectory case asks of a run.
+    """The quantities of a run that a trajectory case measures.
 
     Attributes
     ----------
     energy_gain, energy_bound : see `largest_gain`.
-    error, error_bound : distance from the law as a share of the answer, and what the world's own step excuses.
+    error : relative distance of the run from the law; error_bound : error that the time step may cause.
     """
 
     energy_gain: float
@@ -150,11 +150,11 @@ class TrajectoryCase:
 
     Attributes
     ----------
-    name, source, why_hard, expected : for the report.
-    law : what the truth is, and why it is certain.
+    name, source, why_hard, expected : texts for the report.
+    law : the exact law of the motion, in words.
     scene : the scene to simulate.
-    measure : judges a run of it.
-    worlds : names that `verification.hard_cases.judge.run_in_world` knows.
+    measure : function that measures a run of the scene.
+    worlds : names of worlds for `verification.hard_cases.judge.run_in_world`.
     """
 
     name: str
@@ -171,14 +171,14 @@ AnyCase = HardCase | TrajectoryCase
 
 
 def largest_gain(run: Run) -> float:
-    """Return the most that tool and device ever held beyond what they had and what the hand gave, relative.
+    """Return the largest energy gain of a run, relative to the energy at its start or the work of the hand.
 
-    Kinetic energy of tool and device and the tool's potential energy, less the hand's work on both; relative to the
-    most energy that was there or was given. Springs of walls and coupling hold some of it, never less than none:
-    what is found here above zero was made from nothing.
+    The gain is the change of the kinetic energy of tool and device and of the tool's potential energy, minus the hand's
+    work on both. The springs of walls and coupling also store energy, and this energy is never negative. Therefore a
+    positive gain is energy that the simulation has created.
     """
     ledger = run.energy
-    works = [ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger]  # by the end of each step
+    works = [ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger]  # at the end of each step
     kinetic = sum((ledger[name] for name in ("kinetic", "device_kinetic") if name in ledger), np.zeros(run.steps + 1))
     given = sum((np.concatenate([[0.0], work]) for work in works), np.zeros(run.steps + 1))
     gain = kinetic - kinetic[0] + ledger["potential"] - ledger["potential"][0] - given
@@ -194,17 +194,18 @@ class HardCaseVerdict:
     Attributes
     ----------
     verdict : "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of memory",
-        "failed", or DEPENDS_ON_ROUNDING: a method that goes through LAPACK leaves a residual within a factor of ten of
-        the tolerance, or moves wrong by more than half of |v⁻|: another BLAS would change what is wrong first.
-    note : the error's words where there is no answer.
-    energy_gain : impacts (KE⁺ − KE⁻)/KE⁻ exactly, trajectories the largest gain at any instant, as a share of what
-        the motion started with or was fed.  energy_bound : what rounding (10 d ε √κ(M)) or the step excuses.
-    restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the fastest approach left,
-        likewise; trajectories: see `judge.restitution_residual`.
-    forward_error : |v⁺ − truth| / |v⁻| in the kinetic metric, or the case's own distance from its law.
-    forward_bound : what the conditioning, or the law's own step, excuses.
-    smallest_fault : of a stable verdict, the smallest relative fault planted in the answer that turns it.
-    rank, exact_rank : as used, and of the meant Jacobian; trajectories: the largest rank of an impact, and None.
+        "failed", or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a factor
+        of ten of the tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the verdict.
+    note : the message of the error if there is no answer.
+    energy_gain : impacts: the exact (KE⁺ − KE⁻)/KE⁻; trajectories: see `largest_gain`.
+    energy_bound : gain that rounding (10 d ε √κ(M)) or the time step may cause.
+    restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest remaining approach velocity,
+        scaled in the same way; trajectories: see `judge.restitution_residual`.
+    forward_error : impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; trajectories: relative distance from the law.
+    forward_bound : error that the conditioning or the time step may cause.
+    smallest_fault : for a stable verdict, the smallest relative fault in the answer that changes the verdict.
+    rank, exact_rank : rank that the method used, and rank of the exact Jacobian; trajectories: the largest rank of an
+        impact, and None.
     clamp : factor of the energy clamp.
     seconds : median time of one call, or of one step [s].
     """
@@ -226,11 +227,11 @@ class HardCaseVerdict:
 
     @property
     def is_stable(self) -> bool:
-        """Whether every number is within its bound."""
+        """Whether all quantities are within their bounds."""
         return self.verdict == "stable"
 
 
 def smallest_fault(turns: Callable[[float], bool]) -> float:
-    """Return the smallest relative fault, in steps of a third of a decade, that turns a verdict with either sign."""
+    """Return the smallest relative fault that changes a verdict with either sign; it tries three faults per decade."""
     sizes = 10.0 ** (np.arange(-54, 1) / 3.0)
     return next((float(f) for f in sizes if turns(float(f)) and turns(-float(f))), float("inf"))

@@ -1,4 +1,4 @@
-"""The catalogue. To add a case: a function that returns a HardCase or a TrajectoryCase, and a line here."""
+"""The catalogue of hard cases. To add a case, write a function that returns it and add a line here."""
 
 from __future__ import annotations
 

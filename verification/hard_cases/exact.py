@@ -1,9 +1,10 @@
-"""Truths in rational arithmetic: Poisson's law for a few contacts, and Newton's law with Coulomb friction at one.
+"""Exact outcomes in rational arithmetic: Poisson's law at a few contacts, Newton's law with friction at one contact.
 
-Poisson's law: both LCPs by trying every set of pushing contacts. Friction: Newton's normal impact plus a tangential
-impulse p_t (stick, or slip against the motion after it at μ p_n) whose effect keeps every normal velocity; the whole is
-reduced by the largest α in [0, 1] that gains no energy. That α is rational but for one root, which a ball certifies.
-Source: Kane and Levinson (1985) for the gain; `iapb.contact.impact_laws` for the split.
+Poisson's law: both LCPs are solved by trying every set of pushing contacts. Friction: a tangential impulse α p_t is
+added to Newton's normal impact; it changes no normal velocity. p_t sticks, or has size μ p_n against the slip after the
+impact. α is the largest factor in [0, 1] without a gain of energy. It is rational except for one square root, which
+ball arithmetic encloses. Sources: Kane and Levinson (1985) for the gain of energy; `iapb.contact.impact_laws` for the
+split of the impulse.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from iapb.errors import SolverError
 
 Vector = list[Fraction]
 Matrix = list[Vector]
-_ROOT_BITS = 400  # α is known to 2⁻³⁸⁰ or better: far below what a double can tell
+_ROOT_BITS = 400  # the error of α is at most 2⁻³⁸⁰, far below the precision of doubles
 
 
 def exact_poisson(
@@ -27,7 +28,7 @@ def exact_poisson(
 ) -> tuple[tuple[Fraction, ...], int]:
     """Return v⁺ exactly and the number of contacts that push.
 
-    Compression `0 ≤ p_c ⟂ γ_c ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (docs/theory.md).
+    The two LCPs are compression, `0 ≤ p_c ⟂ γ_c ≥ 0`, and restitution, `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (docs/theory.md).
     """
     M, J = fractions(mass_matrix), fractions(contact_jacobian)
     v, e = fractions(velocity), fractions(restitution)
@@ -43,7 +44,7 @@ def exact_poisson(
 
 
 def _lcp(W: Matrix, q: Vector) -> Vector:
-    """0 ≤ p ⟂ W p + q ≥ 0 by enumeration; W a Delassus matrix, so a set of independent contacts solves it."""
+    """Solve 0 ≤ p ⟂ W p + q ≥ 0 by enumeration; for a Delassus matrix W some set of independent contacts solves it."""
     n = len(q)
     for size in range(n + 1):
         for chosen in combinations(range(n), size):
@@ -56,7 +57,7 @@ def _lcp(W: Matrix, q: Vector) -> Vector:
 def _try_set(W: Matrix, q: Vector, chosen: tuple[int, ...]) -> Vector | None:
     try:
         active = solve([[W[i][j] for j in chosen] for i in chosen], [-q[i] for i in chosen])
-    except ZeroDivisionError:  # dependent contacts: another set has the same effect
+    except ZeroDivisionError:  # dependent contacts: an independent set has the same effect
         return None
     p = [Fraction(0)] * len(q)
     for i, value in zip(chosen, active, strict=True):
@@ -67,7 +68,7 @@ def _try_set(W: Matrix, q: Vector, chosen: tuple[int, ...]) -> Vector | None:
 
 
 def solve(matrix: Matrix, right: Vector) -> Vector:
-    """Gauss elimination; ZeroDivisionError where the matrix is singular."""
+    """Solve a linear system by Gauss elimination; a singular matrix raises ZeroDivisionError."""
     n = len(right)
     rows = [[*matrix[i], right[i]] for i in range(n)]
     for k in range(n):
@@ -81,12 +82,12 @@ def solve(matrix: Matrix, right: Vector) -> Vector:
 
 
 def dot(a: Vector, b: Vector) -> Fraction:
-    """Sum of products."""
+    """Return the scalar product."""
     return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
 
 
 def fractions(array: ArrayLike) -> Any:
-    """A vector or a matrix as lists of fractions, exactly."""
+    """Return a vector or a matrix as lists of exact fractions."""
     given = np.array(array, dtype=object)
     if given.ndim == 1:
         return [Fraction(x) for x in given]
@@ -94,7 +95,7 @@ def fractions(array: ArrayLike) -> Any:
 
 
 class FrictionalImpact:
-    """v⁺ = v + (normal part) + α p_t b, with b the motion that one unit of tangential impulse adds."""
+    """v⁺ = v + (normal part) + α p_t b, where b is the change of velocity by a unit of tangential impulse."""
 
     def __init__(
         self, mass_matrix: ArrayLike, normal: ArrayLike, tangent: ArrayLike, velocity: ArrayLike,
@@ -113,12 +114,15 @@ class FrictionalImpact:
         self.p_t = _coulomb(slip, dot(t, self.b), p_n, across, mu)
 
     def velocity(self, share: Fraction) -> tuple[Fraction, ...]:
-        """v⁺ with that share of the tangential impulse."""
+        """Return v⁺ with this share of the tangential impulse."""
         parts = zip(self.v, self.normal, self.b, strict=True)
         return tuple(v + x + share * self.p_t * y for v, x, y in parts)
 
     def passive_share(self) -> Fraction:
-        """Largest α in [0, 1] with ½ s α² + a α <= loss of the normal part."""
+        """Return the largest α in [0, 1] such that the impact gains no energy.
+
+        α satisfies ½ s α² + a α <= loss of the normal part; s = `square`, a = `along`.
+        """
         metric = [dot(row, self.b) for row in self.mass]
         square, along = self.p_t**2 * dot(metric, self.b), self.p_t * dot(metric, self.v)
         lost = (1 - self.e**2) * self.gamma**2 / (2 * self.w)
@@ -128,7 +132,7 @@ class FrictionalImpact:
 
 
 def _coulomb(slip: Fraction, inertia: Fraction, p_n: Fraction, across: Fraction, mu: Fraction) -> Fraction:
-    """p_t: stick where the cone allows, else slip against the motion that is left."""
+    """Return p_t: the sticking impulse if it lies in the friction cone, else μ p_n against the remaining slip."""
     stick = -slip / inertia
     if abs(stick) <= mu * (p_n - across * stick):
         return stick
@@ -140,7 +144,7 @@ def _coulomb(slip: Fraction, inertia: Fraction, p_n: Fraction, across: Fraction,
 
 
 def _certified_root(square: Fraction) -> Fraction:
-    """The square root, as the middle of a ball whose radius is certified."""
+    """Return the square root as the midpoint of a ball with a certified radius."""
     import flint
 
     before = flint.ctx.prec

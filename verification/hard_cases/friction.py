@@ -1,8 +1,8 @@
-"""Dry friction at its edges: Kane and Levinson's double pendulum, about sliding, Painlevé's rod, stick-slip.
+"""Hard cases of dry friction: Kane and Levinson's double pendulum, the sliding threshold, Painlevé's rod, stick-slip.
 
-Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with friction makes energy. Two
-uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from the vertical, angles of the triangles 5-12-13 and
-8-15-17, near the 20° and 30° of the source: every sine and cosine is a fraction.
+Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with friction creates energy.
+Two uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from the vertical. The source has 20° and 30°; the
+angles here are those of the triangles 5-12-13 and 8-15-17, so that every sine and cosine is a fraction.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _FLOOR = -(_C1 + _C2) - 1e-3  # [m] height of the floor: a millimetre below the 
 
 
 def double_pendulum_without_friction() -> HardCase:
-    """The paper's collision: assumption (iii) leaves friction out."""
+    """The impact of the double pendulum without friction, as in the paper's assumption (iii)."""
     return HardCase(
         "Kane and Levinson's double pendulum, frictionless impact",
         _SOURCE,
@@ -56,7 +56,7 @@ def double_pendulum_without_friction() -> HardCase:
 
 
 def double_pendulum_with_friction() -> HardCase:
-    """The famous gain: Newton's law in the normal, Coulomb's in the tangential direction."""
+    """The impact of the double pendulum with friction: Newton's and Coulomb's laws together gain energy."""
     return FrictionalCase(
         "Kane and Levinson's double pendulum, impact with friction",
         _SOURCE,
@@ -109,7 +109,7 @@ contact:
 
 
 def double_pendulum_motion() -> TrajectoryCase:
-    """The same pendulum falling on the floor from 1 mm, for half a second of bounces."""
+    """The double pendulum falls on the floor from 1 mm and bounces for half a second."""
     return TrajectoryCase(
         "Kane and Levinson's double pendulum, its motion",
         _SOURCE,
@@ -125,13 +125,13 @@ def double_pendulum_motion() -> TrajectoryCase:
 
 
 def _measure_pendulum(run: Run) -> Measured:
-    """Distance from the flight that two rods make, at the last instant before the tip touches, as a share of it.
+    """Measure the relative error of the angles at the last instant before the tip touches the floor.
 
-    A first-order step of semi-implicit Euler is ahead by half a step's acceleration: at most a step in the time flown.
+    Semi-implicit Euler is ahead by half a step's acceleration, so the relative error is at most step / time of flight.
     """
     time, angles = _flight()
     last = int(time / run.dt) - 1
-    q = run.q[last] @ np.array([[1.0, 1.0], [0.0, 1.0]])  # angles against the horizontal
+    q = run.q[last] @ np.array([[1.0, 1.0], [0.0, 1.0]])  # angles to the horizontal
     start = run.q[0] @ np.array([[1.0, 1.0], [0.0, 1.0]])
     truth = angles(last * run.dt)
     off = float(np.abs(q - truth).max() / np.abs(truth - start).max())
@@ -140,7 +140,7 @@ def _measure_pendulum(run: Run) -> Measured:
 
 @cache
 def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
-    """When the tip touches the floor [s], and the two angles against the horizontal up to then."""
+    """Return the time at which the tip touches the floor [s], and the two angles to the horizontal until then."""
     from scipy.integrate import solve_ivp
 
     start = np.array([math.atan2(5, 12) - math.pi / 2, math.atan2(8, 15) - math.pi / 2, 0.0, -0.1])
@@ -161,9 +161,9 @@ def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
 
 # --- a block pushed along the floor ---------------------------------------------------------------------------
 _MU, _DURATION, _CREEP = 0.3, 0.2, 1e-3  # friction, [s], v_threshold of (6) [m/s]
-# Rounding over 800 steps, and what the springs' rest takes: no world that keeps its law is off by more.
+# Rounding over 800 steps and the settling of the springs: a correct world has no larger error.
 _KEPT = 1e-6
-# Coulomb's law by a rigid step of first order: half a step in the time of the push is 6e-4 of the distance.
+# First-order error of a rigid step with Coulomb's law: half a step of the duration changes the distance by 6e-4.
 _FIRST_ORDER = 0.01
 
 _BLOCK = """
@@ -203,7 +203,7 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
     """A push of 0.99 μ m g, judged by law (6) itself."""
 
     def measure(run: Run) -> Measured:
-        """Distance from (6), as a share of the way it creeps."""
+        """Measure the distance from the motion of (6), relative to the creep distance."""
         creep = _creep(0.99, run.steps, run.dt)
         return Measured(largest_gain(run), NO_GAIN, abs(float(run.q[-1, 0]) / creep - 1.0), _KEPT)
 
@@ -216,7 +216,7 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
 
 
 def _creep(share: float, steps: int, dt: float) -> float:
-    """How far law (6) lets a block move that a share of μ m g pushes [m]."""
+    """Return the displacement by law (6) of a block that is pushed by a share of μ m g [m]."""
     x = v = 0.0
     for _ in range(steps):
         v += dt * _MU * _G * (share - min(1.0, v / _CREEP))
@@ -225,17 +225,17 @@ def _creep(share: float, steps: int, dt: float) -> float:
 
 
 def _block(share: float, law: str = "coulomb") -> Scene:
-    depth = _G / (2.0 * 1e4)  # sunk in by its own weight on two springs; friction acts half way down
+    depth = _G / (2.0 * 1e4)  # static overlap of the block on two springs; friction acts at half of it
     return scene_from_text(_BLOCK.format(duration=_DURATION, g=_G, height=0.025 - depth, level=0.025 - 0.5 * depth,
                                          mu=_MU, law=law, creep=_CREEP, force=share * _MU * _G))  # fmt: skip
 
 
 def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
     slide = 0.5 * max(share - 1.0, 0.0) * _MU * _G * _DURATION**2
-    scale = slide or _CREEP * _DURATION  # what sticks is compared with the way of a creep at v_threshold
+    scale = slide or _CREEP * _DURATION  # if the block sticks: the distance of a creep at v_threshold
 
     def measure(run: Run) -> Measured:
-        """Distance from Coulomb's answer, as a share of it."""
+        """Measure the distance from the motion of Coulomb's law, relative to `scale`."""
         off = abs(float(run.q[-1, 0]) - slide) / scale
         return Measured(largest_gain(run), NO_GAIN, off, _FIRST_ORDER)
 
@@ -249,8 +249,8 @@ def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 
 # --- Painlevé's rod -------------------------------------------------------------------------------------------
 _SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
-_HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9  # of the middle [m]: sunk by a nanometre, so that the contact lasts from the start
-_STOPPED_SLIP = 1e-3  # [m/s] v_threshold of (6): below it friction falls
+_HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
+_STOPPED_SLIP = 1e-3  # [m/s] v_threshold of (6): below it friction decreases
 
 _ROD = f"""
 name: painleve_rod
@@ -279,7 +279,7 @@ contact:
 
 
 def painleve_rod() -> TrajectoryCase:
-    """A rod pushed over its lower end at μ = 2, where 1/m + … < 0: no finite force keeps the contact closed."""
+    """A rod slides on its lower end with μ = 2: its effective inertia is negative, so no finite force exists."""
     return TrajectoryCase(
         "Painlevé's rod: sliding without a finite answer",
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
@@ -295,7 +295,7 @@ def painleve_rod() -> TrajectoryCase:
 
 @cache
 def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float64]]]:
-    """When springs have stopped the slip [s], and its speed up to then [m/s]: the rod's equations on one spring."""
+    """Return the time at which the slip stops [s] and its speed until then [m/s], for a rod on one spring."""
     from scipy.integrate import solve_ivp
 
     def slip(state: NDArray[np.float64]) -> Any:
@@ -317,10 +317,10 @@ def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float
 
 
 def _measure_rod(run: Run) -> Measured:
-    """Largest distance of the slip from its law's until it stops, as a share of the first slip.
+    """Measure the largest error of the slip speed until it stops, relative to the initial slip speed.
 
-    Rigid: no slip from the first step on, but for the turn of the rod within a step. Springs: a first-order step is a
-    step late or early at most, while the slip falls at its steepest.
+    A rigid world must have no slip after the first step, except for the rotation of the rod within a step. With springs
+    a first-order step may be late or early by one step, so the bound is the largest change of the slip in a step.
     """
     slip = run.v[:, 0] + 0.5 * np.sin(run.q[:, 2]) * run.v[:, 2]
     end, truth = _slipping()
@@ -333,13 +333,13 @@ def _measure_rod(run: Run) -> Measured:
 
 
 # --- a plate pushed by a spring: stick-slip -----------------------------------------------------------------------
-# The spring is that of a contact: a ball of 1e8 kg at a steady speed presses on the edge of a plate of 1 kg.
+# The spring is a contact: a ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
 _PRESS, _STEADY, _PRESSED = 1e4, 0.01, 0.5  # spring [N/m], speed of the ball [m/s], duration [s]
 _OMEGA = math.sqrt(_PRESS)
-_SLIDING = _MU * _G / _PRESS  # the spring's depth [m] at which the plate slides steadily; it starts half as deep again
+_SLIDING = _MU * _G / _PRESS  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
 _THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
-# A first-order step finds each of the two ends of sticks a step late, at most, before the cycle is reached, and the
-# cycle, whose sticks have no length, by a step each time.
+# Errors of a first-order step: the stick before the cycle begins and ends up to one step late. In the cycle each stick,
+# whose exact duration is zero, lasts up to one step.
 _LATE = 4.0
 
 _PLATE = """
@@ -371,16 +371,16 @@ contact: {{stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2
 
 
 def stick_slip() -> TrajectoryCase:
-    """A plate of 1 kg on a rough floor, pushed by a spring whose other end moves steadily."""
+    """A plate of 1 kg on a rough floor, pushed by a spring whose other end moves at constant speed."""
     amplitude, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
     scene = _PLATE.format(g=_G, height=0.5 * _THICK - _G / (2.0 * _PRESS), behind=-0.075 - _THIN + depth, mu=_MU,
                           thick=_THICK, thin=_THIN, press=_PRESS, speed=_STEADY, duration=_PRESSED)  # fmt: skip
 
     def measure(run: Run) -> Measured:
-        """Largest distance from the closed form, as a share of the cycle's amplitude; the energy seen from the ball.
+        """Measure the largest distance from the closed form, relative to the cycle's amplitude, and the energy gain.
 
-        That energy, (v − V)² / 2 + K u² / 2, is kept while the plate slides and falls while it sticks; the symplectic
-        step lets it swing by ω Δt.
+        The energy is measured in the frame of the ball, (v − V)² / 2 + K u² / 2. It is constant while the plate slides
+        and decreases while it sticks. The symplectic step lets it oscillate by ω Δt.
         """
         u = _STEADY * run.time - run.q[:, 0] + 0.5 * _SLIDING
         held = (run.v[:, 0] - _STEADY) ** 2 + _PRESS * u**2
@@ -400,9 +400,10 @@ def stick_slip() -> TrajectoryCase:
 
 
 def pushed_plate(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Position of the plate [m]: u, the depth beyond steady sliding, obeys u'' = −ω² u while it slides.
+    """Return the position of the plate [m]; u is the spring's depth minus that of steady sliding.
 
-    It starts with u₀ at the ball's speed, comes to rest where u = −√(u₀² − V²/ω²), and slides again from u = 0 on.
+    While the plate slides, u'' = −ω² u. It starts with u₀ at the ball's speed, comes to rest at u = −√(u₀² − V²/ω²),
+    and slides again from u = 0 on.
     """
     u, way = 0.5 * _SLIDING, _STEADY / _OMEGA
     stops = (math.pi + math.asin(way / u)) / _OMEGA

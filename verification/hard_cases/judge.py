@@ -1,6 +1,6 @@
-"""Judge methods and worlds on hard cases: one verdict each, in numbers and in words.
+"""Judge methods and worlds on hard cases; each pair of case and method gets one verdict with its numbers.
 
-A world must neither make energy nor leave the law of a motion by more than its step excuses.
+A world must create no energy, and its error may not exceed the error that its time step may cause.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge_impact import METHODS, judge_impact
 
 Simulate = Callable[[Scene, str], Run]
-_STILL = 1e-9  # [m, rad] of displacement: rounding, and springs that settle
+_STILL = 1e-9  # [m, rad] largest displacement by rounding and by settling springs
 
 
 def run_in_world(scene: Scene, world: str) -> Run:
@@ -54,7 +54,7 @@ def judge_hard_cases(
 
     Parameters
     ----------
-    methods : names of impact methods and of worlds; default all that a case is about.
+    methods : names of impact methods and of worlds; by default the methods or worlds of each case.
     cases : names in `HARD_CASES`, by default all of them. Cases whose files are absent are left out;
         `HARD_CASES[name]()` raises `CaseAbsent` with the reason.
     simulate : function that runs a scene in a world: ``simulate(scene, world) -> Run``.
@@ -63,12 +63,12 @@ def judge_hard_cases(
     Returns
     -------
     tuple of HardCaseVerdict
-        one for each pair of case and method: the verdict in a word, and the numbers behind it.
+        One verdict for each pair of case and method, with its numbers.
 
     Raises
     ------
     ArgumentError
-        If there is no such case.
+        A name in `cases` is not in `HARD_CASES`.
     """
     wanted = None if methods is None else tuple(methods)
     names = tuple(HARD_CASES if cases is None else cases)
@@ -81,7 +81,7 @@ def judge_hard_cases(
 
 
 def methods_for(case: AnyCase) -> tuple[str, ...]:
-    """The impact methods or the worlds that a case is about."""
+    """Return the impact methods or the worlds that are judged on a case."""
     if isinstance(case, HardCase):
         return METHODS if case.methods is None else case.methods
     return case.worlds
@@ -108,7 +108,7 @@ def _of(
 
 @cache
 def _warm_up() -> None:
-    """Compile the step before any clock runs: a short run is timed as one piece."""
+    """Compile the step before the timed runs."""
     simulate(load_scene(find_scene("two_discs")), steps=1)
 
 
@@ -132,9 +132,9 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardC
 
 
 def faulty_motion(run: Run, fault: float) -> Run:
-    """The run with all displacements and changes of velocity by that share too large.
+    """Return the run with all displacements and changes of velocity increased by the share `fault`.
 
-    What stands still creeps instead, at that share of the scene's v_threshold.
+    If nothing moves in the run, all coordinates creep instead at this share of the scene's v_threshold.
     """
     moved, sped = run.q - run.q[0], run.v - run.v[0]
     if np.abs(moved).max() < _STILL:
@@ -144,7 +144,7 @@ def faulty_motion(run: Run, fault: float) -> Run:
 
 
 def _keeps_its_law(case: TrajectoryCase, run: Run) -> bool:
-    """Whether the motion alone is within its bound; the fault leaves the energies as they were recorded."""
+    """Return whether the error of the motion is within its bound; a planted fault does not change the energies."""
     found = case.measure(run)
     return found.error <= found.error_bound
 
@@ -152,7 +152,7 @@ def _keeps_its_law(case: TrajectoryCase, run: Run) -> bool:
 def _motion_verdict(found: Measured, residual: float) -> str:
     if not found.energy_gain <= found.energy_bound:
         return "gains energy"
-    if residual > RESTITUTION_TOLERANCE:  # NaN: no collision to judge
+    if residual > RESTITUTION_TOLERANCE:  # False for NaN: the run has no collision to judge
         return "restitution unmet"
     if not found.error <= found.error_bound:
         return "wrong motion"
@@ -164,12 +164,11 @@ def _seconds_per_step(run: Run) -> float:
 
 
 def restitution_residual(run: Run) -> float:
-    """Return the largest |P·v⁺ + e P·v⁻| / P·(v⁺ − v⁻) of all collisions; NaN where there is none to judge.
+    """Return the largest |P·v⁺ + e P·v⁻| / P·(v⁺ − v⁻) of all collisions; NaN if there is no collision to judge.
 
-    P = Jᵀp is a collision's generalized impulse, so P·v sums the normal velocities with the impulses as weights, and
-    P·(v⁺ − v⁻) = |Δu|² > 0. Where every row meets J v⁺ = −e J v⁻ the residual is zero. A rigid
-    world's blow closes the gap and carries the step's forces as well: its first impulse alone is no collision, and NaN
-    is returned.
+    P = Jᵀp is the generalized impulse of a collision, so P·v sums the normal velocities with the impulses as weights,
+    and P·(v⁺ − v⁻) = |Δu|² > 0. If every row satisfies J v⁺ = −e J v⁻, the residual is zero. For a rigid world the
+    result is NaN, because its impulses also close gaps and carry the forces of the step.
     """
     if run.law == "rigid constraints":
         return math.nan

@@ -1,8 +1,8 @@
-"""Judge an impact method on a hard case: energy, restitution and motion against the exact truth.
+"""Judge an impact method on a hard case by its energy gain, restitution residual and distance from the exact outcome.
 
-A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and a C routine cannot be
-interrupted from Python: such a call gets a process of its own. Its clock starts when the process has compiled; what
-exceeds the limit is killed and reported as timed out, never waited for.
+A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and Python cannot
+interrupt a C routine. Such a call therefore runs in its own process. Its time starts when the process has compiled the
+kernels. A call beyond the time limit is killed and reported as timed out.
 """
 
 from __future__ import annotations
@@ -40,37 +40,37 @@ from verification.hard_cases.exact import dot, fractions
 
 WITHOUT_CLAMP = "factored, no clamp"
 METHODS = ("factored", WITHOUT_CLAMP, "gram_pinv", "gram_cholesky", "damped", "svd")
-# Constant before n ε √κ (√κ + κ(A)), n = max(c, d): Cholesky's backward error and the two solves with its factor
-# (Higham 2002, theorems 10.3 and 8.5), and the basis of the rows, each a few n ε; 1 + e = 2 doubles them. κ is that of
-# M scaled to a unit diagonal, since rounding goes component by component (van der Sluis 1969).
+# Factor of n ε √κ (√κ + κ(A)), n = max(c, d). The backward error of Cholesky's factor, the two solves with this factor
+# (Higham 2002, theorems 10.3 and 8.5) and the basis of the rows each contribute a few n ε; 1 + e = 2 doubles them. κ is
+# that of M scaled to a unit diagonal, because rounding acts on each component by itself (van der Sluis 1969).
 _MARGIN = 10.0
-_REPEATS = 5  # their median is reported; the first call, which fills caches, is not among them
-_SLOW = 0.2  # a call of more seconds is not repeated
-_HALF_SUBNORMAL = Fraction(1, 2**1075)  # rounding of the smallest numbers, which no relative bound covers
+_REPEATS = 5  # number of timed calls after the first one, which fills caches; their median is reported
+_SLOW = 0.2  # [s] a slower call is not repeated
+_HALF_SUBNORMAL = Fraction(1, 2**1075)  # rounding error of subnormal numbers, which no relative bound covers
 _FORM_DELASSUS = ("gram_pinv", "gram_cholesky", "damped")
-# Residuals of these are noise that another LAPACK makes anew: 7e-9 to 5e-8 on Kahan's rows, about a tolerance of 1e-8.
+# The residuals of these methods depend on the LAPACK: 7e-9 to 5e-8 on Kahan's rows, with a tolerance of 1e-8.
 _THROUGH_LAPACK = ("gram_pinv", "gram_cholesky", "svd")
-_NOISE = 10.0  # factor about the tolerance within which such a residual decides nothing
-# A motion that is wrong by more than half of |v⁻| is noise altogether: whether it also gains energy is chance (−1e-3 to
-# 1e-4 of it, by BLAS, for the printed formula on rows 1e-4 apart).
+_NOISE = 10.0  # a residual within this factor of the tolerance decides nothing
+# An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then random (relative gains
+# of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows 1e-4 apart).
 _ALL_NOISE = 0.5
-_MANY_CONTACTS = 2000  # from here on those get a process that can be cut: W has 4e6 entries, its SVD takes a second
+_MANY_CONTACTS = 2000  # with more, these methods run in their own process: the SVD of W (4e6 entries) takes a second
 
-LIMIT_SECONDS = 2.0  # two thousand haptic steps: a method beyond this is of no use to anyone here
+LIMIT_SECONDS = 2.0  # [s] two thousand haptic steps; a slower method is of no use for haptics
 LIMIT_BYTES = 6 << 30  # address space: seven matrices of 10,000 x 10,000 doubles and the libraries
 _READY = b"ready\n"
 
 
 class TimedOut(IapbError):
-    """A call took more than its limit of time."""
+    """A call exceeded its time limit."""
 
 
 class OutOfMemory(IapbError):
-    """A call needed more than its limit of memory."""
+    """A call exceeded its memory limit."""
 
 
 class Answer(NamedTuple):
-    """What is judged of an impact: v⁺, rank, clamp; and the time of the call [s]."""
+    """The judged quantities of an impact, v⁺, rank and clamp, and the time of the call [s]."""
 
     velocity: Any
     rank: int
@@ -79,7 +79,7 @@ class Answer(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The three numbers of an answer, each over its bound decides the verdict."""
+    """The three measures of an answer; each is compared with its bound."""
 
     gain: float
     residual: float
@@ -113,7 +113,7 @@ def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
 
 
 def allowed_error(case: HardCase) -> float:
-    """The share of |v⁻| by which rounding may move v⁺ in the kinetic metric."""
+    """Return the largest error of v⁺ by rounding, in the kinetic metric, relative to |v⁻|."""
     truth, n = case.truth, max(case.contact_jacobian.shape)
     root = float(np.sqrt(truth.scaled_condition))
     return _MARGIN * n * EPS * root * (root + truth.row_condition) + _rounding_of_small_numbers(case)
@@ -125,19 +125,19 @@ def _found(case: HardCase, v_plus: Floats) -> Found:
 
 
 def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
-    """What a fault adds to the answer, times its size: the impulse's effect, and the velocity unless it is stopped."""
+    """Return the vectors that a relative fault scales: the change of velocity, and v⁺ unless it is nearly zero."""
     change = v_plus - case.velocity
     stopped = _form(case, v_plus) <= _form(case, case.velocity) / 10**6
     return ([change] if change.any() else []) + ([] if stopped else [v_plus])
 
 
 def _is_seen(case: HardCase, word: Callable[[Found], str], answer: Floats, wrong: Floats, fault: float) -> bool:
-    """Whether a fault of that size turns the verdict."""
+    """Return whether a fault of this size changes the verdict from "stable"."""
     return word(_found(case, answer + fault * wrong)) != "stable"
 
 
 def _word(error: IapbError) -> str:
-    """What an error means for the verdict."""
+    """Return the verdict for an error."""
     if isinstance(error, TimedOut):
         return "timed out"
     if isinstance(error, OutOfMemory):
@@ -160,7 +160,7 @@ def _near_tolerance(residual: float) -> bool:
 
 
 def _answer(case: HardCase, method: str) -> Answer:
-    """One answer, and the median time of a few."""
+    """Return an answer with the median time of a few calls."""
     if len(case.contact_jacobian) >= _MANY_CONTACTS and method in _FORM_DELASSUS:
         return bounded_impact(case, method)
     warm_up()
@@ -183,7 +183,7 @@ def resolve_once(case: HardCase, method: str) -> Answer:
 
 
 def _resolve_friction(case: FrictionalCase, method: str) -> Answer:
-    """The engine's law with friction, or Newton's and Coulomb's laws as they stand."""
+    """Resolve by the engine's law with friction, or by Newton's and Coulomb's laws without its reduction."""
     started = time.perf_counter()
     if method == NEWTON_COULOMB:
         v_plus, clamp = np.array([float(x) for x in case.newton_with_coulomb()]), np.nan
@@ -197,38 +197,38 @@ def _resolve_friction(case: FrictionalCase, method: str) -> Answer:
 
 @cache
 def warm_up() -> None:
-    """Compile before any clock runs."""
+    """Compile the kernels before the timed calls."""
     resolve_impact([[1.0]], [[1.0]], [-1.0], 0.5)
     resolve_impact(np.eye(2), np.eye(2), [-1.0, -1.0], [0.5, 0.25])
 
 
 def _unmet(case: HardCase, v_plus: Floats) -> float:
-    """Largest relative violation of the law on the rows as given; speeds are scaled first, so nothing underflows."""
+    """Return the largest relative violation of the law on the given rows; scaled speeds prevent underflow."""
     unit = float(np.max(np.abs(case.velocity), initial=0.0)) or 1.0
     J, v, after = case.contact_jacobian, case.velocity / unit, v_plus / unit
     lower = np.linalg.cholesky(case.mass_matrix)
     scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
     if np.ndim(case.restitution):
-        unmet = np.maximum(-(J @ after), 0.0)  # Poisson's law: nothing approaches afterwards
+        unmet = np.maximum(-(J @ after), 0.0)  # Poisson's law: no contact approaches after the impact
     else:
         unmet = np.abs(J @ after + case.restitution * (J @ v))
     return float(np.max(np.divide(unmet, scale, out=np.zeros(len(J)), where=scale > 0.0), initial=0.0))
 
 
 def _forward_error(case: HardCase, v_plus: Floats) -> float:
-    """|v⁺ − truth| / |v⁻| in the kinetic metric, exactly up to the last root."""
+    """Return |v⁺ − truth| / |v⁻| in the kinetic metric; only the final root is rounded."""
     error = [Fraction(x) - t for x, t in zip(v_plus, case.truth.velocity, strict=True)]
     return float(np.sqrt(float(_form(case, error) / _form(case, case.velocity))))
 
 
 def _rounding_of_small_numbers(case: HardCase) -> float:
-    """Share of |v⁻| that rounding every component to the grid of subnormals can be."""
+    """Return the largest error of v⁺, relative to |v⁻|, from rounding its components to subnormal numbers."""
     diagonal = sum((Fraction(x) for x in np.diag(case.mass_matrix)), Fraction(0)) * _HALF_SUBNORMAL**2
     return float(np.sqrt(float(len(case.velocity) * diagonal / _form(case, case.velocity))))
 
 
 def _form(case: HardCase, vector: Any) -> Fraction:
-    """xᵀ M x."""
+    """Return xᵀ M x exactly."""
     x, M = fractions(vector), case.mass_matrix
     return dot(x, [dot(row, x) for row in fractions(M)])
 
@@ -236,16 +236,16 @@ def _form(case: HardCase, vector: Any) -> Fraction:
 def bounded_impact(
     case: HardCase, method: str, limit: float = LIMIT_SECONDS, most_bytes: int = LIMIT_BYTES
 ) -> Answer:
-    """Resolve one hard case by one method in a process of its own.
+    """Resolve one hard case by one method in a separate process.
 
     Raises
     ------
     TimedOut, OutOfMemory
-        Beyond `limit` [s] or `most_bytes` of address space (POSIX systems only).
+        The call exceeds `limit` [s] or `most_bytes` of address space (checked on POSIX systems only).
     IapbError
-        What the resolver itself raised.
+        The resolver raised an error, or the process failed.
     """
-    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the packages that we run from
+    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the separate process imports the same packages
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
     environment = {**os.environ, **paths, **threads}
     command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
@@ -267,7 +267,7 @@ def bounded_impact(
 
 
 def serve() -> None:
-    """Warm up, say so, then read one call and write its answer: what the other process runs."""
+    """Run the separate process: compile, report that it is ready, read one call and write its answer."""
     with one_thread():
         warm_up()
         sys.stdout.buffer.write(_READY)
@@ -286,6 +286,6 @@ def serve() -> None:
 def _limit_memory(most_bytes: int) -> None:
     try:
         import resource
-    except ImportError:  # not a POSIX system: time alone limits the call
+    except ImportError:  # not a POSIX system: only the time is limited
         return
     resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))

@@ -1,4 +1,4 @@
-"""Hard cases of mechanics: light bodies, short levers, singular linkages, grazing, tiny speeds, unequal restitution."""
+"""Hard cases of mechanics: light bodies, short lever arms, singular arms, grazing, tiny speeds, unequal restitution."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def tiny_lever_arm() -> HardCase:
 
 
 def _arm(q1: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix of the straight two-link arm of Fig. 2 (slender rods) and its tip's row along the arm."""
+    """Return the mass matrix of the straight arm of Fig. 2 (slender rods) and the row of its tip along the arm."""
     mass = np.array([[8.0 / 3.0, 5.0 / 6.0], [5.0 / 6.0, 1.0 / 3.0]])
     tip, elbow = 2.0 * np.array([np.cos(q1), np.sin(q1)]), np.array([np.cos(q1), np.sin(q1)])
     along = np.array([np.cos(q1), np.sin(q1)])
@@ -47,7 +47,7 @@ def _arm(q1: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def straight_arm() -> HardCase:
-    """The arm struck along itself, its row set to exact zero as the contact set does."""
+    """The straight arm struck along its own direction; its row is set to exact zeros, as the contact set does."""
     mass, row = _arm(0.3)
     cleaned = np.where(np.abs(row) <= 1e-13 * np.array([[2.0, 1.0]]), 0.0, row)
     return HardCase(
@@ -65,7 +65,7 @@ def straight_arm() -> HardCase:
 
 
 def face_at_three_points() -> HardCase:
-    """A box face on three points of a wall turned by the angle of a 3-4-5 triangle: exactly of rank two."""
+    """A box face on three points of a wall that is rotated by the angle of a 3-4-5 triangle; the exact rank is two."""
     n, t = (Fraction(-3, 5), Fraction(4, 5)), (Fraction(4, 5), Fraction(3, 5))
     rows = []
     for arm in (Fraction(-1, 2), Fraction(1, 7), Fraction(1, 2)):
@@ -116,7 +116,7 @@ def subnormal_speeds() -> HardCase:
 
 
 def light_direction() -> HardCase:
-    """v along M's lightest direction, κ(M) = 1e12, rows random in the kinetic metric, elastic."""
+    """An elastic impact with v along M's lightest direction, κ(M) = 1e12 and random rows in the kinetic metric."""
     rng = np.random.default_rng(34)
     d = 6
     axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
@@ -136,7 +136,7 @@ def light_direction() -> HardCase:
 
 
 def bar_with_unequal_restitution() -> HardCase:
-    """The bar that equalities throw from 0.5 J to 12.167 J."""
+    """The bar whose energy plain equalities raise from 0.5 J to 12.167 J."""
     mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
     return HardCase(
         "Bar struck at two points, e = (1, 0)",
@@ -152,7 +152,7 @@ def bar_with_unequal_restitution() -> HardCase:
 
 
 def wedged_peg() -> HardCase:
-    """The six rows of a peg whose sides have the slope 200 : 9999 (a triangle of whole numbers), pushed in askew."""
+    """The six contacts of a peg that enters its hole askew; its sides have the slope 200 : 9999, with exact normals."""
     n, t = Fraction(200, 10001), Fraction(9999, 10001)
     half, reach = Fraction(1, 200), Fraction(21, 2000)
     points = [(x, -reach, Fraction(0), Fraction(1)) for x in (-half, half)]

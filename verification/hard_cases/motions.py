@@ -1,4 +1,4 @@
-"""Motions with a law in closed form: contact chatter, a sampled wall about Colgate's bound, a wedged peg, a cradle."""
+"""Motions with a law in closed form: contact chatter, a sampled wall at Colgate's bound, a wedged peg, a cradle."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, larg
 
 # --- a ball that chatters --------------------------------------------------------------------------------------
 _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
-# Each bounce is found up to a step late: bounce k is k steps late at speed v eᵏ, in all v Δt Σ k eᵏ = 2 v Δt for e = ½;
-# the first is one step deep, and the height between two instants is off by as much.
+# Each bounce is up to one step late: bounce k is k steps late at speed v eᵏ, in sum v Δt Σ k eᵏ = 2 v Δt for e = ½. The
+# first bounce penetrates by one step, and the height between two instants has an error of one step, too.
 _STEPS_LATE = 4.0
 
 _SCENE = f"""
@@ -38,7 +38,7 @@ contact:
 
 
 def chatter() -> TrajectoryCase:
-    """Dropped from 0.1 m with e = ½."""
+    """A ball dropped from 0.1 m with e = ½."""
     return TrajectoryCase(
         "Contact chatter: infinitely many bounces in 0.43 s",
         "Zeno's bouncing ball; textbook",
@@ -52,7 +52,7 @@ def chatter() -> TrajectoryCase:
 
 
 def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Height of the ball above the floor [m] by the closed form."""
+    """Return the height of the ball above the floor [m] by the closed form."""
     fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
     height = np.where(time < fall, _HEIGHT - 0.5 * _GRAVITY * time**2, 0.0)
     start, speed = fall, _GRAVITY * fall * _RESTITUTION
@@ -65,40 +65,40 @@ def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _end() -> float:
-    """When the last bounce ends [s]: the geometric series of flights."""
+    """Return the time at which the bounces end [s], the sum of the geometric series of flight times."""
     fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
     return fall * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))
 
 
 def _measure_chatter(run: Run) -> Measured:
-    """Largest distance from the closed form, as a share of the drop."""
+    """Measure the largest distance from the closed form, relative to the height of the drop."""
     off = float(np.abs(run.q[:, 0] - _RADIUS - exact_height(run.time)).max()) / _HEIGHT
     late = _STEPS_LATE * math.sqrt(2.0 * _GRAVITY * _HEIGHT) * run.dt / _HEIGHT
     return Measured(largest_gain(run), NO_GAIN, off, late)
 
 
-# --- a sampled wall: at b > K T / 2 + |B| it is passive, beyond it a spring becomes a source of energy ----------
+# --- a sampled wall: it is passive if b > K T / 2 + |B|; otherwise its spring can create energy -------------------
 _PHYSICAL_DAMPING = 0.5  # b [N s/m] of the device of scenes/wall_1d.yaml
-_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, the hand, the coupling
+_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, hand, and coupling, in SI units
 _RADIUS_OF_HANDLE = 0.01
 _BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
-# Rounding over 1,536 steps, which each new contact multiplies: 1e-9 of the way, measured; a fault is far above.
+# Rounding over 1,536 steps, which each new contact amplifies: measured 1e-9 of the distance; faults are far larger.
 _SAME_NUMBERS = 1e-6
 
 
 def wall_at_the_bound() -> TrajectoryCase:
-    """K = 2 b / T exactly."""
+    """A wall of stiffness K = 2 b / T, exactly at the bound."""
     return _wall(1, "the largest stiffness for which passivity is proved", "in no world does the wall give energy")
 
 
 def wall_beyond_the_bound() -> TrajectoryCase:
-    """Five hundred times that."""
+    """A wall of 500 times the stiffness 2 b / T."""
     return _wall(500, "a penalty wall throws the handle back faster than it arrived",
                  "an impulse stops the handle before the spring is compressed: the wall gives no energy")  # fmt: skip
 
 
 def wall_far_beyond_the_bound() -> TrajectoryCase:
-    """Two thousand times that: T² K / m = 1.95, half of where the step itself diverges."""
+    """A wall of 2000 times the stiffness 2 b / T: T² K / m = 1.95, half of the value at which the step diverges."""
     return _wall(2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
                  "impulses do not make a spring this stiff passive; only the rigid wall is")  # fmt: skip
 
@@ -108,7 +108,7 @@ def _wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
     name = "Stiff wall at the Colgate bound" if factor == 1 else f"Stiff wall, {factor:,} times the Colgate bound"
 
     def measure(run: Run) -> Measured:
-        """Largest distance of the tool from the sampled law, as a share of its way to the wall."""
+        """Measure the largest distance of the tool from the sampled law, relative to its initial gap to the wall."""
         truth = sampled_wall(run.law, factor * _BOUND, run.steps, run.dt)
         way = abs(float(run.q[0, 0])) - _RADIUS_OF_HANDLE
         return Measured(largest_gain(run), NO_GAIN, float(np.abs(run.q[:, 0] - truth).max()) / way, _SAME_NUMBERS)
@@ -122,7 +122,7 @@ def _wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
 
 
 def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[np.float64]:
-    """Positions of the tool (steps + 1,): two masses, their coupling, and a wall that is read once a step."""
+    """Return the tool positions (steps + 1,) of two coupled masses and a wall that is sampled once per step."""
     x = [-0.03, -0.03]
     v = [0.1, 0.1]
     touching, path = False, [x[0]]
@@ -144,15 +144,15 @@ def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[n
 
 
 # --- a peg wedged in its hole ------------------------------------------------------------------------------------
-_STIFFNESS, _HAND, _DRAFT = 1000.0, 0.4, 0.01  # of scenes/peg_hole.yaml: wall [N/m], hand [N], slope of the sides
+_STIFFNESS, _HAND, _DRAFT = 1000.0, 0.4, 0.01  # from scenes/peg_hole.yaml: [N/m], [N], slope
 _END = 0.0105  # y [m] of the peg's centre when its front meets the hole's end
-_STOPPED = 1e-9  # speed [m/s] of a body at rest: ten decades below that of the blow
-# The springs' rest position is met to a ten-thousandth: the coupling's own settling leaves 1e-8 after a second.
+_STOPPED = 1e-9  # largest speed [m/s] of a body at rest: ten decades below that of the impact
+# Relative tolerance of the springs' rest position: after one second the coupling has settled to 1e-8.
 _SETTLED = 1e-4
 
 
 def wedged_peg_motion() -> TrajectoryCase:
-    """The shipped scene: the hand pushes the peg to the end of its hole and keeps pushing."""
+    """The scene peg_hole: the hand pushes the peg to the end of its hole and keeps pushing."""
     return TrajectoryCase(
         "A peg wedged in its hole, its motion",
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
@@ -165,7 +165,7 @@ def wedged_peg_motion() -> TrajectoryCase:
 
 
 def _measure_peg(run: Run) -> Measured:
-    """Distance from where the peg must rest, in units of the springs' static depth; one more where it moves still."""
+    """Measure the distance from the rest position in units of the static depth; a peg that still moves adds one."""
     sine = _DRAFT / math.hypot(1.0, _DRAFT)
     depth = _HAND / (2.0 * _STIFFNESS + 4.0 * _STIFFNESS * sine**2)
     place = _END if run.law == "rigid constraints" else _END - depth
@@ -175,7 +175,7 @@ def _measure_peg(run: Run) -> Measured:
 
 
 # --- Newton's cradle whose balls touch ---------------------------------------------------------------------------
-# Radii and places are binary fractions, so that touching is exact, or decimal ones, so that rounding decides the gap.
+# Radii and positions are binary fractions, so that gaps are exactly 0, or decimal fractions, so that gaps are rounding.
 _BALL = "{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1.0, shapes: [{{kind: circle, radius: {r}}}], "
 _CRADLE = """
 name: touching_cradle
@@ -188,31 +188,32 @@ bodies:
 contact: {{stiffness: {stiffness}, damping: 0, restitution: 1, coherence_distance: 2e-3}}
 """
 _CRADLE_STIFFNESS = 1e4
-# Springs of damping 0, read once a step, keep their energy to second order: 2 K Δt² / m.
+# Undamped springs that are sampled once per step conserve energy up to the second-order error 2 K Δt² / m.
 _BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
 
 
 def touching_cradle() -> TrajectoryCase:
-    """Gaps of exactly 0: contacts that are there before the blow and carry nothing.
+    """A cradle with gaps of exactly 0: the contacts exist before the impact and carry no force.
 
-    A contact is new until it has overlapped, so they are struck like those a micrometre apart. Taken for old, springs
-    would pass the blow on, and springs read once a step gain up to 2 K Δt²/m: 0.21 % here, as the world PB shows.
+    A contact counts as new until it overlaps, so these contacts collide like those with a gap of one micrometre. If
+    they counted as old, springs would transmit the impact. Springs that are sampled once per step gain up to
+    2 K Δt²/m, which is 0.21 % here, as the world PB shows.
     """
     return _cradle(0.0, "touching exactly")
 
 
 def touching_cradle_in_centimetres() -> TrajectoryCase:
-    """Gaps of a few 1e-18 m of either sign, as places of 0.02, 0.04 and 0.06 m give them."""
+    """A cradle with gaps of a few 1e-18 m of either sign, from the rounding of 0.02, 0.04 and 0.06 m."""
     return _cradle(0.0, "touching but for rounding", 0.01)
 
 
 def cradle_a_micrometre_apart() -> TrajectoryCase:
-    """Gaps of 1e-6 m: found one after another, a blow each."""
+    """A cradle with gaps of 1e-6 m: the balls collide one after another."""
     return _cradle(1e-6, "a micrometre apart")
 
 
 def cradle_a_micrometre_sunk() -> TrajectoryCase:
-    """Overlaps of 1e-6 m: springs that push before the blow."""
+    """A cradle with overlaps of 1e-6 m: the springs push before the impact."""
     return _cradle(-1e-6, "sunk by a micrometre")
 
 
@@ -222,10 +223,11 @@ def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
              for k, x in enumerate(places)]  # fmt: skip
 
     def measure(run: Run) -> Measured:
-        """How far momentum and energy at the end are from those of the first ball, as shares."""
+        """Measure the relative error of momentum and energy at the end; both must equal those of the first ball."""
         v = run.v[-1]
         off = max(abs(float(v.sum()) - 1.0), abs(float(v @ v) - 1.0))
-        stored = 3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5  # by springs; read once a step, a tenth more
+        stored = 3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5  # share of the energy in springs
+        # Sampling the springs once per step adds up to a tenth.
         return Measured(largest_gain(run), NO_GAIN + 1.1 * stored, off, _BY_SPRINGS)
 
     return TrajectoryCase(

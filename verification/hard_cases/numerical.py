@@ -23,31 +23,31 @@ def thousand_copies() -> HardCase:
 
 
 def no_contact() -> HardCase:
-    """c = 0."""
+    """An impact without contacts, c = 0."""
     return _contacts(0, "No contact at all", "empty matrices, which libraries treat differently",
                      "nothing happens, and no error")  # fmt: skip
 
 
 def one_contact() -> HardCase:
-    """c = 1."""
+    """An impact at one contact, c = 1."""
     return _contacts(1, "One contact", "it is not: every method must solve this case", "(19) to rounding")
 
 
 def hundred_contacts() -> HardCase:
-    """c = 100, rank three."""
+    """An impact at 100 contacts of rank three."""
     return _contacts(100, "100 contacts of rank three", "97 redundant rows, each exact in doubles",
                      "exact rank, and the velocity that three contacts give")  # fmt: skip
 
 
 def ten_thousand_contacts() -> HardCase:
-    """c = 10,000, rank three."""
+    """An impact at 10,000 contacts of rank three."""
     return _contacts(10_000, "10,000 contacts of rank three", "time and memory: the Delassus matrix has 1e8 entries",
                      "linear time and exact rank; "
                      "methods that form the Delassus matrix exceed the limit on time")  # fmt: skip
 
 
 def _contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
-    """Whole-number rows of rank three at most, so that doubles are exact."""
+    """Return an impact with integer rows of rank at most three; doubles represent them exactly."""
     rng = np.random.default_rng(10_000)
     rows = rng.integers(-2, 3, size=(count, 3)) @ np.array([[1, 0, 2, -1], [0, 1, 1, 1], [1, 1, 0, 2]])
     return HardCase(
@@ -64,7 +64,7 @@ def _contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
 
 
 def nearly_parallel_normals() -> HardCase:
-    """Two normals 1e-6 apart, elastic: the energy gain of the printed formula."""
+    """An elastic impact at two normals that differ by 1e-6, on which the printed formula gains energy."""
     return HardCase(
         "Nearly parallel normals, 1e-6 apart",
         "a corner of two almost coplanar faces; normal equations: Higham (2002), chapter 20; erratum 6",
@@ -78,7 +78,7 @@ def nearly_parallel_normals() -> HardCase:
 
 
 def printed_formula_gains() -> HardCase:
-    """Rows 1e-4 apart on a mass matrix of condition 1e6, elastic."""
+    """An elastic impact at rows that differ by 1e-4, with a mass matrix of condition number 1e6."""
     rng = np.random.default_rng(7)
     d = 6
     axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
@@ -98,7 +98,7 @@ def printed_formula_gains() -> HardCase:
 
 
 def hilbert_rows() -> HardCase:
-    """Rows of the Hilbert matrix."""
+    """An impact whose rows are those of the Hilbert matrix."""
     n = 8
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
     return HardCase(
@@ -115,7 +115,7 @@ def hilbert_rows() -> HardCase:
 
 
 def kahan_rows() -> HardCase:
-    """Kahan's matrix: pivoting sees rank n, one singular value is far smaller."""
+    """An impact with the rows of Kahan's matrix: pivots suggest rank n, but one singular value is far smaller."""
     n, c = 24, 0.6
     s = np.sqrt(1.0 - c * c)
     rows = s ** np.arange(n)[:, None] * (np.eye(n) - c * np.triu(np.ones((n, n)), 1))

@@ -1,4 +1,4 @@
-"""Hard problems that others wrote, from the folder ../shared/problems beside the project; absent files are said so."""
+"""Hard problems by others, from the folder ../shared/problems next to the project; absent files raise CaseAbsent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from reference.datasets import read_problem
 from verification.hard_cases.case import NO_GAIN, CaseAbsent, HardCase, Measured, TrajectoryCase, largest_gain
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
-_NOISE = 1e-10  # of the largest eigenvalue of W: below it the bowls' spectra hold what their authors' rounding left
+_NOISE = 1e-10  # share of the largest eigenvalue of W; smaller eigenvalues in these files are rounding noise
 
 
 def find_problem(place: str) -> Path:
@@ -25,7 +25,7 @@ def find_problem(place: str) -> Path:
 
 
 def bowl_of_low_rank() -> HardCase:
-    """bowl.5: 35 contacts, five motions."""
+    """bowl.5: 35 contacts of rank five."""
     mass, rows, velocity = _mechanics("lcp/bowl.5.dynamics.lcp.gz")
     return HardCase(
         "Pile in a bowl, 35 contacts of rank 5", "lcpy (Tournier), bowl.5.dynamics",
@@ -46,7 +46,7 @@ def bowl_of_mixed_scales() -> HardCase:
 
 
 def _mechanics(place: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M = 1 and rows J with J Jᵀ = W to the noise of the file, and the velocity whose J v is nearest to its q."""
+    """Return M = 1, rows J with J Jᵀ = W up to the noise of the file, and the least-squares solution v of J v = q."""
     problem = read_problem(find_problem(place)).problem
     values, axes = np.linalg.eigh(problem.delassus)
     kept = values > _NOISE * values[-1]
@@ -73,13 +73,13 @@ contact: {{restitution: {e}, coherence_distance: 5e-3}}
 
 
 def two_balls_and_a_wall() -> TrajectoryCase:
-    """nimblephysics issue 143: an engine that doubled the energy."""
+    """Two balls and a wall, nimblephysics issue 143, in which that engine doubled the energy."""
     given = json.loads(find_problem("nimble_143.json").read_text(encoding="utf-8"))
     text = _BALLS.format(**given)
     speed = float(given["v"][0])
 
     def measure(run: Run) -> Measured:
-        """Distance of the last velocities from the law's, relative to the speed before."""
+        """Measure the distance of the final velocities from those of the law, relative to the initial speed."""
         return Measured(largest_gain(run), NO_GAIN, float(np.abs(run.v[-1] - [-speed, 0.0]).max()) / speed, 1e-12)
 
     return TrajectoryCase(

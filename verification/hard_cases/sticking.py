@@ -1,7 +1,8 @@
-"""What friction must hold: a nudged box that stops, a box and a stack of boxes that stick on a slope.
+"""Cases of sticking friction: a nudged box that stops, and a box and a stack of boxes that stick on a slope.
 
-A friction force held over a step drives what it should stop: (6) of the paper is an explicit damper μ N / v_threshold,
-unstable from μ N Δt = 2 m v_threshold on. Here μ N Δt / (m v_threshold) is 4.9 for one box at the default threshold.
+A friction force that is constant over a step can reverse the motion that it should stop. Law (6) of the paper is an
+explicit damper μ N / v_threshold, which is unstable if μ N Δt > 2 m v_threshold. Here μ N Δt / (m v_threshold) is 4.9
+for one box at the default threshold.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, larg
 
 _G, _MU, _RATE = 9.81, 0.5, 1000.0
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
-# Width and height [m], stiffness [N/m]. A stack of slabs swings on its springs without slipping.
+# Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without slipping.
 _BOX, _SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
 _LONG = 10.0  # [s]
-_SECOND_ORDER = 0.02  # of the lean, for each box: a contact is midway in the overlap, a hundredth of its lever off
+_SECOND_ORDER = 0.02  # relative error of the lean per box: the contact point lies at half the overlap
 
 _HEAD = """
 name: {name}
@@ -41,7 +42,7 @@ _BODY = """  - {{name: box_{k}, joint: planar, mass: 1.0, inertia: {inertia!r}, 
 def _boxes(
     name: str, title: str, count: int, sort: tuple[float, float, float], slope: float, speed: float
 ) -> Scene:
-    """Boxes of 1 kg on one another on a slope [rad], each sunk in by the weight that it carries."""
+    """Return a scene of boxes of 1 kg on one another on a slope [rad]; each starts with its static overlap."""
     (width, height, stiffness), level, boxes = sort, 0.0, []
     for k in range(count):
         level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
@@ -53,14 +54,14 @@ def _boxes(
 
 
 def nudged_box() -> TrajectoryCase:
-    """A box nudged at 0.2 m/s along a flat floor."""
+    """A box that starts at 0.2 m/s on a flat floor."""
     speed = 0.2
     way, stopped = speed**2 / (2.0 * _MU * _G), speed / (_MU * _G)
 
     def measure(run: Run) -> Measured:
-        """Largest distance from the place where it must stop, from a tenth of a second after that on.
+        """Measure the largest distance from the stopping place, from a tenth of a second after the stop on.
 
-        A first-order step is ahead or behind by at most the way of one step.
+        The position of a first-order step is wrong by at most the distance of one step.
         """
         x = run.q[run.time > stopped + 0.1, 0]
         return Measured(largest_gain(run), NO_GAIN, float(np.abs(x - way).max()) / way, speed * run.dt / way)
@@ -75,12 +76,12 @@ def nudged_box() -> TrajectoryCase:
 
 
 def box_on_a_slope() -> TrajectoryCase:
-    """One box on 20 degrees, for ten seconds."""
+    """One box on a slope of 20 degrees, for ten seconds."""
     return _sticking("Box that sticks on a slope", "box_on_a_slope", 1, _BOX)
 
 
 def stack_on_a_slope() -> TrajectoryCase:
-    """Three slabs on one another on 20 degrees, for ten seconds."""
+    """Three slabs on one another on a slope of 20 degrees, for ten seconds."""
     return _sticking("Stack that sticks on a slope", "stack_on_a_slope", 3, _SLAB)
 
 
@@ -89,7 +90,7 @@ def _sticking(title: str, name: str, count: int, sort: tuple[float, float, float
     leans = _lean(count, sort, slope)
 
     def measure(run: Run) -> Measured:
-        """Distance of the upper box from where its springs let it lean, at the end, as a share of the lean."""
+        """Measure the distance of the upper box from its elastic deflection at the end, relative to the deflection."""
         off = abs(float(run.q[-1, 3 * (count - 1)]) - leans)
         return Measured(largest_gain(run), NO_GAIN, off / leans, _SECOND_ORDER * count)
 
@@ -104,10 +105,10 @@ def _sticking(title: str, name: str, count: int, sort: tuple[float, float, float
 
 
 def _lean(count: int, sort: tuple[float, float, float], slope: float) -> float:
-    """How far the centre of the upper box moves down the slope where nothing slips [m], to first order.
+    """Return the elastic displacement of the upper box's centre down the slope [m], to first order, without slip.
 
-    Faces k carry the moment g sin(slope) h (n − k)² / 2 of the boxes above and turn by it over K w² / 2; the centre of
-    the upper box is (n − 1 − k) h + h / 2 above them.
+    Face k carries the moment g sin(slope) h (n − k)² / 2 of the boxes above it. The face rotates by this moment divided
+    by K w² / 2. The centre of the upper box is (n − 1 − k) h + h / 2 above the face.
     """
     width, height, stiffness = sort
     turns = [_G * math.sin(slope) * height * (count - k) ** 2 / (stiffness * width**2) for k in range(count)]

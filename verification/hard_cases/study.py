@@ -1,4 +1,4 @@
-"""All named hard cases, every method and world on each: a Finding per case, and what the engine makes of them."""
+"""Judge every method and world on all named hard cases: one Finding per case, and one Finding on the engine."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COLUMNS = (
     Column("exact rank"), Column("time", "µs", timed=True), Column("note"),
 )
 OF_CASE = (Column("case"), Column("kind"))
-ENGINE = ("factored", "IAPB")  # what the engine does by default: its impact method, its world
+ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
               "The gain (KE⁺ − KE⁻)/KE⁻ is computed exactly. The error is |v⁺ − truth| / |v⁻| in the kinetic metric; "
@@ -52,12 +52,12 @@ _NOTES = {
 def hard_cases(
     simulate: Simulate, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[Finding, ...]:
-    """Judge all methods and worlds on all cases; a part per method. A case without its files says so."""
+    """Return one finding per case with one part per method; the finding of a case without its files says so."""
     return tuple(of_each(counted(HARD_CASES, progress), lambda name: [_judged(name, simulate, failures)], failures))
 
 
 def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:
-    """What the engine makes of the cases; in its table every method and world on every case."""
+    """Return the finding on the engine; its table has every method and world on every case."""
     tried = [case for case in cases if case.computed]
     ours = {case.title: _outcome(case) for case in tried}
     failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
@@ -70,7 +70,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     question = "Is the engine stable on problems on which other methods fail?"
     rows = [{"case": case.title, "kind": case.details["kind"], **row}
             for case in tried for row in case.tables[case.key].records()]  # fmt: skip
-    table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all but the notes
+    table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all columns but the notes
     others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
     parts = (Part(sentence, verdict, miss="".join(failing[:1]) + others, quantities=(stable,)),)
     tables = {"every method": table}
@@ -78,7 +78,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
 
 
 def _outcome(case: Finding) -> str:
-    """What came of a case by the engine; empty where it was not tried."""
+    """Return the outcome of the engine on a case; "" if it was not judged on this case."""
     by = {part.name: part.sentence for part in case.parts}
     return next((by[name] for name in ENGINE if name in by), "")
 
@@ -98,7 +98,7 @@ def _judged(name: str, simulate: Simulate, failures: list[Failure]) -> Finding:
 
 
 def finding_on(key: str, title: str, table: Table, details: dict[str, str]) -> Finding:
-    """The finding on a case, from a row per method or world."""
+    """Return the finding on a case from a table with one row per method or world."""
     parts = tuple(Part(row["outcome"], REPRODUCED if row["outcome"] == STABLE else REFUTED, row["method"])
                   for row in table.records())  # fmt: skip
     stable = [part.verdict == REPRODUCED for part in parts]
@@ -108,7 +108,7 @@ def finding_on(key: str, title: str, table: Table, details: dict[str, str]) -> F
 
 
 def _row(found: HardCaseVerdict) -> dict[str, Any]:
-    """A verdict as a row; what does not apply or was not delivered is a dash."""
+    """Return a verdict as a row; a quantity that does not apply or is missing is None, printed as a dash."""
     return {
         "method": found.method, "outcome": found.verdict, "energy gain": _known(found.energy_gain),
         "gain allowed": _known(found.energy_bound), "restitution residual": _known(found.restitution_residual),
