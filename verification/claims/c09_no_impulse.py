@@ -37,7 +37,7 @@ FAMILIES = (Family(1, 1, 1, 1e0), Family(3, 6, 3, 1e2), Family(6, 20, 4, 1e4), F
 IMPACTS = {"quick": 20, "full": 300}
 
 JUST_ABOVE = float(np.nextafter(-1.0, 0.0))
-# An impulse 1e-16 times the normal one moves the 2 kg peg by 1e-17 m; contacts may amplify this distance [m, rad].
+# An impulse of 1e-16 of its usual size moves the 2 kg peg by 1e-17 m; contacts may amplify this distance [m, rad].
 SAME_TRAJECTORY = 1e-11
 
 

@@ -104,7 +104,7 @@ COLUMNS = (
     Column("step", "µs", timed=True),  # time of the scene with its effects, the same in each row
     Column("all on", "µs", timed=True),  # time of the scene with all of SWITCHED on
     Column("faster than real time", "times", timed=True),
-    Column("time saved", "%", timed=True),  # share of the step's time that leaving the effect out saves
+    Column("time saved", "%", timed=True),  # share of the step that leaving the effect out saves; None within the noise
     Column("position", "mm"),  # largest distance of the tool (without a hand: of any body) from that with the effect
     Column("device", "mm"),  # the same distance of the device
     Column("energy", "%"),  # largest change of kinetic energy, relative to its largest value with the effect

@@ -288,7 +288,7 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
     """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
     The cost is the median over the scenes on which it can be fitted. "Error stays" is the number of scenes on which the
-    error does not fall. "Best for its time" is the number of scenes on whose front the method is.
+    error does not fall. "Best for its time" is the number of scenes in which the method is on the front.
     """
     found = curves(motions, methods)
     records: list[dict[str, Any]] = []

@@ -189,7 +189,7 @@ def largest_gain(run: Run) -> float:
 
 @dataclass(frozen=True)
 class HardCaseVerdict:
-    """One method or world on one case; NaN where a quantity does not apply or was not delivered.
+    """The verdict of one method or world on one case; a number that does not apply or is missing is NaN.
 
     Attributes
     ----------

@@ -54,7 +54,7 @@ _NOISE = 10.0  # a residual within this factor of the tolerance decides nothing
 # An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then random (relative gains
 # of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows 1e-4 apart).
 _ALL_NOISE = 0.5
-_MANY_CONTACTS = 2000  # with more, these methods run in their own process: the SVD of W (4e6 entries) takes a second
+_MANY_CONTACTS = 2000  # from here on these methods run in their own process: the SVD of W takes a second
 
 LIMIT_SECONDS = 2.0  # [s] two thousand haptic steps; a slower method is of no use for haptics
 LIMIT_BYTES = 6 << 30  # address space: seven matrices of 10,000 x 10,000 doubles and the libraries

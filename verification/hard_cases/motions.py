@@ -79,7 +79,7 @@ def _measure_chatter(run: Run) -> Measured:
 
 # --- a sampled wall: it is passive if b > K T / 2 + |B|; otherwise its spring can create energy -------------------
 _PHYSICAL_DAMPING = 0.5  # b [N s/m] of the device of scenes/wall_1d.yaml
-_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, hand, and coupling, in SI units
+_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, hand, coupling, in SI units
 _RADIUS_OF_HANDLE = 0.01
 _BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
 # Rounding over 1,536 steps, which each new contact amplifies: measured 1e-9 of the distance; faults are far larger.
