@@ -134,7 +134,7 @@ def measure(run: Run) -> dict[str, Any]:
 
 
 def ending(run: Run, turned: float) -> str:
-    """Return in words whether the scene rests or moves in the last tenth of the run."""
+    """Return in words whether the scene rests or moves in the last tenth of the run, or why the run stopped."""
     if not run.complete:
         return STOPPED + run.stopped
     kinetic = run.energy["kinetic"]

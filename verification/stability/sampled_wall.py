@@ -61,9 +61,9 @@ class Loop:
 class Contact:
     """Outcome at each wall (one entry per wall).
 
-    settled : whether the mass is still at the end
+    settled : whether the mass is still in the last quarter of the time and has not grown
     settling_time : time from the first contact [s], infinite if the mass never settles
-    grown : whether the mass is faster than at the start at some time after the first second
+    grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first contact at any wall
     bounces : number of times that the mass leaves the wall
     penetration : largest penetration [m]; peak_force : largest force [N]
     rate_hardness : first rate of the force over the first speed [N/m] (Lawrence et al. 2000)
