@@ -32,8 +32,8 @@ CLIPPING_ROOM = 24
 # contacts each. Up to `SMALL_CAPACITY` contacts the buffer has room for the contacts of every pair.
 CONTACTS_PER_SHAPE, SMALL_CAPACITY = 24, 4096
 
-# A polygon counts as convex when no corner turns inwards by more than this [rad]: vertices typed with six
-# digits describe straight edges to about 1e-6, and an inward turn that small moves no surface visibly.
+# A polygon counts as convex if no corner turns inwards by more than this [rad]. Vertices given with six digits describe
+# straight edges to about 1e-6, and the effect of so small a turn on the surface is negligible.
 CONVEXITY_TOLERANCE = 1e-6
 
 Floats = NDArray[np.float64]

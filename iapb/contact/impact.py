@@ -37,7 +37,7 @@ from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 
-# To add a method: write its function in a file of its own, and a line here.
+# To add a method, write its function in a new file and add a line here.
 METHODS: dict[str, Method] = {
     "factored": Method(None, True),
     "gram_pinv": Method(gram_pinv, False),

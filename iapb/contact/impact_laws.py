@@ -39,7 +39,7 @@ class FrictionalImpact:
     velocity : (d,) v⁺; generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp + Tᵀp_t.
     impulses : (c,) p along the normals [N s]; non-negative if non-negative impulses can produce the motion.
     tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the others.
-    energy_change : KE⁺ − KE⁻ [J]; energy_interval : (lower, upper) that hold it in real arithmetic, upper ≤ 0.
+    energy_change : KE⁺ − KE⁻ [J]; energy_interval : (lower, upper), its bounds in real arithmetic; upper ≤ 0.
     friction_share : factor in [0, 1] that scales friction so that the impact gains no energy and, with status
         ``"reduced"``, every contact stays in its friction cone; 1 = friction is not reduced.
     clamp : factor by which the final energy clamps against rounding scaled the change of velocity.

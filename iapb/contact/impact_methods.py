@@ -102,7 +102,7 @@ class Outcome(NamedTuple):
 
 
 def outcome(problem: ImpactInput, v_plus: Floats, momentum: Floats, impulses: Floats, clamped: bool) -> Outcome:
-    """Undo the scaling; if the rounding of this raised the energy, clamp the step again."""
+    """Undo the scaling; clamp the step again if this rounding raised the energy."""
     work, given = problem.work, problem.given
     work.v_plus[:], work.momentum[:], work.impulses[:] = v_plus, momentum, impulses
     results = np.empty(problem.coordinates), np.empty(problem.coordinates), np.empty(problem.contacts)
@@ -325,11 +325,11 @@ def gram_cholesky(problem: ImpactInput, budget: int, clamped: bool, tolerance: f
     W, gamma = _delassus(problem)
     unit = W / np.sqrt(np.outer(np.diag(W), np.diag(W))) if np.all(np.diag(W) > 0.0) else np.zeros_like(W)
     smallest = float(np.linalg.eigvalsh(0.5 * (unit + unit.T))[0])
-    # A Gram matrix of unit rows knows its smallest eigenvalue to c·ε only: below that the rows count as dependent.
+    # The smallest eigenvalue of a Gram matrix of unit rows is known to c·ε only: below, the rows count as dependent.
     if smallest <= problem.contacts * np.finfo(float).eps * 8:
         raise ArgumentError("contact_jacobian", problem.contact_jacobian.shape,
                             "independent rows for method 'gram_cholesky'; use 'factored' for dependent ones")
-    factor = np.linalg.cholesky(0.5 * (W + W.T))  # of rows of like size: definite, as the test above shows
+    factor = np.linalg.cholesky(0.5 * (W + W.T))  # rows of similar size: definite, as the test above shows
     half = np.linalg.solve(factor, gamma)
     impulses = -(1.0 + problem.restitution) * np.linalg.solve(factor.T, half)
     return _from_impulses(problem, impulses, problem.contacts, clamped)

@@ -49,7 +49,7 @@ class SimulatedDevice:
     mass_matrix : (d, d)
         Symmetric positive definite [kg, kg m²].
     q, v : (d,)
-        Start; v defaults to rest.
+        Initial position and velocity; v defaults to zero.
     dt : float [s]
         Step length > 0.
     damping : (d,), optional

@@ -29,7 +29,7 @@ class JointKind:
     code: int
     coordinates: tuple[tuple[str, str], ...]  # (suffix, unit) of each entry of q
     velocities: tuple[str, ...]  # suffix of each entry of v
-    velocity_units: tuple[str, ...]  # its unit
+    velocity_units: tuple[str, ...]  # unit of each entry of v
     neutral: tuple[float, ...]  # q of the joint at rest
     rotating: tuple[bool, ...]  # for each entry of v: rotation (True) or translation along its axis
 

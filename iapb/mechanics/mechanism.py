@@ -63,7 +63,7 @@ class Mechanism:
     Parameters
     ----------
     bodies : iterable of Body
-        Parents before children, the bodies of one tree together.
+        Parents come before children; the bodies of one tree are consecutive.
 
     Attributes
     ----------

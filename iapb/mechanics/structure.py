@@ -98,7 +98,7 @@ def has_velocity_terms(m: MechanismArrays) -> bool:
 
 # A mechanism with every fixed body merged into the body that carries it: this is enough for M and B.
 #
-# A robot's URDF has about two links for each that moves (flanges, covers, tool frames).
+# A robot's URDF has about two links per moving link (flanges, covers, tool frames).
 
 
 Floats = NDArray[np.float64]

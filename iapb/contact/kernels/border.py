@@ -235,7 +235,7 @@ def row_sizes(work):
 
 @kernel
 def unscale_impact(mass_matrix, velocity, clamped, work, v_plus, momentum, impulses):
-    """Write the impact in the caller's units; clamp the step again if the rounding of this raised the energy.
+    """Write the impact in the caller's units; clamp the step again if this rounding raised the energy.
 
     Returns the factor of this clamp, and (energy change, its lower and upper bound); they are NaN if v⁺ overflows.
     """

@@ -164,7 +164,7 @@ AT_LIMIT = 0.99  # share of a limit: a contact below it sticks
 STILL = 1e-12
 # Tolerance for Coulomb's law, the same as for restitution: rows that differ by less count as one (RANK_TOLERANCE).
 MET = 1e-10
-# Sweeps of p_t in a round, in which the limits move anyway: until one changes velocities by a tenth of the first.
+# Sweeps of p_t in a round, as the limits change anyway: until one changes velocities by a tenth of the first.
 SWEEPS, SETTLED = 10, 0.1
 HELD_SWEEPS = 200  # with the limits held for good
 PUSHES = 1e-9  # share of the normal impulse that non-negative impulses may miss: rounding of the active set
@@ -175,7 +175,7 @@ TRIMS = 5  # each removes the excess over the cones and leaves a share of μ of 
 
 @kernel
 def settle_friction(count, rank, work, push, f, d, scale):
-    """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the law is met to MET.
+    """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the law is met within MET.
 
     If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem.
     scale : speed [m/s] to which STILL and MET are relative.

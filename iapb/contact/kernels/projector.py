@@ -10,7 +10,7 @@ import math
 from iapb.compiled import kernel
 
 # A pivot is a residual row of at least this share of the longest one. A short residual has the rounding ε / ‖r‖ in its
-# direction. If one direction is left, all rows tie, and without this rule rounding would choose.
+# direction. If only one direction is left, all rows tie, and without this rule rounding would choose the pivot.
 _PIVOT_SHARE = 0.1
 _PASSES = 4  # each pass corrects the error of the one before; a vector that no pass leaves long enough is rounding
 

@@ -126,11 +126,11 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
 
 # Contacts of two boxes: separating axes (15), then faces against each other or edge against edge.
 #
-# The axis of largest separation decides. A face of one box (the reference) meets the most opposed face of the
-# other (incident): seen along the normal a rectangle and a parallelogram, whose intersection has three kinds of
-# corners, each found without a list: incident corners in the rectangle, reference corners in the parallelogram,
-# crossings of edges. Of more than four points four are kept, so that the stiffness under a face does not
-# depend on the orientation of the faces. Source: Gottschalk, Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
+# The axis of largest separation decides. A face of one box (the reference) meets the most opposed face of the other
+# (incident). Seen along the normal they are a rectangle and a parallelogram. Their intersection has three kinds of
+# corners: incident corners in the rectangle, reference corners in the parallelogram, crossings of edges. Of more than
+# four points four are kept, so that the stiffness under a face does not depend on the orientation of the faces. Source:
+# Gottschalk, Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
 #
 # The gap of separated boxes is the largest separation over the axes: exact where a face or two edges face each other,
 # elsewhere a lower bound of the distance.
@@ -180,7 +180,7 @@ def _reach(axes, half, n):
 
 @kernel
 def _best_face(apart, A, B, half_a, half_b):
-    """Return the face axis of largest separation, whether it is a's, and the separation. Ties: a first."""
+    """Return the face axis of largest separation, whether it is a's, and the separation. A tie goes to a."""
     face, of_a, best = 0, True, -math.inf
     for k in range(3):
         separation = abs(dot(apart, A[k])) - half_a[k] - _reach(B, half_b, A[k])
@@ -285,7 +285,7 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, center, center_ot
             count = store_in_space(buffer, count, shapes, a, b, vertex_feature(kind, faces, number), point, normal, h)
             if count < 0:
                 return -1
-    if count == start:  # apart sideways, or rounding at a corner: the deepest corner, at the axes' separation
+    if count == start:  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
         x, y = min(max(deepest_x, -hu), hu), min(max(deepest_y, -hv), hv)
         point = add(add(origin, scale(0.5 * separation, m)), add(scale(x, u), scale(y, v)))
         return store_in_space(buffer, count, shapes, a, b, vertex_feature(kind, faces, 24), point, normal, separation)
