@@ -146,13 +146,17 @@ def _lost_on(name: str, kernels: Table) -> str:
     """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
     slower = [row for row in kernels.records() if holds(row) is False]
     faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
-    won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({faster['contacts']} contacts). "
+    won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({_contacts(faster)}). "
     if not slower:
         return f"On {name} IAPB is clearly slower at no size; {won}"
     worst, sizes = min(slower, key=lambda row: float(row["ratio"])), [row["contacts"] for row in slower]
     return (f"On {name} IAPB is slower at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} "
-            f"contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke ({worst['contacts']} "
-            f"contacts); {won}")  # fmt: skip
+            f"contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke ({_contacts(worst)}); "
+            f"{won}")  # fmt: skip
+
+
+def _contacts(row: Row) -> str:
+    return f"{row['contacts']} contact{'s' * (row['contacts'] > 1)}"
 
 
 def _lost_on_hard_impacts(numbers: Table) -> str:
@@ -161,7 +165,7 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
         here = lost.where(contacts=c).records()
         best = max(here, key=lambda row: float(row["ratio"]))
         cases = len({row["problem"] for row in here})
-        said += (f"On {cases} of the nine hard impacts with {c} contact{'s' * (c > 1)} another solver is faster at the "
+        said += (f"On {cases} of the 9 hard impacts with {_contacts(best)} another solver is faster at the "
                  f"same accuracy: {best['solver']} by up to {best['ratio']:.2g} times. ")
     return said or "On the hard impacts above no compiled solver is as exact as IAPB in less time. "
 

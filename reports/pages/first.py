@@ -75,8 +75,9 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     tilts = [bound for part in claim.parts if part.region and not part.name.startswith("theta")
              for name, _, _, bound in part.region.bounds if name == "tilt" and bound is not None]  # fmt: skip
     if tilts:
-        yield True, ("With impulses, the path of the hand is closer to that at a rigid wall than with springs alone or "
-                     f"CBuc, if the peg starts with a tilt of at most {degrees(min(tilts)):.1f}°.")  # fmt: skip
+        yield True, ("With impulses (IAPB), the path of the hand is closer to that at a rigid wall than with springs "
+                     "alone (PB) or with rigid contacts and a unilateral coupling of device and tool (CBuc), if the "
+                     f"peg starts with a tilt of at most {degrees(min(tilts)):.1f}°.")  # fmt: skip
         yield False, "For larger tilts, the path with springs alone is often as close or closer."
     elif claim.parts:
         yield False, "In no range of starts is the path of the hand with impulses the closest to that at a rigid wall."

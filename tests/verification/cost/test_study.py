@@ -20,6 +20,7 @@ from reports.figures.cost import (
 )
 from reports.figures.plot import Plot
 from tests.reports.figure_inputs import tables as kept_tables
+from verification.claims.c22_cost import CLEAR, holds
 from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
 from verification.cost.calls import PRINTED
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
@@ -29,7 +30,7 @@ from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
 from verification.cost.start_up import COLUMNS as START_COLUMNS
 from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL
-from verification.cost.study import RATE, SOLVERS, _rate, compute, finding, quoting
+from verification.cost.study import KERNELS, RATE, SOLVERS, _rate, compute, finding, quoting
 from verification.cost.trajectories import BELOW, INTEGRATORS, WORLDS, by_chance, curves, tenfold_cost, worth
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
@@ -270,6 +271,13 @@ def test_a_report_measures_each_quantity_once_and_quotes_it(
     late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0}]
     c19 = Finding("C19", "", "", "", REPRODUCED, tables={"C19": table_of(RATE_COLUMNS, late)})
     costs = Finding("complementarity", "", "", "", REPRODUCED, tables={"time per impact": tables[SOLVERS]})
+    kernels = kept_tables()["C22/C22"].judged(holds)
+    c22 = Finding("C22", "", "", "", REPRODUCED, tables={"C22": kernels})
+    said = [part for part in quoting(topic, (c19, costs, c22)).parts if "compiled on both sides" in part.sentence]
+    slower = sum(row["ratio"] is not None and row["upper quartile"] <= 1 / CLEAR for row in kernels.records())
+    assert len(said) == 1 and "claim C22" in said[0].sentence
+    assert said[0].miss.startswith(f"compiled, IAPB is slower than Lemke's method in {slower} of ")
+    assert quoting(topic, (c19, costs, c22)).tables[KERNELS] is kernels
     whole = quoting(topic, (c19, costs))
     assert whole.tables[SOLVERS] is costs.tables["time per impact"]
     assert whole.tables[RATE].rows == _rate(c19.tables["C19"]).rows
