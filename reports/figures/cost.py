@@ -58,8 +58,9 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
     "solves all or most of nine hard impacts of that size in time and without a gain of energy; below the name is its "
     "largest error relative to |v⁻|. The colour is that of the method in the pictures below: strong for an error below "
     "1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” is then "
-    "the largest error of the best method that ends in time without creating energy. The numbers name that method, "
-    "and the best methods called from Python. The nine impacts: condition number of M 1, 1e3 and 1e6; relative "
+    "the largest error of the best method that ends in time without creating energy. The table under Numbers names "
+    "that method, and the best methods called from Python. The nine impacts: condition number of M 1, 1e3 and 1e6; "
+    "relative "
     "distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
@@ -104,9 +105,10 @@ def power_of_error(value: float) -> str:
 
 
 _WHY = (
-    "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is created. With "
-    "one or two contacts this fixed work takes most of the time. In a pile no row is redundant, so IAPB does this work "
-    "for every contact, while Lemke's method needs one pivot for each. On a patch all rows but three are redundant, "
+    "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is created. On a "
+    "patch of a few contacts this fixed work takes most of the time. In a pile no row is redundant, so IAPB does "
+    "this work for every contact, while Lemke's method needs one pivot for each. On a patch all rows but three are "
+    "redundant, "
     "and IAPB is faster."
 )
 
@@ -150,8 +152,9 @@ def _lost_on(name: str, kernels: Table) -> str:
     if not slower:
         return f"On {name} IAPB is clearly slower at no size; {won}"
     worst, sizes = min(slower, key=lambda row: float(row["ratio"])), [row["contacts"] for row in slower]
-    return (f"On {name} IAPB is slower at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} "
-            f"contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke ({_contacts(worst)}); "
+    return (f"On {name} IAPB is clearly slower at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} "
+            f"to {max(sizes)} contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke "
+            f"({_contacts(worst)}); "
             f"{won}")  # fmt: skip
 
 
@@ -268,9 +271,12 @@ _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` dra
 _READ = (
     "Lower left is better. Each mark is a run with one time step; finer steps are further right. The number at a curve "
     "is the factor by which the computing time grows for ten times the accuracy on that scene: a power fitted to the "
-    "filled marks (thick straight line). Hollow marks are not fitted, because there a finer step divides the error by "
-    f"less than {GAINED:g}. “Then level” or “stays at”: no shorter step reduces this error, which comes from the "
-    "contact model. “Too few runs”: finer steps took longer than allowed. The grey steps join the runs that no other "
+    "filled marks (thick straight line). At hollow marks the finer step divides the error by less than "
+    f"{GAINED:g}; they are not fitted. The error depends on where an impact falls within a step, so curves are "
+    "uneven. The table gives medians over the scenes, and in brackets the range. “Then level” or “stays at”: no "
+    "shorter "
+    "step reduces this error, which comes from the contact model. “Too few runs”: finer steps took longer than "
+    "allowed. The grey steps join the runs that no other "
     "run beats in both time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at "
     "the lower rim: the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end "
     "at the instant of impact; it is not fitted either. "
@@ -293,8 +299,9 @@ def trajectory_precision(motions: Table) -> Drawn:
 @recipe(
     "integrator-precision", "What a better integrator buys in a whole motion", "haptic-rate/motions",
     section="accuracy",
-    caption="The same runs for each integrator of IAPB and PB, with grey steps of their own. An integrator of higher "
-    "order is more exact only between impacts. The step that contains an impact dominates the error, so Runge-Kutta 4 "
+    caption="The same worlds with other integrators; the grey steps join the best of these runs. An integrator of "
+    "higher order is more exact only between impacts. The step that contains an impact dominates the error, so "
+    "Runge-Kutta 4 "
     "needs four evaluations and gains little. Marks and numbers as above.",
 )  # fmt: skip
 def integrator_precision(motions: Table) -> Drawn:
@@ -407,8 +414,8 @@ def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float 
 @recipe(
     "anytime", "What each row of the budget buys", "haptic-rate/budgets", section="accuracy",
     caption="Plastic impacts that stop after a budget of rows, which are taken in order of the largest residual. The "
-    "residual falls with every row, and to rounding at the rank. The energy taken never exceeds that of the complete "
-    "impact, so every budget is passive.",
+    "residual falls with every row. After as many rows as the rank of J it is at rounding level. The energy "
+    "taken never exceeds that of the complete impact, so every budget is passive.",
 )  # fmt: skip
 def anytime(numbers: Table) -> Drawn:
     """Draw a panel for the residual and one for the energy."""

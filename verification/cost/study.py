@@ -237,8 +237,9 @@ def _say_printed(tables: Tables) -> Iterator[Part]:
     for contacts, ours, printed, ratio in _printed_over_factored(tables):
         wanted = FACTORS[contacts]
         yield _part(
-            f"With 12 coordinates and {contacts} contacts the engine's (factored) impact takes {ours:.3g} µs, the printed formula "
-            f"{printed:.3g} µs: {ratio:.0f} times as long. Target: at least {wanted:g}.", ratio >= wanted,
+            f"With 12 coordinates and {contacts} contacts the engine's (factored) impact takes {ours:.3g} µs, the "
+            f"printed formula {printed:.3g} µs: {ratio:.0f} times as long. Target: at least {wanted:g}.",
+            ratio >= wanted,
             miss=f"the factored impact of {contacts} contacts is {ratio:.0f} times as fast as the printed formula "
                  f"(target {wanted:g})")  # fmt: skip
 
