@@ -27,9 +27,9 @@ _LOUD = ("distributed", "distributed.client", "distributed.core", "tornado.appli
 # Called as scheduler(compute, parts); yields (part, result) as results come.
 Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Generator[tuple[Any, Any]]]
 
-_AHEAD = 4  # parts handed out per worker: enough that none waits, few enough that little is lost on Ctrl-C
-_CLUSTER_AHEAD = 256  # parts on their way to a cluster
-_WATCH = 1.0  # [s] between two looks at whether the parent is still there
+_AHEAD = 4  # parts submitted per worker: enough to keep it busy, few enough that Ctrl-C loses little work
+_CLUSTER_AHEAD = 256  # parts submitted to a cluster at the same time
+_WATCH = 1.0  # [s] between two checks that the parent is alive
 
 
 def do_missing(
@@ -116,7 +116,7 @@ def _client(address: str) -> Any:
         from distributed import Client
     except ImportError as error:
         raise MissingDependencyError("distributed", "A sweep on a cluster", "pip install 'iapb[cluster]'") from error
-    for name in _LOUD:  # a scheduler that dies is one sentence of ours, without their tracebacks
+    for name in _LOUD:  # if the scheduler dies, print one sentence of ours without dask's tracebacks
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout="10s")
@@ -148,7 +148,7 @@ def starting_a_process() -> Iterator[None]:
 
     A child inherits the signals that its parent's thread has blocked. If the child blocked SIGINT only after its
     start, Ctrl-C could stop it during its imports: it would print a traceback, and if it held the lock of the pool,
-    the pool would wait for ever.
+    the pool would wait forever.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -166,7 +166,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _begin(told: Any, parent: int) -> None:
-    """Initialise a worker; it exits when its parent is gone, instead of waiting for it for ever."""
+    """Initialise a worker; it exits when its parent is gone, instead of waiting forever."""
 
     def watch() -> None:
         while os.getppid() == parent:

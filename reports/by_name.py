@@ -33,7 +33,7 @@ def function_named(argument: str, name: str, form: str = "package.module:functio
         sys.path.insert(0, os.getcwd())
     try:
         home = import_module(module)
-    except Exception as error:  # somebody else's module: whatever it raises, it is what is wrong with the name
+    except Exception as error:  # a user's module may raise anything
         why = f"{type(error).__name__}: {error}"
         raise ArgumentError(argument, name, f"a module that can be imported ({why})") from error
     if not hasattr(home, attribute):

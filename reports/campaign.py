@@ -27,7 +27,7 @@ from verification.laws.kit import LawCount, added
 
 _TABLE = "laws"
 _COMMAND = "iapb verify --full"
-# Files of one law: each is a run of about 150 kB. A resolver that breaks a law more often is not understood by more.
+# Largest number of files per law; each is a run of about 150 kB. More counterexamples would not give more insight.
 KEPT_PER_LAW = 1000
 
 

@@ -18,8 +18,8 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError
 
-# command -> its line in `iapb --help`. Its module in reports.commands holds a function of the same name and is imported
-# where the command is the one that was given; `iapb --help` imports none.
+# command -> its line in `iapb --help`. The module of that name in reports.commands has a function with the same name.
+# Only the module of the given command is imported; `iapb --help` imports none.
 COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
     "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
@@ -64,7 +64,7 @@ def _before(
 
 
 def _app(given: list[str]) -> typer.Typer:
-    """The command line with all commands, of which only the given one can be called."""
+    """Return the command line with all commands; only the given command can be called."""
     app = typer.Typer(
         name="iapb", no_args_is_help=True, pretty_exceptions_enable=False,
         help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove "
@@ -72,7 +72,7 @@ def _app(given: list[str]) -> typer.Typer:
         epilog="Start with: iapb run peg_corner",
     )  # fmt: skip
     app.callback()(_before)
-    if COMPLETION in os.environ:  # the shell asks: the words so far stand in its own variable
+    if COMPLETION in os.environ:  # shell completion: the shell passes the words in a variable
         given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
     wanted = next((word for word in given if not word.startswith("-")), "")
     for name, words in COMMANDS.items():
@@ -82,7 +82,7 @@ def _app(given: list[str]) -> typer.Typer:
 
 
 def _not_given() -> None:
-    """Stand for a command that is only listed."""
+    """Do nothing; this is the placeholder for commands that are only listed in the help."""
 
 
 def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -98,9 +98,9 @@ def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-# What a terminal obeys, and what turns the order of letters round; a tab and the end of a line are neither.
+# Terminal control characters and characters that reverse the direction of text; not tabs and line ends.
 _ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-_COLOUR = re.compile(r"(\x1b\[[0-9;]*m)")  # as rich prints it; it can do no harm but to the looks
+_COLOUR = re.compile(r"(\x1b\[[0-9;]*m)")  # colour sequences as rich prints them; they are harmless
 _BARS = re.compile(r"(\x1b\[(?:[0-9;]*m|[0-9]*[ABK]|\?25[hl])|\r)")
 
 

@@ -36,7 +36,7 @@ _TEXTS = {
 def remembering(
     recipes: tuple[Recipe, ...], failures: list[Failure] | None = None
 ) -> tuple[tuple[Recipe, ...], dict[str, Figure]]:
-    """Return the recipes, and a mapping that receives each figure, by its key, once it is drawn.
+    """Return the recipes, and a mapping that receives each drawn figure by its key.
 
     A figure that raises is appended to `failures`, and the page says that it was not computed.
     """

@@ -104,7 +104,7 @@ def _write_fclib(path: Path, case: ImpactCase) -> None:
     try:
         problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e, name=path.stem)
         write_fclib(path, problem)
-    except IapbError:  # an extreme input that is no such problem: the run has it
+    except IapbError:  # FCLIB cannot express this extreme input; the run has it
         path.unlink(missing_ok=True)
 
 

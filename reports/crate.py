@@ -1,4 +1,4 @@
-"""A description of the report for machines: RO-Crate metadata beside it (https://w3id.org/ro/crate/1.1)."""
+"""Machine-readable metadata beside the report, as an RO-Crate (https://w3id.org/ro/crate/1.1)."""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ from verification.finding import Table
 
 EXACT, CLOSE, DIFFERS = "exact", "close", "differs"
 TIMING, PROSE, ONLY_OLD, ONLY_NEW = "timing", "prose", "only old", "only new"
-# Another processor rounds and orders sums differently: some 1e-16 a step, grown by a thousand steps of a simulation.
+# Another processor orders and rounds sums differently: by some 1e-16 per step, which grows over thousands of steps.
 TOLERANCE = 1e-9
 # A difference below this is rounding: errors of 1e-16 need not repeat to any digit, nor a solver's 1e-11 to three.
 ROUNDING = 1e-12
-# What a cell says of something that was not tried because something smaller took too long (reference.complementarity).
+# The text of a cell whose case was not run because a smaller case took too long (reference.complementarity).
 LEFT_OUT = "left out"
 
 
@@ -147,7 +147,7 @@ def _named(names: Sequence[str], table: Table) -> dict[str, dict[str, Any]]:
 
 
 def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
-    """Return how two cells compare, and their gap; texts must be equal."""
+    """Return the state of a comparison of two cells, and their relative difference; texts must be equal."""
     if _same(old, new):
         return EXACT, 0.0
     if old is None or new is None:

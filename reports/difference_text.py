@@ -20,14 +20,14 @@ from reports.difference import (
 )
 from reports.provenance import PEERS
 
-# Columns of the table by part of the report, each with the states that it counts.
+# Columns of the table, which has a row per part of the report; each column with the states that it counts.
 PARTS = (("the same", (EXACT,)), ("within the tolerance", (CLOSE,)), ("differ", (DIFFERS,)),
          ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)),
          ("other sentences", (PROSE,)))  # fmt: skip
 SHOWN = 20  # lines; the rest is counted
 _WIDEST = 34  # letters of a cell
-# What must be equal for all to come out the same to the last bit. The lock fixes the BLAS, the processor its kernels;
-# of what is compared with, some is outside of the lock.
+# Facts that must be equal for equal results to the last bit. The lock file fixes the BLAS, and the processor fixes its
+# kernels. Some of the packages compared with are not in the lock file.
 _BITWISE = ("cpu", "lock", "sources", *PEERS)
 
 

@@ -25,7 +25,7 @@ _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 class ReportNumbers:
     """The numbers of a report.
 
-    tables : by place in the report, such as "claims/C07" or "mechanics/trees"
+    tables : tables by their place in the report, such as "claims/C07" or "mechanics/trees"
     runs : content hash of each run, by the command that reproduces it
     provenance : code, machine and packages that made the report
     depth : "quick" or "full"

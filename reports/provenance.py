@@ -19,7 +19,7 @@ from reference.simulators import find_simulator
 
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
-# What a report compares with, or rests its proofs on.
+# Packages that a report compares with or uses for its proofs.
 PEERS = ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon", "sympy",
          "python-flint", "hypothesis", "mujoco", "pybullet", "drake", "siconos")  # fmt: skip
 UNKNOWN = "unknown"
@@ -167,7 +167,7 @@ def _dirty() -> str:
     return UNKNOWN if status is None else str(bool(status)).lower()
 
 
-# What can change a result; other files of the checkout may be in work.
+# Files that can change a result; changes of other files are ignored.
 _TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
 
 

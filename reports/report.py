@@ -1,4 +1,4 @@
-"""Write the report: its first page, a page for each section beside it, and all of them in one archive.
+"""Write the report: a first page, a page for each section, and an archive of all pages.
 
     pages = build_report(Evidence(inputs=..., claims=..., ...))
     write_report("out", pages)
@@ -25,7 +25,7 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
     Raises
     ------
     ArgumentError
-        If the first page is larger than LARGEST_FIRST, or the archive than LARGEST_ARCHIVE.
+        The first page is larger than LARGEST_FIRST, or the archive is larger than LARGEST_ARCHIVE.
     """
     target, contents = Path(folder), {name: page.encode() for name, page in pages.items()}
     packed = _archive(contents)

@@ -20,7 +20,7 @@ from reference.worlds import WORLDS, find_world
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.runs import read_run
 
-# name of a law -> (module, class); any other law is made again where a world has it
+# name of a law -> (module, class); any other law is taken from the world that has it
 LAWS = {
     "impulse-augmented penalty": ("iapb.contact.laws", "ImpulseAugmented"),
     "impulse-augmented penalty with impact friction": ("iapb.contact.laws", "ImpulseAugmented"),

@@ -49,8 +49,8 @@ class Runner:
         self.store = RunStore(folder)
         self.progress = progress
         self.used: dict[str, UsedRun] = {}  # by file name, in the order of use
-        self._outside: list[dict[str, UsedRun]] = []  # what was used before each `recording` that is open
-        self.user = ""  # who is said to use what is asked for now
+        self._outside: list[dict[str, UsedRun]] = []  # the used runs from outside of each open `recording`
+        self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
 

@@ -36,8 +36,8 @@ from reports.store.logs import (
 from reports.store.runs import RunEntry, store_parts, store_run
 
 PAUSE = 5.0  # [s] between two states in a log
-HELD = 16 << 20  # bytes of chunks that wait for the log, and of a part on its way to the run file
-_STATE_SHARE = 0.05  # of the time may go into states
+HELD = 16 << 20  # bytes of the chunks held before the log is written, and of a part copied to the run file
+_STATE_SHARE = 0.05  # largest share of the time for writing states
 
 
 @dataclass(frozen=True)

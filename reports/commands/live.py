@@ -48,7 +48,7 @@ def live(
     if not 1.0 <= seconds * rate < LONGEST:
         raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
     source = scene_given(scene, set_)
-    out.mkdir(parents=True, exist_ok=True)  # where it cannot be, that is said before and not after the run
+    out.mkdir(parents=True, exist_ok=True)  # an unusable folder is reported before the run, not after it
     with compiling_told(to_stderr):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)
         name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"

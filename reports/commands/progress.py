@@ -54,7 +54,7 @@ def _shown(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, 
 def _bars(console: Any, transient: bool) -> Progress:
     name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
     number = _Number()
-    # Only what goes to the same terminal is moved above the bars: a redirected stdout must not end up on stderr.
+    # Only output to the same terminal is printed above the bars: a redirected stdout must not be sent to stderr.
     return Progress(name, BarColumn(), number, TimeElapsedColumn(), console=console, transient=transient,
                     redirect_stdout=sys.stdout.isatty())
 

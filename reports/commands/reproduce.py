@@ -1,4 +1,4 @@
-"""`iapb reproduce`: every figure, table and claim into one report."""
+"""`iapb reproduce`: compute every figure, table and claim, and write them to one report."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
 
 
 def print_contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Name the quantities for which the pages give more than one value or verdict, and return them."""
+    """Print and return the quantities for which the pages give more than one value or verdict."""
     found = contradictions(pages)
     for name, texts in found.items():
         print(f"More than one value in the report. {name}: {', '.join(texts)}.")

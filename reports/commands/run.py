@@ -1,4 +1,4 @@
-"""`iapb run SCENE`: simulate a scene in one of the paper's worlds and keep the run."""
+"""`iapb run SCENE`: simulate a scene in one of the paper's worlds and store the run."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Values = Annotated[list[str] | None, typer.Option(
 
 
 def scene_given(name: str, values: list[str] | None) -> Scene:
-    """Return the scene of that name or file, with the values of ``--set``."""
+    """Return the scene with that name or file, changed by the values of ``--set``."""
     scene = load_scene(find_scene(name))
     return scene.with_values(parsed(values)) if values else scene
 
@@ -133,7 +133,7 @@ def deepest(run: Run) -> float:
     return max(0.0, *(-float(block.min(initial=0.0)) for block in blocks(run.contacts.gap)))
 
 
-SHOWN_COORDINATES = 12  # more do not fit a line that anybody reads
+SHOWN_COORDINATES = 12  # more would not fit into a readable line
 
 
 def describe(run: Run, existed: bool) -> None:

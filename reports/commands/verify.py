@@ -23,7 +23,7 @@ from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
 from verification.laws.kit import LawCount
 
-ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M): of what the engine proves, of what the kit asks of anybody
+ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
 _SHOWN = 20  # counterexamples listed; all are in their folder
 
@@ -100,7 +100,7 @@ def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, worke
     ours = resolver == ENGINE
     bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
     request = CampaignRequest(resolver, bounds, condition, impacts, trajectories, seed, workers)
-    request.subject()  # a name that cannot be imported is told here, not by a worker
+    request.subject()  # raises here, not in a worker, if the name cannot be imported
     batches, campaign = plan(impacts, trajectories, PARTS if ours else (IMPACTS,)), Campaign(out, request)
     there = sum(campaign.path_of(batch).is_file() for batch in batches)
     print(f"{len(batches)} batches in {campaign.folder}, {there} of them done before.", flush=True)
@@ -167,7 +167,7 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str], json_: b
     names = list(SIMULATORS) if "all" in simulators else list(dict.fromkeys(simulators))
     chosen = list(dict.fromkeys(scenes)) or list(FIXED_SCENES)
     for scene in chosen:
-        fixed_scene(scene)  # a wrong name is told before anything runs
+        fixed_scene(scene)  # a wrong name raises before anything runs
     for name in names:
         simulator = find_simulator(name)
         if "all" not in simulators:

@@ -1,4 +1,4 @@
-"""Stage: the claims ledger, a Finding for each claim, with runs from the store."""
+"""Stage: the claims of the paper, a Finding for each claim, with runs from the store."""
 
 from __future__ import annotations
 

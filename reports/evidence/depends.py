@@ -8,7 +8,7 @@ from pathlib import Path
 from reports.provenance import package_version
 from verification.proofs import coq_development
 
-BESIDE = Path(__file__).resolve().parents[3] / "shared"  # files of others, where somebody has put them
+BESIDE = Path(__file__).resolve().parents[3] / "shared"  # optional external files
 # The last fuzzing and fault injection (`make fuzz`); absent where only the package is installed.
 LAST_RESULT = Path(__file__).resolve().parents[2] / "tests" / "robustness" / "last_result.json"
 ABSENT = "absent"

@@ -31,7 +31,7 @@ from verification.proofs.statement import ProofRecord
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
 
-# what draws random numbers -> module with its SEED
+# study that draws random numbers -> module with its SEED
 SEEDS = {
     "claims": "verification.claims.study", "properties": "verification.laws.study",
     "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.robots",

@@ -13,7 +13,7 @@ from reports.store.runs import read_provenance
 from reports.uses import UsedRun
 
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
-UNNAMED = "the report"  # uses a run that nothing in particular asked for
+UNNAMED = "the report"  # the user of a run that no claim, topic or figure requested
 TABLE_COMMAND = "iapb reproduce"
 
 

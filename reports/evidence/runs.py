@@ -12,8 +12,8 @@ from iapb.scene import Scene
 from reports.runner import Runner
 from verification.finding import Failure, attempt, counted
 
-# The experiments of the paper's section VII, emulated: its device at 512 Hz read and driven one step late each way,
-# encoders of 1 µm and 0.01 mrad, a little bearing friction. Ours: the paper gives none of these numbers.
+# Emulation of the experiments in the paper's section VII: the device runs at 512 Hz with a delay of one step in each
+# direction, encoders of 1 µm and 0.01 mrad, and low bearing friction. These numbers are ours: the paper gives none.
 EMULATED_DEVICE: dict[str, Any] = {
     "device.delay": 1,
     "device.position_resolution": [1e-6, 1e-6, 1e-5],

@@ -81,7 +81,7 @@ class Stage:
         records = self._computed(compute, runner)
         tables: dict[str, Table] = {}
         text = json.dumps(plain_records(records, tables), ensure_ascii=False)  # writes NaN and Infinity, and reads them
-        read_back = adapter.validate_python(_whole(json.loads(text), tables))  # what is no such record is not written
+        read_back = adapter.validate_python(_whole(json.loads(text), tables))  # raises before a wrong record is written
         self.failures += getattr(records, "failures", ())
         incomplete = self.path.with_name(f"{self.path.stem}-incomplete.h5")
         incomplete.unlink(missing_ok=True)

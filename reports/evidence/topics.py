@@ -1,4 +1,4 @@
-"""The topics of the report in reading order: a study `function(run, depth, progress) -> Finding` and one line here."""
+"""The topics of the report in reading order: each is one line here and a study `function(run, depth, progress)`."""
 
 from __future__ import annotations
 

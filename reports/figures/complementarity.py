@@ -133,7 +133,7 @@ def where_to_stop(numbers: Table) -> Drawn:
     return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)
 
 
-_AGREE = 1e-11  # of |v⁻|: nearer motions are one
+_AGREE = 1e-11  # of |v⁻|: motions closer than this are equal
 
 
 def _distance_over(rows: Rows, name: str, limit: float | None = None) -> str:
@@ -167,7 +167,7 @@ def _by_rows(plot: Plot, rows: Rows, places: Sequence[tuple[float, float]]) -> N
         plot.marks([place for row, place in zip(rows, places, strict=True) if name.endswith(f" {row['rows']}")], look)
 
 
-# At most six curves; the numbers have all. The table calls "IAPB" what Python calls.
+# At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.
 TIMED = {
     "IAPB kernel": STYLES["IAPB kernel"], "Lemke kernel": STYLES["Lemke kernel"], "IAPB": STYLES["IAPB, Python"],
     PRINTED: STYLES["printed, numpy"], "gauss_seidel": STYLES["gauss_seidel"],
@@ -295,7 +295,7 @@ def _ends(numbers: Table) -> Table:
                   tuple((*name, shares[0], shares[-1]) for name, shares in curves.items()), 3, timed=ends)  # fmt: skip
 
 
-_ROUNDING = 1e-12  # errors below are none
+_ROUNDING = 1e-12  # smaller errors count as none
 _SCENES = 6  # shown, those with the largest errors
 _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
 

@@ -1,8 +1,8 @@
 """The peg in the corner: the first picture, and Figures 7 to 13, in four worlds and with a limited or emulated device.
 
 Each figure shows trajectories or forces of some runs, on the device side. The paper's frame has x to the left and y
-down (its drawing turned by 180 degrees), so both axes of a path are reversed: the corner is at the lower right, as in
-the paper's Figure 4. Lengths in metres, angles in radians, unless a name says otherwise.
+down (its drawing is turned by 180 degrees), so both axes of a path are reversed: the corner is at the lower right, as
+in the paper's Figure 4. Lengths are in metres and angles in radians, unless a name says otherwise.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
-# An impact of one step is hundreds of times the force that holds the peg afterwards, so each force is drawn at contact,
-# in full and magnified around the force that balances the hand (coordinate, heading, label, where it is cut).
+# The force of an impact in one step is hundreds of times the holding force afterwards. So each force is drawn at the
+# first contact, over the whole run, and magnified around the holding force (coordinate, heading, label, limit).
 _FORCES = ((0, "force along x", "Fx [N]", 1.5), (2, "torque", "τ [N m]", 0.03))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
-_AT_CONTACT = (0.01, 0.14)  # [s] before and after the first contact: the blows of all worlds, apart from one another
-# what deviates from the ideal hand: its coordinates, in words, on the axis, factor to what is drawn
+_AT_CONTACT = (0.01, 0.14)  # [s] before and after the first contact: the impulses of all worlds, separately visible
+# deviations from the hand in the ideal world: coordinates, name, axis label, unit factor
 _DEVIATIONS = ((slice(0, 2), "position", "distance from ideal [mm]", MILLI),
                (slice(2, 3), "angle", "angle from ideal [°]", DEGREES))  # fmt: skip
 _LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
-_MARKS = 9  # markers along a curve: enough to tell it in grey, few enough to see the line
+_MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
 # A peg slower than this (and turning slower than this) counts as settled: a tenth of its speed at contact, where
 # the eye no longer sees it move [m/s], [rad/s].
 SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
@@ -122,7 +122,7 @@ def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, LineStyle], ...]:
 
 
 def marks(count: int, number: int) -> tuple[int, int]:
-    """Return matplotlib's (first, every) so that curves that coincide show their markers side by side."""
+    """Return matplotlib's `markevery` (first, every), with which coinciding curves show their markers side by side."""
     every = max(count // _MARKS, 1)
     return (number * every // 5) % every, every
 

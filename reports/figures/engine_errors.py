@@ -1,4 +1,4 @@
-"""Engines and scenes: energy error, momentum error and overlap as tables of coloured cells."""
+"""Tables of coloured cells by engine and scene: energy error, momentum error and overlap."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ from reports.figures.scenes_space import Sight, pieces
 SIZE = (400, 300)
 LARGEST = 60_000  # bytes of one film in the page
 _MOMENTS = (300, 220, 160, 120, 80, 50)  # as many as fit
-_IMPACTS = 60  # of them, the first get moments of their own
+_IMPACTS = 60  # the moments around this many first impacts are added
 _STRONGEST = 12  # contacts shown at a moment
 _MARGIN = 0.08  # of the picture
 _WHOLE = 32_000  # largest whole number written
@@ -161,7 +161,7 @@ class Film:
     text: str
 
     def flat(self, points: Any) -> Floats:
-        """Return points (..., 2 or 3) [m] of the view's frame in the picture."""
+        """Return the picture coordinates of points (..., 2 or 3) [m] in the view's frame."""
         x, y = np.moveaxis(np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
         return np.stack([self.scale * x, SIZE[1] - self.scale * y], axis=-1)
 
@@ -238,7 +238,7 @@ def _poses(made: Film) -> tuple[Floats, Floats]:
     each = [frames(made.run.scene_resolved, made.parts.seen, made.run.pose[step]) for step in made.steps]
     origins = np.array([[made.scale * (place.origin - corner) for place in places] for places in each])
     turns = np.array([Rotation.from_matrix([place.rotation for place in places]).as_quat() for places in each])
-    for k in range(1, len(turns)):  # the nearer of ±, so that the player may go straight from one to the next
+    for k in range(1, len(turns)):  # the nearer sign of ±q, so that the player can interpolate linearly
         turns[k] *= np.where(np.sum(turns[k] * turns[k - 1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     return turns, origins
 

@@ -21,11 +21,11 @@ Points = NDArray[np.float64]
 
 
 def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]]) -> list[Box]:
-    """Write each name beside its mark, in the nearest place where it covers no mark, no other name and no line.
+    """Write each name beside its mark, at the nearest position where it covers no mark, no other name and no line.
 
     Call it last, after the limits of the axes are set. Returns the boxes of the names [points].
     """
-    axes.figure.draw_without_rendering()  # the layout decides where marks are
+    axes.figure.draw_without_rendering()  # the positions of marks are known after the layout
     marks = [tuple(place) for place in _on_paper(axes, places)]
     frame = _frame(axes)
     taken: list[Box] = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in marks]
@@ -59,7 +59,7 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
     named = [text.get_text() for text in axes.texts]
     if len(lines) < 2:
         return
-    axes.figure.draw_without_rendering()  # the layout decides where curves are
+    axes.figure.draw_without_rendering()  # the positions of curves are known after the layout
     frame = _frame(axes)
     places = {line: _places_of(line, frame) for line in axes.lines}
     taken: list[Box] = [_box_of(text) for text in axes.texts]
@@ -143,7 +143,7 @@ def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[B
 
 
 NAME_SIZE = 8.0  # points
-_PLACES = 40  # along a curve that are tried
+_PLACES = 40  # number of places along a curve that are tried
 # directions and distances [points] of a name from its place on the curve
 _AROUND = tuple((x, y, away) for away in (3.0, 10.0, 20.0, 32.0, 48.0)
                 for x, y in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)))  # fmt: skip

@@ -24,7 +24,7 @@ TREATMENTS = {
 }
 LEGEND = tuple((look.name, look) for look in TREATMENTS.values())
 CRADLE, BERNOULLI = "cradle of 5", "Bernoulli"
-ROUNDING = 1e-12  # changes below this are none
+ROUNDING = 1e-12  # smaller changes count as none
 _RADIUS = 0.5
 _ORDERS = {"contact 0, then 1": "the upper ball first", "contact 1, then 0": "the lower ball first"}
 

@@ -1,6 +1,6 @@
-"""A figure as one SVG file that stands alone: its panels side by side on paper, the legend below.
+"""Write a figure as one self-contained SVG file: its panels side by side, with the legend below.
 
-For places that show a picture but no page, such as a README. The page's variables keep their fallback colours.
+It is meant for places outside of the report, such as a README. There, the fallback colours of the variables are used.
 """
 
 from __future__ import annotations

@@ -33,13 +33,13 @@ class LineStyle:
     dash: tuple[float, ...] = ()
     width: float = 1.5
     filled: bool = True
-    name: str = ""  # of what is drawn; the drawing and its legend carry it
+    name: str = ""  # name of the curve, in the drawing and in its legend
 
 
-# A row per thing that is drawn: the names that figures give it, and its look. No two rows look alike, and what is drawn
-# of one thing looks the same in every figure. A world's colour and marker belong to it alone.
+# One row per method, world or quantity: the names that figures give it, and its style. All styles differ, and each
+# method, world or quantity has the same style in every figure. No other row has the colour and marker of a world.
 LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
-    # the paper's worlds, and ours
+    # the worlds of the paper and of this project
     (("ideal",), LineStyle(INK, "", (), 2.4)),
     (("IAPB", "pfull", "factored", "IAPB kernel", "IAPB, Euler", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
     (("PB", "PB, Euler", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
@@ -93,7 +93,7 @@ STYLES: dict[str, LineStyle] = {name: replace(look, name=name) for names, look i
 
 BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, a declared slope, the value before
 
-# marks of maps and tables: how a trial came out
+# marks of maps and tables: the outcome of a trial
 OUTCOMES: dict[str, LineStyle] = {
     "holds": LineStyle(BLUE, "o", (), 0.0),
     "fails": LineStyle(VERMILION, "X", (), 0.0),

@@ -16,7 +16,7 @@ from typing import Any
 
 from reports.figures.style import VARIABLES
 
-LARGEST_ENLARGEMENT = 1.35  # beyond, the lettering would shout
+LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
 TIME, PATH = "time", "path"  # a curve over time may be zoomed along t alone; a path in the plane both ways
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")

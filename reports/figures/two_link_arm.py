@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 def mass_matrix(reading: str) -> Floats:
-    """Return M of the straight arm (q2 = 0) [kg m²]: slender uniform rods, or all mass at the far ends."""
+    """Return M of the straight arm (q2 = 0) [kg m²], for slender uniform rods or for all mass at the far ends."""
     centre, inertia = (LENGTH / 2, MASS * LENGTH**2 / 12) if reading == "uniform rods" else (LENGTH, 0.0)
     about_joint = MASS * centre**2 + inertia
     coupling = MASS * LENGTH * centre
@@ -51,7 +51,7 @@ def energy_after(reading: str, distance: float, restitution: float) -> float:
 
 
 def arm_energies() -> dict[str, Floats]:
-    """Return the table behind the figure: ``restitution`` and, by reading and contact, KE and KE₀ [J]."""
+    """Return the data of the figure: ``restitution``, and KE and KE₀ [J] by mass distribution and contact point."""
     table: dict[str, Floats] = {"restitution": RESTITUTIONS}
     for reading in READINGS:
         mass = mass_matrix(reading)

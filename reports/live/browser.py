@@ -30,10 +30,10 @@ from reports.live.window import Window
 Floats = NDArray[np.float64]
 
 HOST = "127.0.0.1"
-HOLD_SECONDS = 5.0  # without a movement of the mouse, after which the hand lets go
+HOLD_SECONDS = 5.0  # [s] without a movement of the mouse until the hand lets go
 FRAMES_PER_SECOND = 30.0
 
-_POLITENESS = 10  # niceness: the loop comes first
+_POLITENESS = 10  # niceness: the loop has priority
 _BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (170, 170, 165)
 _DISTANCE = {False: 2.2, True: 1.4}  # of the camera, in sizes of a scene in the plane or in space
 _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
@@ -50,10 +50,10 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
     """Serve the scene while `wanted` returns True; send the address through `ready` once the server is running."""
     import viser
 
-    # A browser opens connections that it never uses: a traceback each, were they logged where nobody has set up a log.
+    # A browser opens connections that it never uses; without this, each would print a traceback.
     logging.getLogger("websockets").setLevel(logging.CRITICAL)
     token = secrets.token_urlsafe(16)
-    with _guarded(token), redirect_stdout(StringIO()):  # the loop's own process says where to look
+    with _guarded(token), redirect_stdout(StringIO()):  # the loop's process prints the address
         server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
     server.gui.configure_theme(show_share_button=False)
     frames = _draw(server, scene)
@@ -172,7 +172,7 @@ class _Mouse:
         self.target = None if event.phase == "end" else np.array(event.target.position, dtype=float)
 
     def _gone(self, client: Any) -> None:
-        self.target = None  # a mouse that nobody moves any more holds nothing
+        self.target = None  # without a client the mouse holds nothing
 
     def follow(self, pose: Floats) -> None:
         """Move the handle to the held point of the tool, unless the mouse holds the handle."""

@@ -15,11 +15,11 @@ import numpy as np
 from iapb.contact.impact import resolve_impact
 from iapb.simulation import Simulation
 
-_RESERVE = 0.1  # share of the period that is kept back: for the clock, and for what other programs take
-_FORGETTING = 0.01  # share by which the largest fixed cost seen fades per step: gone after a few hundred
-_ROWS = 200  # most rows of the calibrating impact
+_RESERVE = 0.1  # share of the period that is reserved for the clock and for other programs
+_FORGETTING = 0.01  # share by which the largest fixed cost decays per step: it is forgotten after a few hundred steps
+_ROWS = 200  # largest number of rows of the calibration impact
 _REPEATS = 15
-_CHEAPEST_ROW = 1e-8  # [s] a few dozen operations: less is what is left of noise where an impact has few rows
+_CHEAPEST_ROW = 1e-8  # [s] a few dozen operations; a smaller measured time per row is noise
 
 
 class RowCost(NamedTuple):

@@ -100,7 +100,7 @@ def timetable_of(period: float, rows: Floats) -> Timetable:
     return Timetable(period, due, start, end, budget.astype(np.int64), rows[:, 4:].copy())
 
 
-_EDGES = np.geomspace(1e-9, 1e5, 32_001)  # [s]; a thousandth apart
+_EDGES = np.geomspace(1e-9, 1e5, 32_001)  # [s], relative distance 1e-3
 
 
 class Spread:
@@ -121,7 +121,7 @@ class Spread:
         return tuple(min(float(_EDGES[min(each, len(_EDGES) - 1)]), self._worst) for each in bins[:-1]) + (self._worst,)
 
 
-# Linux wakes a sleeper some 50 µs late, so the last stretch is spent awake; more would only heat the processor.
+# Linux wakes a sleeping process about 50 µs late, so the clock polls during the last part; more would waste power.
 SPIN_SECONDS = 1e-4
 
 

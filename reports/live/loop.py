@@ -1,13 +1,13 @@
 """The haptic loop: one step of the simulation at each tick of a clock.
 
     wait for the tick
-        the device has moved meanwhile: read it, write the step that ends here
+        read the device, which has moved since the last tick, and record the step that ends now
         compute the row budget of the next step from the time left, and read the hand's wrench
-        begin the next step: coupling, contact law, the force goes to the device
+        begin the next step: compute coupling and contact law, send the force to the device
         publish the coordinates for the viewer
 
-The loop never waits for a lock or for the viewer. Python's garbage collector is off during the loop. Files are written
-only if enough time is left before the next tick.
+The loop never waits for a lock or for the viewer. Python's garbage collector is off during the loop. The log is written
+when enough time is left before the next tick, or when too many chunks are waiting.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from reports.store.logs import RunLog
 
 Floats = NDArray[np.float64]
 
-_SPARE_SECONDS = 4e-4  # a chunk is made only where this much is left of the period, or nothing is left anyway
-_LOG_SECONDS = 7e-4  # and written where this much is left,
-_MOST_WAITING = 8  # or so many wait
-_TICKS_KEPT = 16 * 512  # more than the ticks of the chunks that wait
+_SPARE_SECONDS = 4e-4  # [s] a chunk is allocated in advance only if this much of the period is left
+_LOG_SECONDS = 7e-4  # [s] a chunk is written if this much of the period is left
+_MOST_WAITING = 8  # or if more chunks than this are waiting
+_TICKS_KEPT = 16 * 512  # more than the ticks of the waiting chunks
 
 
 class Audience(Protocol):
@@ -114,7 +114,7 @@ class Loop:
                 self._finish()
             except IapbError as error:
                 stopped = str(error)
-            except Exception as error:  # a device of somebody's own: whatever it does, what was done is kept
+            except Exception as error:  # a user's device may raise anything; finished steps are kept
                 stopped = f"the device failed: {type(error).__name__}: {error}"
             self._release()
         steps = self._tape.steps
@@ -164,7 +164,7 @@ class Loop:
 
     def _release(self) -> None:
         if self.simulation.link is not None:
-            with suppress(Exception):  # it may be what failed
+            with suppress(Exception):  # the device may be the cause of the failure
                 self.simulation.link.release()
 
     @contextmanager
@@ -175,7 +175,7 @@ class Loop:
 
         try:
             before = signal.signal(signal.SIGINT, stop)
-        except ValueError:  # not the main thread: nobody's Ctrl-C arrives here
+        except ValueError:  # not the main thread, which alone receives Ctrl-C
             yield
             return
         try:

@@ -43,7 +43,7 @@ def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -
 
 
 def made_device(name: str, scene: Scene) -> Device | None:
-    """Return the device that ``module:factory`` makes of a scene; None for an empty name.
+    """Return the device that ``module:factory`` makes for a scene; None for an empty name.
 
     Raises
     ------

@@ -29,12 +29,12 @@ from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, T
 from verification.scenes.trace import COORDINATES
 
 FIRST_PAGE = "report.html"
-# Rows of a table, or runs of a claim, on the page; the files beside it have all of them, the page stays small.
+# Largest number of table rows, or runs of a claim, on a page, to keep it small; the files beside it have all of them.
 ROWS_SHOWN = 200
-# The mark that goes with each outcome: shape as well as colour.
+# The mark of each outcome; marks differ in shape as well as in colour.
 OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "◐", "≈", "✕", "○", "…"), strict=True))
 OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "where", "limited", "bad", "open", "absent"), strict=True))
-# The same outcomes in the words of a check that is not a claim of the paper.
+# The words for the same outcomes of a check that is not a claim of the paper.
 FINDINGS = dict(
     zip(VERDICTS, ("holds", "holds where stated", "mixed", "fails", "cannot tell", "not computed"), strict=True)
 )

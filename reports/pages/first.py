@@ -21,9 +21,9 @@ ERRATA = (
 )
 LIMIT = "This does not hold for springs and time stepping: see what we miss."
 MISSES_SHOWN = 5
-# Topics whose misses come first: what gains energy or moves wrongly, then what differs, then what is slow.
+# Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
-PEG_STEP = "peg_corner"  # the scene whose step stands for the time of a step
+PEG_STEP = "peg_corner"  # the scene whose time of a step is shown
 
 
 @dataclass(frozen=True)

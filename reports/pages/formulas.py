@@ -41,7 +41,7 @@ def prose(text: str, marks: tuple[Mark, ...] = ()) -> Markup:
 
 
 def _powers(text: str, marks: tuple[Mark, ...]) -> Markup:
-    """Return escaped text in which 2.0e-16 reads 2.0 · 10⁻¹⁶, -1 has a true minus sign and >= is one sign."""
+    """Return escaped text in which 2.0e-16 becomes 2.0 · 10⁻¹⁶, -1 gets a true minus sign, and >= becomes ≥."""
     signs = text.replace(">=", "≥").replace("<=", "≤")
     return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, marked(str(escape(signs)), marks))))
 

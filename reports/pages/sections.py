@@ -1,4 +1,4 @@
-"""The sections of the report in reading order, in five groups: one template and one page each, and one line here."""
+"""The sections of the report in reading order, in five groups; each has one template, one page and one line here."""
 
 from __future__ import annotations
 

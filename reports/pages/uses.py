@@ -11,7 +11,7 @@ from reports.pages.records import StoredFile
 
 @dataclass(frozen=True)
 class RunsOf:
-    """The runs that one claim, topic or figure's input was made from."""
+    """The runs behind one claim, topic or figure input."""
 
     user: str
     runs: tuple[StoredFile, ...]

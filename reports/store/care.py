@@ -67,7 +67,7 @@ def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[F
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    if folder.is_file():  # one that is named counts, whatever its name
+    if folder.is_file():  # a file given by name is checked, whatever its suffix
         yield folder
     for path in sorted(folder.rglob("*")):
         if path.is_file() and path.name.endswith(_LOOKED_AT):
@@ -148,7 +148,7 @@ def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[
             os.replace(state.path, state.path.with_name(state.path.name + DAMAGED_SUFFIX))
     for store in stores:
         if (store / INDEX_NAME).is_file():
-            (store / INDEX_NAME).unlink()  # lines about files that changed would be believed
+            (store / INDEX_NAME).unlink()  # otherwise stale lines about changed files would be used
             read_index(store)
     return states
 

@@ -37,8 +37,8 @@ from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
 PARTIAL_SUFFIX = ".partial"
 INDEX_NAME = "index.jsonl"
-_KEY_DIGITS = 16  # 64 bits in the name: a chance hit among a million runs is below 1e-7; the file holds all 256
-# Between two checkpoints pass at least this long, and this many times what the last one took.
+_KEY_DIGITS = 16  # 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
+# The pause between two checkpoints is at least this long, and at least this many times the last writing time.
 _SHORTEST_PAUSE_SECONDS = 5.0
 _PAUSE_PER_WRITE = 20.0
 

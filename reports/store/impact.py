@@ -7,7 +7,7 @@ the number of closing rows is counted or −1, the clamp is NaN, the unit of a v
 
     mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution (c,)   the input
     velocity_after (k, d), residual, tolerance                                     the result
-    translations (t, d)                                                            motions z with J z = 0, where known
+    translations (t, d)                                                            motions z with J z = 0, if known
     law, statement, found, test                                                    texts: `found` is JSON
 """
 

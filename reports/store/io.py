@@ -30,9 +30,9 @@ _STORE: dict[str, Any] = {
     "format": "iapb store", "format_version": 1,
     "note": "iapb store gc and repair act on the sealed files of iapb in this folder, and on nothing else",
 }  # fmt: skip
-WRITING = ".writing"  # ends the name of a file that is not yet whole
+WRITING = ".writing"  # suffix of a file that is not yet complete
 _ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|index\.jsonl|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
-# A write takes seconds; what is older than this was left by a writer that was killed.
+# A write takes seconds; older temporary files were left by killed writers.
 _ABANDONED_AFTER_SECONDS = 3600.0
 
 _MARK = b"\niapb sha256 "
@@ -44,8 +44,8 @@ _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
 _COMPRESSION_LEVEL = 4
-_MOST_PACKED = 1100  # times: deflate makes at most 1032 bytes of one
-_UNPACKED_SMALL = 1 << 20  # bytes that anything may state
+_MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
+_UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
 
 
 def sync(path: Path) -> None:
@@ -87,7 +87,7 @@ def _locked(path: Path) -> int:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file), path.stat()):
                 return file
-        os.close(file)  # it was removed meanwhile, as one that a killed writer left
+        os.close(file)  # another process removed it as the file of a killed writer
 
 
 def is_locked(path: Path) -> bool:
@@ -272,7 +272,7 @@ def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
             with aside.open("ab") as end:
                 end.write(mark)
     except (OSError, RuntimeError) as error:
-        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library says so, among other things
+        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library includes the number in its message
         why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
         raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
 
@@ -302,7 +302,7 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
             yield file
     except RunFileError:
         raise
-    except Exception as error:  # whole, but made by something else: can fail anywhere, with anything
+    except Exception as error:  # sealed, but made by other software: any error is possible
         raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
 
 
@@ -420,7 +420,7 @@ def dataset_of(group: Any, name: str, path: str) -> Any:
     """Return a dataset of `group` without reading its values; it raises the errors of `read_values`."""
     import h5py
 
-    within = isinstance(group, h5py.Group)  # "get" would read a dataset through, however long it says it is
+    within = isinstance(group, h5py.Group)  # "get" would read a whole dataset, of any stated length
     dataset = group.get(name) if within else None
     if not isinstance(dataset, h5py.Dataset):
         raise RunFileError(f"{path}: {group.name}/{name} is missing")

@@ -22,7 +22,7 @@ from iapb.scene import scene_folder
 from reports.store.io import blocks, written_aside
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
-# What can change a number in a run: the engine, the reference worlds, and the numeric packages under them.
+# Sources that can change a number in a run: the engine, the reference worlds, and the numeric packages.
 _SOURCES = ("iapb", "reference")
 _ENGINE = "iapb"
 SOURCES = "sources"  # entry of a table's provenance: the `evidence_version` that made it
@@ -133,7 +133,7 @@ def is_older_engine(label: str) -> bool:
 
 
 def add_array(digest: Any, name: str, array: Any) -> None:
-    """Feed one array to a hash: its name, type, shape and bytes (little-endian, row by row)."""
+    """Add one array to a hash: its name, type, shape and bytes (little-endian, row by row)."""
     dtype = array.dtype.newbyteorder("<")
     digest.update(f"{name} {dtype.str} {array.shape}\0".encode())
     for block in blocks(array):

@@ -395,6 +395,6 @@ def _energy(read: Callable[[Any, str, str], Any], group: Any, path: str) -> dict
 
 def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:
     names, active, reasons = (read_values(group, name, path) for name in ("effect", "active", "reason"))
-    ignores = read_values(group, "ignores", path) if "ignores" in group else ("",) * len(names)  # files of before
+    ignores = read_values(group, "ignores", path) if "ignores" in group else ("",) * len(names)  # not in old files
     rows = zip(names, active, reasons, ignores, strict=True)
     return tuple(EffectRow(name, bool(on), reason, ignored) for name, on, reason, ignored in rows)

@@ -3,7 +3,7 @@
     /scene, /law, /coupling   texts: name, YAML source, every setting as JSON
     /trajectory               states at n + 1 instants
     /steps                    forces, impulse and contact state of the n steps between them
-    /contacts                 ragged: those of step k are the rows offsets[k]:offsets[k + 1]
+    /contacts                 a ragged table: the contacts of step k are the rows offsets[k]:offsets[k + 1]
     /impacts                  one row per step and island of a colliding group
     /energy                   the energy balance, at instants and over steps
     /effects                  the active effects, and the reasons
@@ -34,7 +34,7 @@ GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any], str]] = {
     "impacts": (quantities(ImpactTable), lambda run: run.impacts, "energy_lost"),
     "timings": (quantities(Run, "chunk"), lambda run: run, "chunk_seconds"),
 }
-RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy ledger: the content hash
+RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy balance: the content hash
 
 # (group, name, attribute of Run): texts; those of `JSON_TEXTS` are stored as JSON
 TEXTS = (

@@ -177,7 +177,7 @@ def _hashable(values: Any) -> Any:
     """Return a column in its stored form: texts as bytes, booleans as small integers."""
     if _is_text(values):
         return np.frombuffer("\0".join(values).encode(), np.uint8)
-    array = values if hasattr(values, "dtype") else np.asarray(values)  # what is in a file stays there
+    array = values if hasattr(values, "dtype") else np.asarray(values)  # a dataset in a file is not read here
     return array.astype(np.uint8) if array.dtype == np.bool_ else array
 
 
@@ -214,7 +214,7 @@ def _write(group: Any, table: Table, *, growing: bool = False) -> None:
 
 
 def _read(group: Any, path: str) -> Table:
-    if not hasattr(group, "keys"):  # a dataset in a table's place could be gone through for ever
+    if not hasattr(group, "keys"):  # iterating over a dataset in a table's place might never end
         raise RunFileError(f"{path}: {group.name} is no table")
     columns = tuple(
         Column(
@@ -230,9 +230,9 @@ def _read(group: Any, path: str) -> Table:
     return Table(group.name.strip("/"), columns, str(group.attrs["title"]), runs, str(group.attrs["command"]))
 
 
-# A cell of a finding's table is one of these. Its kind is stored where the column's numbers or texts do not say it.
+# The types of a cell in a finding's table. They are stored if they do not follow from the type of the column.
 _KINDS: tuple[type, ...] = (type(None), bool, int, float, str)
-_WHOLE = 2**53  # up to here every whole number is a float
+_WHOLE = 2**53  # every smaller integer is exactly a float
 _OUTCOMES, _KIND = "holds", "kind of "
 
 

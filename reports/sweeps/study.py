@@ -22,7 +22,7 @@ from iapb.scene.reading import read_values
 from reports.store.keys import hash_of
 
 LAW = "law."  # paths below it are settings of the contact law
-MAX_POINTS = 1_000_000  # files in one folder: more is no sweep but a slip of the pen
+MAX_POINTS = 1_000_000  # files in one folder: a larger study is probably a mistake
 MAX_VALUES = 100_000  # of one axis
 
 Value = Annotated[Number | bool | Text | tuple[Number, ...], Field()]
@@ -52,7 +52,7 @@ class Range(Part):
             ratio = self.stop / self.start
             if 0.0 < ratio < math.inf:
                 inner = [self.start * math.exp(share * math.log(ratio)) for share in shares]
-            else:  # ends further apart than any number is large
+            else:  # the ratio of the ends overflows
                 low, high = math.log(self.start), math.log(self.stop)
                 inner = [math.exp((1.0 - share) * low + share * high) for share in shares]
         else:
@@ -83,7 +83,7 @@ class Draws(Part):
 
 
 class Study(Part):
-    """A sweep: every combination of the grid, times the random draws, in every world.
+    """A sweep: every combination of the grid values and the random draws, in every world.
 
     Paths are those of a scene (``contact.stiffness``, ``bodies.peg.velocity.0``), or ``law.`` and a setting of the
     contact law (``law.integrator``).
@@ -197,7 +197,7 @@ def scene_of(study: Study, path: Path) -> Path:
 class Point:
     """One simulation of a sweep, as plain values that can be sent to another machine.
 
-    scene : path of the scene's file or its name; values : by scene path; law : settings of the law by name
+    scene : name or file path of the scene; values : values by scene path; law : settings of the law by name
     """
 
     index: int

@@ -2,7 +2,7 @@
 
     out/sweeps/<study>/runs/*.h5        one run file per point
     out/sweeps/<study>/results.jsonl    a line per finished point, appended as it comes
-    out/sweeps/<study>/summary.h5       the table of all points, once they are all done
+    out/sweeps/<study>/summary.h5       the table of all points, written when all are finished
 """
 
 from __future__ import annotations
