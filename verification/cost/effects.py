@@ -299,13 +299,13 @@ class Loop(RecordedLoop):
         return seconds
 
     def places(self) -> Floats:
-        """(n, k, 3) of the held body, of all bodies without a hand [m]."""
+        """Return points of the held body, or of all bodies without a hand, at the compared instants (n, k, 3) [m]."""
         system = self.simulation.system
         bodies = slice(None) if system.tool_tree < 0 else slice(system._held_body(), system._held_body() + 1)
         return np.array([_points(system.mechanism, q, bodies) for q in self.q])
 
     def device_places(self) -> Floats:
-        """(n, k, 3) of the device's bodies [m]; empty without a device."""
+        """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty without a device."""
         if self.simulation.coupling.name == "none":
             return np.zeros((0, 0, 3))
         device = self.simulation.system.device_mechanism()

@@ -189,7 +189,7 @@ def _quality(problem: ImpactCase, v_plus: Floats) -> dict[str, float | None]:
 
 
 def _residual(case: ImpactCase, v_plus: Floats) -> float:
-    """max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|)."""
+    """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|)."""
     mass, J, v = case.arrays
     lower = np.linalg.cholesky(mass)
     scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)

@@ -171,11 +171,12 @@ AnyCase = HardCase | TrajectoryCase
 
 
 def largest_gain(run: Run) -> float:
-    """Return the largest energy gain of a run, relative to the energy at its start or the work of the hand.
+    """Return the largest relative energy gain of a run.
 
     The gain is the change of the kinetic energy of tool and device and of the tool's potential energy, minus the hand's
-    work on both. The springs of walls and coupling also store energy, and this energy is never negative. Therefore a
-    positive gain is energy that the simulation has created.
+    work on both. It is divided by the initial kinetic energy plus the largest work of the hand plus the largest drop of
+    potential energy. The springs of walls and coupling also store energy, and this energy is never negative. Therefore
+    a positive gain is energy that the simulation has created.
     """
     ledger = run.energy
     works = [ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger]  # at the end of each step

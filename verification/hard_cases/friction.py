@@ -189,18 +189,18 @@ hand: {{body: block, point: [0, -{level}], force: [{force}, 0, 0]}}
 
 
 def sticking_threshold() -> TrajectoryCase:
-    """A push of 0.99 μ m g."""
+    """A block on the floor, pushed with 0.99 μ m g."""
     return _pushed(0.99, "Sticking, 1 % below the threshold", "it sticks; (6) would creep at 0.99 v_threshold for ever")
 
 
 def sliding_threshold() -> TrajectoryCase:
-    """A push of 1.01 μ m g."""
+    """A block on the floor, pushed with 1.01 μ m g."""
     expected = "it slides by ½ 0.01 μ g t²; (6) would run ahead by nearly v_threshold t"
     return _pushed(1.01, "Sliding, 1 % above the threshold", expected)
 
 
 def creep_of_the_regularised_law() -> TrajectoryCase:
-    """A push of 0.99 μ m g, judged by law (6) itself."""
+    """A block on the floor, pushed with 0.99 μ m g and compared with law (6) itself."""
 
     def measure(run: Run) -> Measured:
         """Measure the distance from the motion of (6), relative to the creep distance."""

@@ -24,7 +24,7 @@ def mass_ratio() -> HardCase:
 
 
 def tiny_lever_arm() -> HardCase:
-    """Two points of a face 1e-9 m apart."""
+    """A face that strikes at two points 1e-9 m apart."""
     return HardCase(
         "Lever arms of 1e-9 m",
         "contact points that a detector reports at nearly the same place",
@@ -87,7 +87,7 @@ def face_at_three_points() -> HardCase:
 
 
 def grazing() -> HardCase:
-    """Fast sliding with a normal velocity of 1e-8 m/s."""
+    """An impact of fast sliding with a normal velocity of 1e-8 m/s."""
     return HardCase(
         "Grazing impact",
         "a fast tool brushing a wall; Nordmark, J. Sound and Vibration 145 (1991), on grazing",
@@ -102,7 +102,7 @@ def grazing() -> HardCase:
 
 
 def subnormal_speeds() -> HardCase:
-    """Speeds near 1e-312 m/s."""
+    """An impact at speeds near 1e-312 m/s."""
     return HardCase(
         "Subnormal speeds",
         "a body whose speed halves again and again; Demmel, Underflow and reliability (1984)",

@@ -35,7 +35,7 @@ def bowl_of_low_rank() -> HardCase:
 
 
 def bowl_of_mixed_scales() -> HardCase:
-    """bowl.21: eigenvalues of W from 4e5 to 2e-4."""
+    """bowl.21: the eigenvalues of W range from 2e-4 to 4e5."""
     mass, rows, velocity = _mechanics("lcp/bowl.21.dynamics.lcp.gz")
     return HardCase(
         "Pile in a bowl, 43 contacts of mixed scales", "lcpy (Tournier), bowl.21.dynamics",
