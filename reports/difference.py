@@ -111,8 +111,8 @@ def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cel
 def _rows(old: Table, new: Table) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the rows of both tables by name.
 
-    If the tables have equally many rows, a row is named by its number, else by its first cell; rows with the same
-    first cell are numbered. If measured times decide which rows exist, a row is named by all its untimed cells.
+    If the tables have equally many rows, a row is named by its number and its first cell, else by its first cell alone,
+    with a number after repeated names. If measured times decide which rows exist, a row is named by all untimed cells.
     """
     if old.timed_rows or new.timed_rows:
         return _named(_distinct(_untimed_cells(old)), old), _named(_distinct(_untimed_cells(new)), new)

@@ -69,7 +69,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
 
 
 def verdict_of_families(holds: list[bool | None]) -> str:
-    """Return the verdict on all families; if one is undecided (too few of its impacts moved), it is NOT_TESTABLE."""
+    """Return the verdict on all families; without a failing family, one that moved too rarely makes it NOT_TESTABLE."""
     return NOT_TESTABLE if None in holds and False not in holds else verdict_of_law(holds)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of planar scenes: equal scales, no axes, hatched walls, filled bodies. Lengths are in metres."""
+"""Pictures of planar scenes: equal scales, no axes, filled walls and bodies. Lengths are in metres."""
 
 from __future__ import annotations
 

@@ -234,7 +234,7 @@ def _penetration_panel(key: str, runs: Mapping[str, Run]) -> Panel:
 
 
 def tool_positions(run: Run) -> Floats:
-    """Return the tool's coordinates (n + 1, d_t); planar and one-dof joints have equally many velocities."""
+    """Return the tool's coordinates (n + 1, d_t); its joints must have as many velocities as coordinates."""
     return run.q[:, slice(*run.tool_coordinates)]
 
 

@@ -1,4 +1,4 @@
-"""A run as a film: the poses and contacts of its bodies at up to 300 moments, small enough for a page.
+"""A run as a film: the poses and contacts of its bodies at a few hundred moments, small enough for a page.
 
 Positions and marks are 16-bit integers in base64. A picture has SIZE units, y down. The moments are evenly spaced in
 time; the moments just before and after the first impacts are added. All impulses between two moments are included.

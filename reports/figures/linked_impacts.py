@@ -1,7 +1,7 @@
 """Newton's cradle and Bernoulli's three balls: one impact solved with relative rows, per-body rows, or event by event.
 
-Beside each outcome stands which quantities it conserves. All but the per-body rows conserve energy and momentum; their
-outcomes differ nevertheless, because the choice of rows decides the outcome.
+Each outcome is labelled with the changes of energy and momentum. All treatments except per-body rows conserve both, but
+their outcomes differ nevertheless, because the choice of rows decides the outcome.
 """
 
 from __future__ import annotations
