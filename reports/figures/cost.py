@@ -60,8 +60,7 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
     "1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” is then "
     "the largest error of the best method that ends in time without creating energy. The table under Numbers names "
     "that method, and the best methods called from Python. The nine impacts: condition number of M 1, 1e3 and 1e6; "
-    "relative "
-    "distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
+    "relative distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
     """Draw a cell per size and budget."""
@@ -108,8 +107,7 @@ _WHY = (
     "The reason: IAPB orders the rows, orthogonalises each of them twice and proves that no energy is created. On a "
     "patch of a few contacts this fixed work takes most of the time. In a pile no row is redundant, so IAPB does "
     "this work for every contact, while Lemke's method needs one pivot for each. On a patch all rows but three are "
-    "redundant, "
-    "and IAPB is faster."
+    "redundant, and IAPB is faster."
 )
 
 
@@ -274,8 +272,7 @@ _READ = (
     "filled marks (thick straight line). At hollow marks the finer step divides the error by less than "
     f"{GAINED:g}; they are not fitted. The error depends on where an impact falls within a step, so curves are "
     "uneven. The table gives medians over the scenes, and in brackets the range. “Then level” or “stays at”: no "
-    "shorter "
-    "step reduces this error, which comes from the contact model. “Too few runs”: finer steps took longer than "
+    "shorter step reduces this error, which comes from the contact model. “Too few runs”: finer steps took longer than "
     "allowed. The grey steps join the runs that no other "
     "run beats in both time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at "
     "the lower rim: the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end "
@@ -301,8 +298,7 @@ def trajectory_precision(motions: Table) -> Drawn:
     section="accuracy",
     caption="The same worlds with other integrators; the grey steps join the best of these runs. An integrator of "
     "higher order is more exact only between impacts. The step that contains an impact dominates the error, so "
-    "Runge-Kutta 4 "
-    "needs four evaluations and gains little. Marks and numbers as above.",
+    "Runge-Kutta 4 needs four evaluations and gains little. Marks and numbers as above.",
 )  # fmt: skip
 def integrator_precision(motions: Table) -> Drawn:
     """Draw the integrators in the same way as the worlds."""
