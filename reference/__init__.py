@@ -1,1 +1,1 @@
-"""Independent answers: nothing here shares an algorithm with the engine."""
+"""Independent reference solutions: nothing here shares an algorithm with the engine."""

@@ -1,12 +1,12 @@
 """Contacts of the rigid worlds in closed form: circles, convex polygons and half-planes; balls, boxes and half-spaces.
 
-The engine's conventions (unit normal from b into a, gap along it, point midway, its choice of points where a face lies
-on a face), but none of its code: everything is computed in the world frame, a polygon's nearest point is sought on all
-edges, faces of boxes are clipped by Sutherland and Hodgman. So is every sum in another order, and a fault of one shows
-beside the other (`verification.mechanics.engine_differences`).
+This module has the engine's conventions (unit normal from b into a, gap along it, point midway, same choice of points
+for face on face) but shares no code with it. It computes everything in the world frame, searches all edges for a
+polygon's nearest point, and clips faces of boxes by Sutherland and Hodgman. Sums thus have a different order, and a
+fault in one implementation shows as a difference (`verification.mechanics.engine_differences`).
 
-Two polygons, or boxes, meet along the axis of largest separation; axes of a flush pair agree to rounding, so what
-differs by less than TIE of the size counts as equal, and one of them goes first: b's edge, or a's face.
+The normal of two polygons or boxes is the axis of largest separation. For flush pairs, separations agree up to
+rounding, so differences below TIE of the size count as equal. Then b's edge, or a's face, has priority.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 ROUNDING = 1e-12  # share of the size within which points coincide
-TIE = 1e-14  # share of the size within which separations are equal: a tilt of 1e-6 already tells two faces apart
-# The engine's conventions for boxes: two edges decide only where they overlap this share less than faces do; directions
-# whose sine is below that have no common normal of their own; four points of a patch stay.
+TIE = 1e-14  # share of the size within which separations count as equal; a tilt of 1e-6 already exceeds it
+# The engine's conventions for boxes: two edges give the normal only if they overlap by this share less than faces do;
+# edges with a smaller sine between them count as parallel; at most four points of a patch are kept.
 EDGE_SHARE, PARALLEL, MOST_POINTS = 0.05, 1e-6, 4
 
 
 class Contacts(NamedTuple):
-    """c contacts: shapes, bodies (-1: the world), feature (c,); point, normal (c, 3); gap (c,) [m]."""
+    """c contacts: shapes, bodies (-1 = the world), feature (c,); point, normal (c, 3); gap (c,) [m]."""
 
     shape_a: Integers
     shape_b: Integers
@@ -43,7 +43,7 @@ class Contacts(NamedTuple):
 
 
 def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float) -> Contacts:
-    """The contacts with gap <= margin [m]; axes (n + 1, 3, 3), origins (n + 1, 3) of bodies, the world's last."""
+    """Return the contacts with gap <= margin [m], for axes (n + 1, 3, 3), origins (n + 1, 3) of bodies and world."""
     room = _room(shapes.kind, shapes.count, pairs)
     ids, values = np.empty((room, 3), np.int64), np.empty((room, 7))
     corners, center, frames = _placed(shapes.kind, shapes.first, shapes.count, shapes.body, shapes.vertices,
@@ -57,7 +57,7 @@ def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origin
 
 @numba.njit(cache=True, fastmath=False)
 def _room(kind, count, pairs):  # type: ignore[no-untyped-def]
-    """Largest number of contacts, with room for a clipped face."""
+    """Return a capacity for all contacts, with room for a clipped face."""
     room = 16
     for k in range(len(pairs)):
         a = pairs[k, 0]
@@ -67,7 +67,7 @@ def _room(kind, count, pairs):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _placed(kind, first, count, body, vertices, center, frames, axes, origins):  # type: ignore[no-untyped-def]
-    """Corners, centres and axes of all shapes in the world; the second row of a half-plane is a direction."""
+    """Return corners, centres and axes of all shapes in the world; the second row of a half-plane is a direction."""
     corners, centers, turned = np.zeros((len(vertices), 3)), np.zeros((len(kind), 3)), np.zeros((len(kind), 3, 3))
     for s in range(len(kind)):
         own, origin = axes[body[s]], origins[body[s]]
@@ -86,7 +86,7 @@ def _placed(kind, first, count, body, vertices, center, frames, axes, origins): 
 
 @numba.njit(cache=True, fastmath=False)
 def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin, ids, values):  # type: ignore[no-untyped-def]
-    """Write the contacts of all pairs; return how many."""
+    """Write the contacts of all pairs; return their number."""
     n = 0
     for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -126,7 +126,7 @@ def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin
 
 @numba.njit(cache=True, fastmath=False)
 def _store(ids, values, n, feature, point, normal, gap):  # type: ignore[no-untyped-def]
-    """Write a contact, its shapes still open."""
+    """Write a contact without its shapes, which `_find` adds; return the new number of contacts."""
     ids[n, 0], ids[n, 2] = -1, feature
     values[n, :3], values[n, 3:6], values[n, 6] = point, normal, gap
     return n + 1
@@ -134,13 +134,13 @@ def _store(ids, values, n, feature, point, normal, gap):  # type: ignore[no-unty
 
 @numba.njit(cache=True, fastmath=False)
 def _feature(kind, one, other):  # type: ignore[no-untyped-def]
-    """Number of two features; kind 0: corner of a on a face of b, 1: the other way round, 2: two corners or edges."""
+    """Return the number of two features; kind 0: corner of a on face of b, 1: reverse, 2: two corners or edges."""
     return (kind * 100_000 + one) * 100_000 + other
 
 
 @numba.njit(cache=True, fastmath=False)
 def _points_on_plane(points, radius, origin, normal, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Corners (or the middle of a ball) over a half-plane or half-space."""
+    """Write contacts of corners (or the centre of a ball) with a half-plane or half-space."""
     for i in range(len(points)):
         gap = np.sum((points[i] - origin) * normal) - radius
         if gap <= margin:
@@ -150,7 +150,7 @@ def _points_on_plane(points, radius, origin, normal, margin, ids, values, n):  #
 
 @numba.njit(cache=True, fastmath=False)
 def _balls(x, radius_x, y, radius_y, otherwise, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Two circles or balls; `otherwise` is the normal where the middles coincide."""
+    """Write the contact of two circles or balls; `otherwise` is the normal if the centres coincide."""
     apart = x - y
     distance = np.sqrt(np.sum(apart * apart))
     gap = distance - (radius_x + radius_y)
@@ -162,7 +162,7 @@ def _balls(x, radius_x, y, radius_y, otherwise, margin, ids, values, n):  # type
 
 @numba.njit(cache=True, fastmath=False)
 def _ball_on(nearest, middle, radius, sign, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """A circle or ball at a signed distance from a polygon or box; sign −1 where the ball is b."""
+    """Write the contact of a circle or ball with a polygon or box; sign −1 if the ball is b."""
     normal, distance, feature = nearest
     gap = distance - radius
     if gap > margin:
@@ -172,7 +172,7 @@ def _ball_on(nearest, middle, radius, sign, margin, ids, values, n):  # type: ig
 
 @numba.njit(cache=True, fastmath=False)
 def _edges(polygon):  # type: ignore[no-untyped-def]
-    """Outward unit normals (k, 3) and lengths (k,) of a counterclockwise polygon's edges."""
+    """Return outward unit normals (k, 3) and lengths (k,) of a counterclockwise polygon's edges."""
     normals, lengths = np.zeros((len(polygon), 3)), np.empty(len(polygon))
     for i in range(len(polygon)):
         edge = polygon[(i + 1) % len(polygon)] - polygon[i]
@@ -183,7 +183,7 @@ def _edges(polygon):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
-    """Direction from the polygon to a point, signed distance and feature; inside, by the nearest edge."""
+    """Return direction from the polygon to a point, signed distance and feature; inside, those of the nearest edge."""
     normals, lengths = _edges(polygon)
     inner, edge = -np.inf, 0
     for i in range(len(polygon)):
@@ -208,7 +208,7 @@ def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _along(axes, x):  # type: ignore[no-untyped-def]
-    """Components (3,) of x along the axes, without BLAS."""
+    """Return the components (3,) of x along the axes, without BLAS."""
     found = np.empty(3)
     for k in range(3):
         found[k] = axes[0, k] * x[0] + axes[1, k] * x[1] + axes[2, k] * x[2]
@@ -217,7 +217,7 @@ def _along(axes, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_box(center, axes, half, x):  # type: ignore[no-untyped-def]
-    """Direction from the box to a point, signed distance and feature; inside, by the nearest face."""
+    """Return direction from the box to a point, signed distance and feature; inside, those of the nearest face."""
     local = _along(axes, x - center)
     beyond = np.abs(local) - half
     if beyond.max() <= 0.0:
@@ -235,7 +235,7 @@ def _nearest_on_box(center, axes, half, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _box_corners(axes, half):  # type: ignore[no-untyped-def]
-    """Corners (8, 3) about the middle."""
+    """Return the corners (8, 3) relative to the centre."""
     corners = np.empty((8, 3))
     for i in range(8):
         for x in range(3):
@@ -249,7 +249,7 @@ def _box_corners(axes, half):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _best_edge(onto, normals, other):  # type: ignore[no-untyped-def]
-    """Largest separation of `other` over the edges of `onto`, and the edge."""
+    """Return the largest separation of `other` over the edges of `onto`, and the edge."""
     best, edge = -np.inf, 0
     for i in range(len(onto)):
         lowest = np.inf
@@ -262,7 +262,7 @@ def _best_edge(onto, normals, other):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Two convex polygons: the incident edge over the reference edge, or two corners."""
+    """Write contacts of two convex polygons: the incident edge over the reference edge, or two corners."""
     (normals_a, lengths_a), (normals_b, lengths_b) = _edges(a), _edges(b)
     size = lengths_a.max() + lengths_b.max()
     (over_a, edge_a), (over_b, edge_b) = _best_edge(a, normals_a, b), _best_edge(b, normals_b, a)
@@ -275,7 +275,7 @@ def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, sign, size, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Contacts over the reference edge; sign 1 where it is b's."""
+    """Write the contacts over the reference edge; sign 1 if the edge belongs to b."""
     m, length, k = normals[edge], lengths[edge], len(other)
     t = np.array([-m[1], m[0], 0.0])
     incident = 0
@@ -309,7 +309,7 @@ def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, si
 
 @numba.njit(cache=True, fastmath=False)
 def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """One contact between the closest corners of polygons that are apart."""
+    """Write one contact between the closest corners of separate polygons."""
     best, i, j = np.inf, 0, 0
     for k in range(len(ref)):
         for m in range(len(other)):
@@ -325,7 +325,7 @@ def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, fastmath=False)
 def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Two boxes: the axis of largest separation among 15, then a clipped face or two edges."""
+    """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or two edges."""
     apart, size = center_a - center_b, half_a.sum() + half_b.sum()
     face, best, edge_i, edge_j, edge_best = -1, -np.inf, 0, 0, -np.inf
     for k in range(6):
@@ -353,13 +353,13 @@ def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  #
 
 @numba.njit(cache=True, fastmath=False)
 def _reach(axes, half, m):  # type: ignore[no-untyped-def]
-    """Half the extent of a box along m."""
+    """Return half the extent of a box along m."""
     return np.sum(half * np.abs(_along(axes, m)))
 
 
 @numba.njit(cache=True, fastmath=False)
 def _two_edges(center_a, A, half_a, i, center_b, B, half_b, j, gap, ids, values, n):  # type: ignore[no-untyped-def]
-    """One contact midway between the closest points of two edges."""
+    """Write one contact midway between the closest points of two edges."""
     u, w = A[:, i].copy(), B[:, j].copy()
     m = np.cross(u, w)
     m = m / np.sqrt(np.sum(m * m))
@@ -383,7 +383,7 @@ def _two_edges(center_a, A, half_a, i, center_b, B, half_b, j, gap, ids, values,
 
 @numba.njit(cache=True, fastmath=False)
 def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, separation, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Corners of the incident face clipped to the reference face (four at most); sign 1 where that is b's."""
+    """Write the corners of the incident face clipped to the reference face (four at most); sign 1 if that is b's."""
     apart, k1, k2 = center_o - center, (face + 1) % 3, (face + 2) % 3
     m, u, w = axes[:, face].copy(), axes[:, k1].copy(), axes[:, k2].copy()
     outward = np.sum(apart * m) >= 0.0
@@ -439,7 +439,7 @@ def _cut(patch, lines, length, axis, sign, limit, border):  # type: ignore[no-un
 
 @numba.njit(cache=True, fastmath=False)
 def _doubled(patch, c, length, share):  # type: ignore[no-untyped-def]
-    """Whether an earlier corner lies at the same place."""
+    """Return whether an earlier corner lies at the same place."""
     nearest = np.inf
     for i in range(c):
         nearest = min(nearest, np.abs(patch[i] - patch[c]).max())
@@ -448,7 +448,7 @@ def _doubled(patch, c, length, share):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _widest(ids, values, start, n, m):  # type: ignore[no-untyped-def]
-    """Keep the deepest, the one farthest from it, and the widest on each side of the line through both."""
+    """Keep the deepest contact, the one farthest from it, and the farthest on each side of the line through both."""
     chosen = np.empty(MOST_POINTS, np.int64)
     chosen[0] = start + int(np.argmin(values[start:n, 6]))
     x, best = values[chosen[0], :3].copy(), -1.0

@@ -1,7 +1,7 @@
-"""Contacts of a system as rows, gaps and velocities, and back into the record of a step.
+"""Contacts of a system as rows, gaps and velocities, and their record after a step.
 
 Rows nᵀ(J_a − J_b), (11)-(12), are built from Pinocchio's frame Jacobians of the bodies and the contacts of
-`reference.contact_finding`: nothing here calls the engine's mechanics or its narrow phase.
+`reference.contact_finding`. Nothing here calls the engine's mechanics or its narrow phase.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from reference.rigid_body import PinocchioMechanism, model_of
 
 Floats = NDArray[np.float64]
 
-# nᵀJ smaller than this share of what it is summed from is rounding, not a lever arm of the contact.
+# An nᵀJ below this share of its summands is rounding error, not a lever arm of the contact.
 ROW_NOISE = 1e-13
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -28,7 +28,7 @@ _mechanics: WeakKeyDictionary[Mechanism, PinocchioMechanism] = WeakKeyDictionary
 
 
 def mechanics_of(system: Any) -> PinocchioMechanism:
-    """Pinocchio's model of the system's mechanism, built once."""
+    """Return Pinocchio's model of the system's mechanism, built once."""
     mechanism = system.mechanism
     if mechanism not in _mechanics:
         _mechanics[mechanism] = model_of(mechanism)
@@ -39,7 +39,7 @@ def mechanics_of(system: Any) -> PinocchioMechanism:
 class ContactRows:
     """c contacts of one configuration.
 
-    geometry : Contacts, c of each
+    geometry : Contacts, c entries in each field
     jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma : (c,) J v [m/s]
     """
 
@@ -64,9 +64,9 @@ def _with_stops(
     geometry: Contacts, system: Any, mechanics: PinocchioMechanism, q: Floats, origins: Floats, frames: Floats,
     margin: float,
 ) -> Contacts:
-    """Append the ends of the joints' ranges with gap <= margin [m]: contacts on an arm that the joint turns.
+    """Append the joint limits with gap <= margin [m], as contacts on an arm that the joint rotates.
 
-    The joint's axis is that of its body's motion by the joint's own velocity, relative to the parent.
+    The joint's axis is the direction of its body's motion relative to the parent under unit joint velocity.
     """
     stops = system.stops
     gap = stops.arm * stops.sign * (q[stops.coordinate] - stops.bound)
@@ -85,10 +85,10 @@ def _with_stops(
 
 
 def contact_jacobian(directions: Floats, geometry: Contacts, origins: Floats, frames: Floats) -> Floats:
-    """Velocity (c, d) of a against b at each contact along its direction n (c, 3), zero where it is only rounding.
+    """Return the rows (c, d) of the velocity of a relative to b along directions n (c, 3); mere rounding becomes 0.
 
-    With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point: nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
-    origins (n + 1, 3), frames (n + 1, 6, d) : of the bodies, the world's last
+    With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point, nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
+    origins (n + 1, 3), frames (n + 1, 6, d) : those of the bodies and, last, of the world
     """
     return np.asarray(_rows(directions, geometry.point, geometry.body_a, geometry.body_b, origins, frames))
 
@@ -117,9 +117,9 @@ def _rows(directions, points, bodies_a, bodies_b, origins, frames):  # type: ign
 
 
 def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Floats]:
-    """Unit tangents t (c, s, 3) of the contacts and their rows tᵀ(J_a − J_b) (c, s, d).
+    """Return unit tangents t (c, s, 3) of the contacts and their rows tᵀ(J_a − J_b) (c, s, d).
 
-    s = 1 in the plane, t = z × n; s = 2 in space, so that (n, t_1, t_2) is right-handed.
+    In the plane s = 1 and t = z × n; in space s = 2 and (n, t_1, t_2) is right-handed.
     """
     normals = found.geometry.normal
     tangents = unit_tangents(normals, getattr(system.scene, "dimensions", 2) == 3)
@@ -129,7 +129,7 @@ def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Fl
 
 
 def unit_tangents(normals: Floats, spatial: bool) -> Floats:
-    """Unit tangents (c, s, 3) of normals (c, 3): one in the plane, z × n, two in space."""
+    """Return unit tangents (c, s, 3) of normals (c, 3): z × n in the plane, two tangents in space."""
     if not spatial:
         return cross(Z, normals)[:, None]
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]  # the coordinate axis that is farthest from the normal
@@ -139,7 +139,7 @@ def unit_tangents(normals: Floats, spatial: bool) -> Floats:
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """a × b over the last axis (..., 3): numpy's own takes ten times as long for a few vectors."""
+    """Return a × b over the last axis (..., 3); for a few vectors numpy's function takes ten times as long."""
     found = np.empty(np.broadcast_shapes(a.shape, b.shape))
     found[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     found[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -152,8 +152,8 @@ def write_contacts(
 ) -> None:
     """Record in `state` the contacts that touch or carry an impulse.
 
-    blow, pushed : (c,) impulses [N s], those that are recorded as forces in `pushed`
-    friction : (c, 3) tangential impulses, world axes, recorded as forces
+    blow, pushed : (c,) impulses [N s]; `pushed` is recorded as forces
+    friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
     into = state.contacts
     _write(into.shape_a, into.shape_b, into.feature, into.body_a, into.body_b, into.point, into.normal, into.gap,
@@ -189,7 +189,7 @@ def _write(  # type: ignore[no-untyped-def]
 
 
 def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats) -> None:
-    """Log the blows of a step as one impact: velocity before, mass matrix, generalized impulse and rows (c, d)."""
+    """Log the collision impulses of a step as one impact, from v before, mass matrix, impulse (d,) and rows (c, d)."""
     log = state.impacts
     log.logged[0] = 0
     if not len(rows):
@@ -203,6 +203,6 @@ def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floa
 
 
 def identities(contacts: Any, rows: Any) -> list[tuple[int, int, int]]:
-    """Which contact each row is: its two shapes and their features."""
+    """Return the identity of the contact of each row: its two shapes and their features."""
     first, second, feature = contacts.shape_a, contacts.shape_b, contacts.feature
     return [(int(first[i]), int(second[i]), int(feature[i])) for i in rows]

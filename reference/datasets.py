@@ -1,7 +1,7 @@
-"""Contact problems written by others: LCP text files (plain or gzip), MLCP text, FCLIB HDF5.
+"""Read contact problems of other projects: LCP text files (plain or gzip), MLCP text, FCLIB HDF5.
 
-`read_problem(path)` picks the format by what the file is; every reader returns ImpactProblem records, and a
-damaged or foreign file is a DatasetError that says where it went wrong.
+`read_problem(path)` chooses the format by the ending of the file's name. Every reader returns a StoredProblem. For a
+damaged or unknown file it raises a DatasetError that names the place.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from reference.fclib import LARGEST_SIZE, DatasetError, StoredProblem, read_fcli
 
 Floats = NDArray[np.float64]
 
-_LARGEST_TEXT = 64 << 20  # bytes, unpacked: 2,500 unknowns with all their digits; a few packed bytes can ask for any
+_LARGEST_TEXT = 64 << 20  # unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
 
-# Rows that each constraint type of an MLCP file brings: True for a two-sided one.
+# Rows of each constraint type of an MLCP file: True for a two-sided row.
 _MLCP_ROWS = {
     **{f"MLCP_BILATERAL_{n}D_CONSTRAINT": (True,) * n for n in (1, 2, 3)},
     "MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT": (False,),
@@ -33,12 +33,12 @@ def read_problem(path: Path | str) -> StoredProblem:
 
     Parameters
     ----------
-    path : of the file; its name's ending says which format
+    path : path of the file; the ending of its name decides the format
 
     Raises
     ------
     DatasetError
-        The file is of no known kind, damaged, cut off, or larger than is read here; the message says where.
+        The file has an unknown format, is damaged or truncated, or is too large; the message says where.
     """
     path = Path(path)
     name = path.name.lower()
@@ -56,7 +56,7 @@ def read_problem(path: Path | str) -> StoredProblem:
 
 
 def problem_files(folder: Path | str) -> list[Path]:
-    """Return the problem files below `folder`, sorted; readmes and other files are left out."""
+    """Return the problem files below `folder`, sorted, without other files."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ArgumentError("folder", str(folder), "an existing folder")
@@ -65,7 +65,7 @@ def problem_files(folder: Path | str) -> list[Path]:
 
 
 def read_lcp(path: Path | str) -> StoredProblem:
-    """Read n, M (n x n, row by row), q of  0 <= z ⟂ M z + q >= 0, plain text or gzip (lcpy)."""
+    """Read n, M (n x n, row by row) and q of the LCP  0 <= z ⟂ M z + q >= 0  from plain text or gzip (lcpy)."""
     path = Path(path)
     numbers = _numbers(path, _text(path).split())
     n = _count(path, numbers, 0)
@@ -77,8 +77,8 @@ def read_lcp(path: Path | str) -> StoredProblem:
 def read_siconos_lcp(path: Path | str) -> StoredProblem:
     """Read a dense LCP of Siconos: size, storage flag 0, sizes, then M **column by column**, and q.
 
-    Column order is what the files mean: `lcp_Pang_isolated_sol` has a solution only when read so, and
-    `lcp_CPS_2` becomes example 4.4.7 of Cottle, Pang, Stone (1992). A remark may follow the numbers.
+    The files use column order: only in this order does `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal
+    example 4.4.7 of Cottle, Pang, Stone (1992). A remark may follow the numbers.
     """
     path = Path(path)
     words = _text(path).split()
@@ -100,7 +100,8 @@ def read_siconos_lcp(path: Path | str) -> StoredProblem:
 def read_mlcp(path: Path | str) -> StoredProblem:
     """Read a labelled MLCP text of OpenSurgSim: constraint types, E, HCHt, friction and stored lambda.
 
-    Bilateral constraints of one to three dimensions and frictionless unilateral ones are read, others refused.
+    The reader accepts bilateral constraints of one to three dimensions and frictionless unilateral ones; it refuses
+    others.
     """
     path = Path(path)
     fields, remark = _labelled(path, _text(path))
@@ -164,7 +165,7 @@ def _lcp(path: Path, matrix: Floats, q: Floats) -> ImpactProblem:
 
 
 def _labelled(path: Path, text: str) -> tuple[dict[str, str], str]:
-    """Split 'label = value' entries, whose bracketed values may run over lines; return them and the title."""
+    """Split 'label = value' entries, whose bracketed values may span lines; return them and the title."""
     fields: dict[str, str] = {}
     label, remark = "", ""
     for line in text.splitlines():

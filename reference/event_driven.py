@@ -1,15 +1,15 @@
-"""Event-driven simulation, exact up to rounding: constant mass and force, springs, gaps linear in the coordinates.
+"""Event-driven simulation, exact up to rounding, for constant mass and force, springs, and linear gaps.
 
-Between events the accelerations are constant, so every gap is a parabola in time and its next zero is known in
-closed form: no step size, no tolerance in time. Covers the bouncing ball, the block that slides into a corner
-without turning, and balls in a row (cradle). It is the truth that time stepping must converge to.
+Between events the accelerations are constant, so every gap is a parabola in time and its next zero has a closed form.
+There is no step size and no tolerance in time. This covers the bouncing ball, the block that slides into a corner
+without rotating, and balls in a row (cradle). Time stepping must converge to this motion.
 
-With springs, M a = f − K q + Jᵀλ, each arc is a sum of modes: sines, or parabolas at frequency zero. Their gaps and
-contact forces have a bounded second derivative, so that the next zero is approached from the left by steps that
-cannot pass one (conservative advancement), to rounding.
+With springs, M a = f − K q + Jᵀλ, and each arc is a sum of modes: sines, or parabolas at frequency zero. Gaps and
+contact forces then have a bounded second derivative. So the next zero is approached from the left by steps that cannot
+pass it (conservative advancement), up to rounding.
 
-At an event, all closed contacts take part in one impact by a law of `reference.complementarity.laws`; between events
-closed contacts at rest stay closed as long as their force pushes (the complementarity problem of accelerations).
+At an event, all closed contacts take part in one impact by a law of `reference.complementarity.laws`. Between events,
+closed contacts at rest stay closed as long as they push (the complementarity problem of accelerations).
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from reference.rigid_step import nearest_velocity
 
 Floats = NDArray[np.float64]
 
-# Gaps and speeds at an event carry the rounding of a parabola's root: 1e-16 relative, some factors of ten kept.
+# Gaps and speeds at an event have the rounding error of a parabola's root, 1e-16 relative; the tolerances are larger.
 _CLOSED = 1e-11  # of the largest coordinate: a gap below this is closed
-_AT_REST = 1e-11  # of the largest speed so far: a normal velocity below this is none
-_WEAK = 1e-10  # share below which a contact force, an acceleration or an independent direction of rows is none
+_AT_REST = 1e-11  # of the largest speed so far: a normal velocity below this counts as zero
+_WEAK = 1e-10  # share below which a contact force, an acceleration or a singular value of rows counts as zero
 _NO_SPRING = 1e-13  # of the largest ω²: below this a mode has no spring
-_INSTANT = 4.0 * float(np.finfo(np.float64).eps)  # of the time: a step to the next zero below this has arrived
+_INSTANT = 4.0 * float(np.finfo(np.float64).eps)  # of the time: a shorter step means that the zero is reached
 
 
 @dataclass(frozen=True)
 class LinearSystem:
     """M (d, d), constant force f (d,), gaps = rows q + start with rows (c, d), start (c,), restitution e.
 
-    stiffness : K (d, d), symmetric and positive semidefinite, of springs with the force −K q; None: no springs. Their
-        rest position is a part of f.
+    stiffness : K (d, d), symmetric and positive semidefinite, of springs with the force −K q; None without springs.
+        The force f includes the effect of their rest position.
     """
 
     mass_matrix: Floats
@@ -60,7 +60,7 @@ class LinearSystem:
             object.__setattr__(self, "stiffness", _checked_stiffness(self.stiffness, d))
 
     def gap(self, q: Floats) -> Floats:
-        """Gaps (c,) [m]."""
+        """Return the gaps (c,) [m]."""
         return self.rows @ q + self.start
 
 
@@ -76,7 +76,7 @@ def _checked_stiffness(stiffness: ArrayLike, d: int) -> Floats:
 
 @dataclass(frozen=True)
 class Modes:
-    """An arc under springs: q = q₀ + B z, z'' = −ω² z + c, z(0) = 0.
+    """An arc with springs: q = q₀ + B z with z'' = −ω² z + c and z(0) = 0.
 
     basis : B (d, m), with BᵀM B = 1, BᵀK B = ω²; frequency : ω (m,) [rad/s]; rate : z'(0); push : c
     """
@@ -87,7 +87,7 @@ class Modes:
     push: Floats
 
     def at(self, time: Floats | float) -> tuple[Floats, Floats, Floats]:
-        """z, z' and z'' (n, m) at times (n,) since the arc began."""
+        """Return z, z' and z'' (n, m) at times (n,) since the start of the arc."""
         t = np.asarray(time, np.float64)[..., None]
         w = self.frequency
         still = w == 0.0
@@ -99,16 +99,16 @@ class Modes:
         return moved, rate, cosine * self.push - w * sine * self.rate
 
     def largest(self, order: int) -> Floats:
-        """Bounds (m,) of |dⁿz/dtⁿ|, n = `order` >= 2, at all times."""
+        """Return bounds (m,) of |dⁿz/dtⁿ| for n = `order` >= 2, valid at all times."""
         return np.hypot(self.push, self.frequency * self.rate) * self.frequency ** (order - 2)
 
 
 @dataclass(frozen=True)
 class ExactTrajectory:
-    """Arcs between events: parabolas, or modes where there are springs.
+    """Arcs between events: parabolas, or modes with springs.
 
     event_time : (k,) start of each arc [s], the first 0; q, v : (k, d) there, after the impact; a : (k, d)
-    impulse : (k, c) of the impact at the start of the arc [N s]; end : time up to which it is known [s]
+    impulse : (k, c) of the impact at the start of each arc [N s]; end : time up to which the motion is known [s]
     """
 
     event_time: Floats
@@ -120,7 +120,7 @@ class ExactTrajectory:
     modes: tuple[Modes, ...] = ()
 
     def state(self, time: ArrayLike) -> tuple[Floats, Floats]:
-        """Return q and v (n, d) at the times (n,), right after an event that falls on one."""
+        """Return q and v (n, d) at the times (n,); at the instant of an event, those after it."""
         t = np.atleast_1d(np.asarray(time, np.float64))
         if t.min(initial=0.0) < 0.0 or t.max(initial=0.0) > self.end:
             raise ArgumentError("time", time, f"times in [0, {self.end!r}] s")
@@ -145,7 +145,7 @@ def event_driven(
 ) -> ExactTrajectory:
     """Return the motion from q, v (d,) for `duration` [s], or up to event number `most_events`.
 
-    An accumulation of impacts (a ball coming to rest) ends it early: `end` then says how far it goes.
+    An accumulation of impacts (a ball that comes to rest) ends the motion early; `end` is its last time.
 
     Parameters
     ----------
@@ -153,12 +153,12 @@ def event_driven(
     q, v : (d,) at the start, [m | rad] and their rates
     duration : [s]
     law : impact law; by default Newton's as a linear complementarity problem
-    most_events : after which the motion ends
+    most_events : number of events after which the motion ends
 
     Returns
     -------
     ExactTrajectory
-        parabolas between the events, so exact at every time.
+        The arcs between the events, which are exact at every time up to rounding.
     """
     q_now, v_now, now = np.array(q, np.float64), np.array(v, np.float64), 0.0
     speed, arcs = float(np.abs(v_now).max(initial=0.0)), list[_Arc]()
@@ -187,7 +187,7 @@ def event_driven(
 def _impact(
     system: LinearSystem, v: Floats, closed: NDArray[np.bool_], at_rest: float, law: Callable[..., Outcome]
 ) -> tuple[Floats, Floats]:
-    """Return v⁺ and the impulses (c,) where a closed contact approaches; v as it is otherwise."""
+    """Return v⁺ and the impulses (c,) of an impact; v and zeros if no closed contact approaches."""
     impulse = np.zeros(len(closed))
     rows = system.rows[closed]
     if not (rows @ v < -at_rest).any():
@@ -200,7 +200,7 @@ def _impact(
 def _acceleration(
     system: LinearSystem, v: Floats, closed: NDArray[np.bool_], at_rest: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Acceleration (d,) with resting contacts kept from closing further, and the contacts (c,) that rest."""
+    """Return the acceleration (d,) with resting contacts kept from closing, and the resting contacts (c,)."""
     resting = closed & (np.abs(system.rows @ v) <= at_rest)
     free = np.asarray(np.linalg.solve(system.mass_matrix, system.force), np.float64)
     bound = np.where(resting, 0.0, -np.inf)
@@ -215,7 +215,7 @@ def _next_closing(
     closed: NDArray[np.bool_],
     resting: NDArray[np.bool_],
 ) -> float:
-    """Time [s] until the first gap closes: least positive root of gap + gamma t + α t²/2 that decreases."""
+    """Return the time [s] until the first gap closes: the least positive decreasing root of gap + gamma t + α t²/2."""
     gaps = np.where(closed, 0.0, system.gap(q))
     rates, curvatures = system.rows @ v, system.rows @ acceleration
     waits = [
@@ -226,8 +226,8 @@ def _next_closing(
 
 
 def _first_root(gap: float, rate: float, curvature: float) -> float:
-    """Least t > 0 at which gap + rate t + curvature t²/2 passes zero downwards; infinity when it never does."""
-    if gap == 0.0:  # it leaves now (rate > 0) and returns when gravity wins
+    """Return the least t > 0 at which gap + rate t + curvature t²/2 passes zero downwards, or infinity."""
+    if gap == 0.0:  # it separates now (rate > 0) and returns if the curvature is negative
         return -2.0 * rate / curvature if curvature < 0.0 and rate > 0.0 else np.inf
     discriminant = rate * rate - 2.0 * curvature * gap
     if discriminant < 0.0 or (rate >= 0.0 and curvature >= 0.0):
@@ -242,7 +242,7 @@ def _first_root(gap: float, rate: float, curvature: float) -> float:
 def _spring_arc(
     system: LinearSystem, q: Floats, v: Floats, closed: NDArray[np.bool_], at_rest: float, duration: float
 ) -> tuple[Modes, float]:
-    """The arc that begins here, and the time [s] until a gap closes or a contact that rests is released."""
+    """Return the arc that starts here, and the time [s] until a gap closes or a resting contact opens."""
     held = _held_by_springs(system, q, v, closed, at_rest)
     modes, K = _modes(system, q, v, held), np.asarray(system.stiffness, np.float64)
     gaps, B = np.where(closed, 0.0, system.gap(q)), modes.basis
@@ -259,7 +259,7 @@ def _spring_arc(
 def _held_by_springs(
     system: LinearSystem, q: Floats, v: Floats, closed: NDArray[np.bool_], at_rest: float
 ) -> list[int]:
-    """Independent closed contacts that stay closed: they push, or neither acceleration nor jerk opens them."""
+    """Return independent closed contacts that stay closed: they push, or neither acceleration nor jerk opens them."""
     M, K = system.mass_matrix, np.asarray(system.stiffness, np.float64)
     resting = np.flatnonzero(closed & (np.abs(system.rows @ v) <= at_rest))
     rows, free = system.rows[resting], np.asarray(np.linalg.solve(M, system.force - K @ q), np.float64)
@@ -280,14 +280,14 @@ def _held_by_springs(
 
 
 def _depends(system: LinearSystem, held: list[int], row: int) -> bool:
-    """Whether a row is a combination of the held ones: its gap keeps still with theirs."""
+    """Whether a row is a linear combination of the held rows, so that its gap is constant too."""
     rows = np.linalg.solve(np.linalg.cholesky(system.mass_matrix), system.rows[[*held, row]].T).T
     rows /= np.linalg.norm(rows, axis=1)[:, None]
     return row in held or bool(np.linalg.svd(rows, compute_uv=False)[-1] < _WEAK) or len(rows) > rows.shape[1]
 
 
 def _modes(system: LinearSystem, q: Floats, v: Floats, held: list[int]) -> Modes:
-    """Modes of the motions that keep the held gaps."""
+    """Return the modes of the motions that keep the held gaps constant."""
     from scipy.linalg import null_space
 
     cholesky, K = np.linalg.cholesky(system.mass_matrix), np.asarray(system.stiffness, np.float64)
@@ -301,10 +301,10 @@ def _modes(system: LinearSystem, q: Floats, v: Floats, held: list[int]) -> Modes
 
 
 def _first_zero(values: Floats, slopes: Floats, modes: Modes, duration: float) -> float:
-    """Least t > 0 at which one of h = values + slopes z(t) passes zero downwards; infinity if not before `duration`.
+    """Return the least t > 0 at which one of h = values + slopes z(t) passes zero downwards; inf if after `duration`.
 
-    From h with |h''| <= C the zero is no nearer than the positive root of h + h' t − C t²/2. What begins at zero
-    begins to rise with its first derivative that is not zero, by less and less at most.
+    With |h''| <= C the zero is no nearer than the positive root of h + h' t − C t²/2. An h that starts at zero first
+    rises with its first nonzero derivative; the bound of the next derivative gives a time up to which it is positive.
     """
     sizes = [np.abs(slopes) @ modes.largest(order) for order in (2, 3, 4)]
     _, rate, bend = modes.at(0.0)

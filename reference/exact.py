@@ -1,13 +1,13 @@
-"""The truth for hard impacts: exact rationals, and balls of certified radius (python-flint).
+"""Exact results for hard impacts: rational numbers, and ball arithmetic with certified radius (python-flint).
 
 Every finite double is a rational number, so an impact given in doubles has an exact outcome of (21),
 v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal independent subset
-of the rows (33). The subset is found without rounding: redundant rows are decided, not estimated. Rows that
-are redundant only up to rounding *are* independent here; give fractions where exact redundancy is meant.
+of the rows (33). The subset is found without rounding, so redundancy is decided exactly. Rows that are redundant only
+up to rounding are independent here; give fractions for exact redundancy.
 
 For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error bound:
-2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so nothing cancels before it is
-known to 106 bits. Where M is not symmetric to the last bit, it is ½(ΔᵀMs + sᵀMΔ).
+2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so the energies do not cancel.
+If M is not symmetric to the last bit, the formula is ½(ΔᵀMs + sᵀMΔ).
 Source: Dekker, Numerische Mathematik 18 (1971); Ogita, Rump, Oishi, SIAM J. Sci. Comput. 26 (2005).
 """
 
@@ -26,19 +26,19 @@ from iapb.errors import ArgumentError, MissingDependencyError, SolverError
 Floats = NDArray[np.float64]
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
 
-_FIRST_BALL_BITS = 256  # working precision tried first; doubled until the ball is narrow
-_LAST_BALL_BITS = 1 << 14  # a ball still wide at this precision is given up, with an error
+_FIRST_BALL_BITS = 256  # first working precision; doubled until the ball is narrow
+_LAST_BALL_BITS = 1 << 14  # if the ball is still wide at this precision, an error is raised
 _BALL_ACCURACY_BITS = 80  # narrow enough to round to the nearest double and to judge its last bit
 
 _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
-_ROUNDING = 2.0**-100  # error of one double-double operation is below 2^-102; with room
-# Beyond these magnitudes the halves or the error terms leave the range of doubles; the caller goes exact then.
+_ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
+# Beyond these magnitudes the halves or the error terms leave the range of doubles; use exact arithmetic then.
 _SMALLEST, _LARGEST = 1e-60, 1e60
 
 
 @dataclass(frozen=True)
 class ExactImpact:
-    """The outcome of (21) for the given numbers, without rounding.
+    """The result of (21) for the given numbers, without rounding.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class ExactImpact:
 def exact_impact(
     mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float | Fraction
 ) -> ExactImpact:
-    """Return the exact outcome of (21) for M (d, d), J (c, d), v (d,) and scalar e.
+    """Return the exact result of (21) for M (d, d), J (c, d), v (d,) and scalar e.
 
     Parameters
     ----------
-    mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M is taken as symmetric positive definite
+    mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M must be symmetric positive definite
     restitution : e, one for all rows
 
     Returns
@@ -106,7 +106,7 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
 def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
     """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded once; > 0 is a gain.
 
-    KE⁻ = 0 gives 0 when KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
+    If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     before, after = (
@@ -123,13 +123,13 @@ def ball_impact(
 ) -> tuple[Floats, Floats]:
     """Return v⁺ of (21) as doubles (d,) and certified bounds (d,) of their error, by ball arithmetic.
 
-    Faster than `exact_impact` for large problems: only the choice of independent rows is rational. Precision
-    doubles until every ball is as narrow as 2⁻⁸⁰ of the largest component.
+    This is faster than `exact_impact` for large problems, because only the choice of independent rows is rational. The
+    precision doubles until every ball's radius is at most 2⁻⁸⁰ of the largest component.
 
     Raises
     ------
     SolverError
-        if the ball stays wide at 16384 bits
+        The ball is still wide at 16384 bits.
     """
     flint = _flint()
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
@@ -155,9 +155,9 @@ def condition_number(mass_matrix: ArrayLike) -> float:
 
 
 def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) -> float:
-    """Return kappa(A), A = J L⁻ᵀ: largest over smallest nonzero singular value; 1 when there is no row.
+    """Return kappa(A) of A = J L⁻ᵀ, the largest over the smallest nonzero singular value; 1 without rows.
 
-    They are the square roots of the nonzero eigenvalues of M⁻¹JᵀJ, which is rational.
+    The singular values are the square roots of the nonzero eigenvalues of M⁻¹JᵀJ, which is rational.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
@@ -214,7 +214,7 @@ def _first_nonzero(matrix: Rational, row: int) -> int:
 
 
 def _generalized_impulse(mass: Any, rows: Any, v: Any, e: Any) -> Any:
-    """−(1+e) Jₙᵀ (Jₙ M⁻¹ Jₙᵀ)⁻¹ Jₙ v, in whatever arithmetic the matrices bring (rationals or balls)."""
+    """Return −(1+e) Jₙᵀ (Jₙ M⁻¹ Jₙᵀ)⁻¹ Jₙ v in the arithmetic of the matrices (rationals or balls)."""
     if rows.nrows() == 0:
         return v - v
     delassus = rows * mass.solve(rows.transpose())
@@ -245,7 +245,7 @@ def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
 def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> tuple[Floats, Floats]:
     """Return (gain, bound), each (n,): (KE⁺ − KE⁻)/KE⁻ per impact and a bound of its error.
 
-    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). NaN, with bound infinity, where KE⁻ is not positive.
+    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). If KE⁻ is not positive, gain is NaN and bound infinity.
     """
     before = np.atleast_2d(np.asarray(v_minus, dtype=np.float64))
     after = np.atleast_2d(np.asarray(v_plus, dtype=np.float64))
@@ -271,7 +271,7 @@ def _check_magnitudes(masses: Floats, before: Floats, after: Floats) -> None:
 
 @numba.njit(cache=True, fastmath=False)
 def _two_sum(a, b):  # type: ignore[no-untyped-def]
-    """a + b as an exact pair (sum, error)."""
+    """Return a + b as an exact pair (sum, error)."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -279,7 +279,7 @@ def _two_sum(a, b):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _two_product(a, b):  # type: ignore[no-untyped-def]
-    """a b as an exact pair (product, error)."""
+    """Return a b as an exact pair (product, error)."""
     p = a * b
     c = _SPLITTER * a
     a1 = c - (c - a)
@@ -292,7 +292,7 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _add(ah, al, bh, bl):  # type: ignore[no-untyped-def]
-    """Double-double sum, the accurate variant (both low parts kept)."""
+    """Return the double-double sum, in the accurate variant that keeps both low parts."""
     sh, sl = _two_sum(ah, bh)
     th, tl = _two_sum(al, bl)
     sh, sl = _two_sum(sh, sl + th)
@@ -301,7 +301,7 @@ def _add(ah, al, bh, bl):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _multiply(ah, al, bh, bl):  # type: ignore[no-untyped-def]
-    """Double-double product."""
+    """Return the double-double product."""
     ph, pl = _two_product(ah, bh)
     return _two_sum(ph, pl + (ah * bl + al * bh))
 

@@ -1,7 +1,7 @@
-"""FCLIB: the HDF5 format of the FrictionalContactLibrary, read and written (normal component first).
+"""Read and write FCLIB, the HDF5 format of the FrictionalContactLibrary (normal component first).
 
-fclib_local : u = W r + q;  fclib_global : M v = H r + f, u = Hᵀ v + w. Both with friction mu per contact, and
-a solution (r, u, v) that counts as absent when it is all zeros, as in files that were never solved.
+fclib_local : u = W r + q;  fclib_global : M v = H r + f, u = Hᵀ v + w. Both have friction mu per contact and a
+solution (r, u, v). A solution of zeros counts as absent, because unsolved files have one.
 Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D frictional contact problems (2014).
 """
 
@@ -20,13 +20,13 @@ from reference.hdf5 import leads_out
 
 Floats = NDArray[np.float64]
 
-LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a larger number in a header is damage, not a problem
-LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, which costs its entries alone
+LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
+LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
 WITH_MECHANICS = 2_000  # coordinates up to which a global problem keeps its dense M and J
 
 
 class DatasetError(IapbError, ValueError):
-    """A problem file is damaged or of a kind that is not known here."""
+    """A problem file is damaged or has an unknown format."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
         self.path = Path(path)
@@ -37,8 +37,8 @@ class DatasetError(IapbError, ValueError):
 class StoredProblem:
     """A problem file as read.
 
-    problem : the ImpactProblem; stored_impulse : (n,) what the file gives as multipliers, or None
-    remark : text that the file carries; format : name of the format
+    problem : the ImpactProblem; stored_impulse : (n,) multipliers in the file, or None
+    remark : text in the file; format : name of the format
     """
 
     problem: ImpactProblem
@@ -54,17 +54,17 @@ _COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 
 def read_fclib(path: Path | str) -> StoredProblem:
     """Read a local or global FCLIB problem as an ImpactProblem with friction.
 
-    A global problem is condensed by sparse factors: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. Its mechanics (J = Hᵀ) comes along
-    up to WITH_MECHANICS coordinates.
+    A global problem is condensed with sparse factors: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. The result includes its mechanics
+    (M, J = Hᵀ) if w = 0 and it has at most WITH_MECHANICS coordinates.
 
     Parameters
     ----------
-    path : of the HDF5 file
+    path : path of the HDF5 file
 
     Raises
     ------
     DatasetError
-        The file is no FCLIB problem, is damaged, or states a size beyond what is read here.
+        The file is not an FCLIB problem, is damaged, or exceeds the size limits of this module.
     MissingDependencyError
         h5py is not installed.
     """
@@ -85,17 +85,17 @@ def read_fclib(path: Path | str) -> StoredProblem:
         raise
     except IapbError as error:
         raise DatasetError(path, str(error)) from error
-    except Exception as error:  # HDF5, but made by something else or damaged: can fail anywhere, with anything
+    except Exception as error:  # a damaged or foreign HDF5 file can raise any exception
         raise DatasetError(path, f"cannot be read: {' '.join(str(error).split())}") from error
 
 
 def write_fclib(
     path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None
 ) -> None:
-    """Write a problem (and its solution) as fclib_local; W is stored in full as compressed rows.
+    """Write a problem (and its solution) as fclib_local; W is stored as compressed rows.
 
-    A frictionless problem is written with two zero tangential components per contact and mu = 0. A restitution
-    is written into q, which FCLIB's law needs; reading back gives the same complementarity problem with e = 0.
+    A frictionless problem is written with two zero tangential components per contact and mu = 0. Restitution is
+    included in q, because FCLIB has no e; reading the file gives the same complementarity problem with e = 0.
     """
     h5py = _h5py()
     w, q, r, size = _three_components(problem, impulse)
@@ -138,7 +138,7 @@ def _read_global(path: Path, group: Any) -> ImpactProblem:
     if not w.any() and len(f) <= WITH_MECHANICS:
         dense, rows = mass.toarray(), h.T.toarray()
         return ImpactProblem.from_impact(dense, rows, free, 0.0, mu, contact_size=size, name=path.name)
-    # the constant w has no velocity of its own, and a large dense M no room: W and q only
+    # w ≠ 0 has no generalized velocity, and a large dense M needs too much memory: return W and q only
     delassus = np.hstack([h.T @ factors.solve(h[:, k : k + _BLOCK].toarray()) for k in range(0, len(w), _BLOCK)]
                          or [np.zeros((0, 0))])  # fmt: skip
     return ImpactProblem.from_delassus(delassus, h.T @ free + w, 0.0, mu, contact_size=size, name=path.name)
@@ -158,7 +158,7 @@ def _vector(path: Path, group: Any, name: str) -> Floats:
 
 
 def _numbers(path: Path, group: Any, name: str, kinds: str) -> NDArray[Any]:
-    """Return a dataset of real numbers as a vector; looked at before it is read, since its header may say anything."""
+    """Return a dataset of real numbers as a vector; its header is checked before it is read."""
     dataset = group[name]
     if not hasattr(dataset, "dtype") or dataset.dtype.kind not in kinds or dataset.shape is None:
         raise DatasetError(path, f"{name} is no dataset of {'whole ' if kinds == 'iu' else ''}numbers")
@@ -182,7 +182,7 @@ def _string(group: Any, name: str) -> str:
 
 
 def _matrix(path: Path, group: Any, name: str) -> Any:
-    """Return a CXSparse matrix as a sparse one of compressed columns."""
+    """Return a CXSparse matrix as a sparse matrix of compressed columns."""
     from scipy import sparse
 
     m, n, nz = (_whole(path, group, key) for key in ("m", "n", "nz"))
@@ -205,13 +205,13 @@ def _stored_impulse(path: Path, file: Any, size: int) -> Floats | None:
     if "solution/r" not in file:
         return None
     r = _vector(path, file, "solution/r")
-    return r if r.any() and len(r) == size else None  # all zeros: a placeholder, never a reference
+    return r if r.any() and len(r) == size else None  # zeros are a placeholder, not a solution
 
 
 def _three_components(
     problem: ImpactProblem, impulse: Floats | None
 ) -> tuple[Floats, Floats, Floats | None, int]:
-    """W, q, r and components per contact in FCLIB's layout, which knows 2 or 3 components only."""
+    """Return W, q, r and the number of components per contact in FCLIB's layout, which has 2 or 3 components."""
     if problem.relaxed:
         raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
     if problem.contact_size > 1:

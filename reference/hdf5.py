@@ -1,4 +1,4 @@
-"""HDF5 files from other people: what leads out of a file is refused before anything is read."""
+"""Safety of HDF5 files from other people: references to other files are found before any data is read."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ _HARD = 0
 
 
 def leads_out(file: Any) -> str:
-    """Return what in an open HDF5 file leads elsewhere, by its name; "" where the file holds everything itself.
+    """Return text on the first item of an open HDF5 file that refers elsewhere; "" if the file is self-contained.
 
-    HDF5 can name other files as links, as the storage of a dataset, or as parts of a virtual dataset, and opens them
-    without asking: a file could so show the contents of any other that its reader may read.
+    HDF5 can refer to other files by links, as storage of a dataset, or as parts of a virtual dataset, and it opens them
+    without asking. A malicious file could thereby show the content of any file that the user may read.
     """
     import h5py
 

@@ -1,7 +1,7 @@
-"""BLAS on one thread, for whatever solves many small systems: laws at every step, timings, sweeps.
+"""Run BLAS on one thread for code that solves many small systems: laws at every step, timings, sweeps.
 
-OpenBLAS hands even 12 unknowns to a pool of threads; where other processes hold the cores, each product waits for
-them: the rigid world then took four times as long with four busy neighbours on two cores, and more with more.
+OpenBLAS uses a pool of threads even for 12 unknowns. If other processes occupy the cores, each product waits for the
+pool: with four busy processes on two cores, the rigid world took four times as long, and longer with more processes.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ _limited: ContextVar[bool] = ContextVar("_limited", default=False)
 
 @cache
 def _controller() -> Any:
-    """Made once: asking which BLAS libraries are loaded takes a millisecond, setting their limit 30 µs."""
-    import numpy.linalg  # noqa: F401 - numpy and scipy bring a BLAS each, known only once it is loaded
+    """Return the controller, made once: finding the loaded BLAS libraries takes 1 ms, setting their limit 30 µs."""
+    import numpy.linalg  # noqa: F401 - numpy and scipy bring a BLAS each, which is found only after it is loaded
 
     needed("scipy.linalg", "A reference")
     return needed("threadpoolctl", "A reference").ThreadpoolController()
@@ -28,7 +28,7 @@ def _controller() -> Any:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limit the BLAS of numpy and of scipy to one thread; inside another such block this costs nothing."""
+    """Limit the BLAS of numpy and of scipy to one thread; a nested block does nothing."""
     if _limited.get():
         yield
         return

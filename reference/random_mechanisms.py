@@ -1,4 +1,4 @@
-"""Random trees of rigid bodies and random states, from a seed: what comparisons and properties run over."""
+"""Random trees of rigid bodies and random states from a seed, for comparisons and property tests."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from iapb.mechanics.mechanism import Body, Joint, Mechanism
 
 Floats = NDArray[np.float64]
 
-# Masses [kg] and radii of gyration [m] span these decades; a flat or rod-like body has a nearly singular
-# inertia: a principal moment down to this share of the largest.
+# Masses [kg] and radii of gyration [m] span these decades. A flat or rod-like body has a nearly singular inertia:
+# its second moments of mass go down to this share.
 MASS_DECADES = (-3.0, 2.0)
 GYRATION_DECADES = (-2.0, 0.0)
 THINNEST = 1e-9
@@ -27,7 +27,7 @@ def random_rotation(rng: np.random.Generator) -> Floats:
 def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
     """Return a physical inertia (3, 3) about the centre of mass, sometimes nearly singular.
 
-    Made from second moments of mass s >= 0: principal moments s_y + s_z, s_z + s_x, s_x + s_y.
+    It is made from second moments of mass s >= 0, with principal moments s_y + s_z, s_z + s_x and s_x + s_y.
     """
     gyration = 10.0 ** rng.uniform(*GYRATION_DECADES)
     second = mass * gyration**2 * np.where(rng.random(3) < 0.3, THINNEST, rng.random(3))
@@ -37,7 +37,7 @@ def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
 
 
 def random_body(rng: np.random.Generator, name: str, parent: str | None, kind: str) -> Body:
-    """Return a body on a joint of that kind, everything else random."""
+    """Return a random body on a joint of the given kind."""
     mass = 10.0 ** rng.uniform(*MASS_DECADES)
     x, y, z = (float(entry) for entry in rng.normal(size=3))
     return Body(
@@ -54,7 +54,7 @@ def random_body(rng: np.random.Generator, name: str, parent: str | None, kind: s
 def random_mechanism(
     rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
 ) -> Mechanism:
-    """Return trees of `joints` bodies each, depth first, from long chains to bushes, of the joint kinds given."""
+    """Return trees of `joints` bodies each, in depth-first order, from chains to bushy trees; `kinds` are the joints."""
     bodies: list[Body] = []
     for tree in range(trees):
         chain: list[str] = []  # from the root to the newest body

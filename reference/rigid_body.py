@@ -1,7 +1,7 @@
-"""Rigid-body dynamics by Pinocchio: the mechanics of the rigid worlds, and for comparison with the engine's own.
+"""Rigid-body dynamics by Pinocchio, for the rigid worlds and for comparison with the engine.
 
-A Pinocchio model comes from a Mechanism (`model_of`) or, independently of the engine's reading, from the URDF
-file by Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` answers in the engine's conventions.
+A Pinocchio model is made from a Mechanism (`model_of`) or, independently of the engine's reader, from a URDF file by
+Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` uses the engine's conventions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from iapb.mechanics.mechanism import Body, Mechanism
 
 Floats = NDArray[np.float64]
 
-# Step [s] of the differences of fourth order: truncation (h ω)⁴ω/480 and rounding stay below 1e-11 up to 10 rad/s.
+# Step [s] of the fourth-order differences: truncation (h ω)⁴ω/480 and rounding stay below 1e-11 up to 10 rad/s.
 _RATE_STEP = 1e-3
 
 
@@ -33,12 +33,12 @@ def _pinocchio() -> ModuleType:
 
 
 class PinocchioMechanism:
-    """A Pinocchio model behind the engine's vocabulary (same q, v, shapes, units and axes as `Mechanism`).
+    """A Pinocchio model with the engine's interface (same q, v, shapes, units and axes as `Mechanism`).
 
     Parameters
     ----------
     model : pinocchio.Model
-        With one body frame per body, of the body's name.
+        It has one body frame per body, with the body's name.
     """
 
     def __init__(self, model: Any) -> None:
@@ -48,21 +48,21 @@ class PinocchioMechanism:
         self._below = np.tril_indices(self.nv, -1)
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
+        """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
         mass = np.array(_pinocchio().crba(self.model, self.data, q))
         mass[self._below] = mass.T[self._below]
         return mass
 
     def bias(self, q: Floats, v: Floats) -> Floats:
-        """B(q, v) (d,) without gravity."""
+        """Return B(q, v) (d,) without gravity."""
         return self._under((0.0, 0.0, 0.0), q, v, np.zeros(self.nv))
 
     def gravity(self, q: Floats, g: ArrayLike) -> Floats:
-        """G(q) (d,) for the field g (3,) [m/s^2]."""
+        """Return G(q) (d,) for the gravity field g (3,) [m/s^2]."""
         return self._under(g, q, np.zeros(self.nv), np.zeros(self.nv))
 
     def inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, g: ArrayLike) -> Floats:
-        """tau = M dv + B + G (d,)."""
+        """Return tau = M dv + B + G (d,)."""
         return self._under(g, q, v, dv)
 
     def _under(self, g: ArrayLike, q: Floats, v: Floats, dv: Floats) -> Floats:
@@ -70,7 +70,7 @@ class PinocchioMechanism:
         return np.array(_pinocchio().rnea(self.model, self.data, q, v, dv))
 
     def frame_jacobian(self, q: Floats, body: str) -> Floats:
-        """J (6, d) of the body's origin and of its turning, world axes."""
+        """Return J (6, d) of the body's linear velocity at its origin and angular velocity, in world axes."""
         pinocchio = _pinocchio()
         jacobian = pinocchio.computeFrameJacobian(
             self.model, self.data, q, self._frame(body), pinocchio.LOCAL_WORLD_ALIGNED
@@ -78,24 +78,24 @@ class PinocchioMechanism:
         return np.array(jacobian).reshape(6, self.nv)  # one column comes as a vector
 
     def point_jacobian(self, q: Floats, body: str, point: Floats) -> Floats:
-        """J (3, d) of a world point fixed to the body: v_origin + omega x (point - origin)."""
+        """Return J (3, d) of a world point fixed to the body: v_origin + omega x (point - origin)."""
         jacobian = self.frame_jacobian(q, body)
         x, y, z = point - self.placement(q, body)[1]
         across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         return jacobian[:3] - across @ jacobian[3:]
 
     def placement(self, q: Floats, body: str) -> tuple[Floats, Floats]:
-        """Axes (3, 3) and origin (3,) [m] of a body in the world."""
+        """Return axes (3, 3) and origin (3,) [m] of a body in the world."""
         _pinocchio().framesForwardKinematics(self.model, self.data, q)
         frame = self.data.oMf[self._frame(body)]
         return np.array(frame.rotation), np.array(frame.translation)
 
     def inner_forces(self, q: Floats, v: Floats, g: ArrayLike) -> Floats:
-        """B + G (d,)."""
+        """Return B + G (d,)."""
         return self._under(g, q, v, np.zeros(self.nv))
 
     def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
-        """Axes (n + 1, 3, 3), origins (n + 1, 3), frame Jacobians (n + 1, 6, d) of n bodies, and last of the world."""
+        """Return axes (n + 1, 3, 3), origins (n + 1, 3), Jacobians (n + 1, 6, d) of n bodies and, last, the world."""
         pinocchio, frames = _pinocchio(), self.model.frames
         pinocchio.computeJointJacobians(self.model, self.data, q)
         pinocchio.updateFramePlacements(self.model, self.data)
@@ -114,24 +114,24 @@ class PinocchioMechanism:
         return axes, origins, rows
 
     def kinetic_energy(self, q: Floats, v: Floats) -> float:
-        """Kinetic energy [J]."""
+        """Return the kinetic energy [J]."""
         return float(_pinocchio().computeKineticEnergy(self.model, self.data, q, v))
 
     def potential_energy(self, q: Floats, g: ArrayLike) -> float:
-        """Potential energy [J] of the bodies that can move."""
+        """Return the potential energy [J] of the bodies that can move."""
         self.model.gravity.linear = np.array(g, dtype=np.float64)
         return float(_pinocchio().computePotentialEnergy(self.model, self.data, q))
 
     def centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        """Momentum and angular momentum about the centre of mass (6,) [N s, N m s]."""
+        """Return momentum and angular momentum about the centre of mass (6,) [N s, N m s]."""
         return np.array(_pinocchio().computeCentroidalMomentum(self.model, self.data, q, v).vector)
 
     def integrate(self, q: Floats, v: Floats, dt: float) -> Floats:
-        """Configuration (nq,) after dt [s] with constant v."""
+        """Return the configuration (nq,) after dt [s] with constant v."""
         return np.array(_pinocchio().integrate(self.model, q, v * dt))
 
     def difference(self, q0: Floats, q1: Floats) -> Floats:
-        """The velocity (d,) that leads from q0 to q1 in unit time."""
+        """Return the velocity (d,) that leads from q0 to q1 in unit time."""
         return np.array(_pinocchio().difference(self.model, q0, q1))
 
     def normalize(self, q: Floats) -> Floats:
@@ -139,7 +139,7 @@ class PinocchioMechanism:
         return np.array(_pinocchio().normalize(self.model, q))
 
     def rate(self, q: Floats, v: Floats) -> Floats:
-        """dq/dt (nq,) of a motion with velocity v (d,) through q: v itself where coordinates may be added."""
+        """Return dq/dt (nq,) of a motion with velocity v (d,) through q; this is v itself if nq = d."""
         if self.nq == self.nv:
             return v
         near, far = ((self.integrate(q, v, h) - self.integrate(q, v, -h)) / (2.0 * h)
@@ -147,12 +147,12 @@ class PinocchioMechanism:
         return np.asarray((4.0 * near - far) / 3.0)
 
     def impulse_dynamics(self, q: Floats, v: Floats, contact_jacobian: Floats, restitution: float) -> Floats:
-        """v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""
+        """Return v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""
         run = _pinocchio().impulseDynamics
         return np.array(run(self.model, self.data, q, v, contact_jacobian, restitution, 0.0))
 
     def calls(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
-        """Pinocchio's own q -> M and (q, v) -> B + G, bound to the model and nothing more: for timing."""
+        """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to the model, for timing."""
         pinocchio = _pinocchio()
         return (
             partial(pinocchio.crba, self.model, self.data),
@@ -176,12 +176,12 @@ def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioM
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:
     """Build the same mechanism in Pinocchio.
 
-    A fixed body becomes a frame, its inertia part of the body it is fixed to; a planar joint becomes three.
+    A fixed body becomes a frame, and its inertia is added to its parent body. A planar joint becomes three joints.
 
     Raises
     ------
     ArgumentError
-        Bodies not depth first: Pinocchio would silently give wrong results.
+        The bodies are not in depth-first order, for which Pinocchio would silently give wrong results.
     """
     _check_depth_first(mechanism)
     pinocchio = _pinocchio()
@@ -201,14 +201,14 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
 
 
 def _frame_along(axis: Floats) -> Floats:
-    """Return a rotation (3, 3) whose z axis is the given one, exact to rounding for every direction."""
+    """Return a rotation (3, 3) with the given z axis, accurate to rounding for every direction."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
     x /= np.linalg.norm(x)
     return np.column_stack((x, np.cross(axis, x), axis))
 
 
 def _check_depth_first(mechanism: Mechanism) -> None:
-    """Each body's parent must be the body before it, or carry that one."""
+    """Check that each body's parent is the body before it or one of that body's ancestors."""
     open_chain: list[str] = []
     for body in mechanism.bodies:
         while open_chain and open_chain[-1] != body.parent:
@@ -219,9 +219,9 @@ def _check_depth_first(mechanism: Mechanism) -> None:
 
 
 def _joint_models(pinocchio: ModuleType, body: Body) -> list[tuple[Any, Any]]:
-    """Return the Pinocchio joints, in a chain, that make the body's joint, each with a turn before it.
+    """Return the chain of Pinocchio joints that forms the body's joint, each with a rotation before it.
 
-    The turn is undone behind the joint: Pinocchio's unbounded joint turns about z, wherever our axis points.
+    The rotation is undone after the joint. It is needed because Pinocchio's unbounded joint always rotates about z.
     """
     kind, axis, straight = body.joint.kind, body.joint.unit_axis, pinocchio.SE3.Identity()
     if kind == "fixed":
@@ -248,9 +248,9 @@ def impulse_dynamics(
 ) -> Floats:
     """Return v after an impact (d,) by Pinocchio's `impulseDynamics` for any mass matrix.
 
-    The function takes a model; a serial chain of d joints has a full M, which is then overwritten by ours.
-    It factors M, forms the Delassus matrix J M^-1 J^T and factors that: rows must be independent, and
-    the error grows with the square of the condition number of A = J L^-T.
+    `impulseDynamics` takes a model, so the model here is a serial chain of d joints whose M is overwritten. It factors
+    M, forms the Delassus matrix J M^-1 J^T and factors that. So rows must be independent, and the error grows
+    with the square of the condition number of A = J L^-T.
 
     Parameters
     ----------

@@ -1,30 +1,30 @@
-"""One step with rigid contacts at velocity level: a QP, or two where the law of restitution is Poisson's.
+"""One step with rigid contacts at velocity level: one QP, or two with Poisson's law of restitution.
 
 One step of length dt from velocity v, with generalized force f and contact rows J:
 
     v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the multipliers,
 
-    b_i = −gap_i/dt         open contact (gap > 0) that may close, not pass (Stewart-Trinkle, Anitescu)
-    b_i = −inf              open contact that is left alone (Moreau): nothing happens before it closes
+    b_i = −gap_i/dt         open contact (gap > 0) that may close but not penetrate (Stewart-Trinkle, Anitescu)
+    b_i = −inf              open contact without constraint (Moreau): it acts only after it closes
     b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in Poisson's step
-    b_i = 0                 closed contact that does not; `stabilization` adds a share of −gap_i/dt where gap < 0
+    b_i = 0                 closed contact that does not approach; with `stabilization`, a share of −gap_i/dt if gap < 0
 
-Poisson's step adds e p to the contacts that approached, and solves once more with the same b: it has a solution where
-Newton's law has none (closed contacts that face each other, e > 0). Each contact may have its own e_i.
+Poisson's step adds the impulses e p at the contacts that approached, and solves once more with the same b. It has a
+solution also if Newton's law has none (opposed closed contacts with e > 0). Each contact may have its own e_i.
 
-Newton's step can gain energy, and not only where the e_i differ: with one e for all, the rows that approach get
-J v⁺ = −e J v⁻ but those that separate J v⁺ >= 0, which is another e. A bar of 1 kg, one end falling at 1 m/s and the
-other rising at 0.1 m/s on closed contacts, e = 1: p = (0.65, 0.3) N s, and the end held at rest pays for 0.015 J. The
-contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) with the forces before them; where e > 0 and both are
-positive, the step is Poisson's too, which never gains.
+Newton's step can gain energy, even with equal e_i: approaching rows get J v⁺ = −e J v⁻, but separating rows get
+J v⁺ >= 0, which amounts to a different e. Example: a bar of 1 kg on two closed contacts with e = 1, one end falling at
+1 m/s and the other rising at 0.1 m/s. Then p = (0.65, 0.3) N s, and the impulse on the other end, which comes to rest, adds 0.015 J.
+The contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) after the forces. If e > 0 and both are positive,
+Poisson's step is used, which never gains energy.
 Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
 (1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
 
 With dry friction (`friction_step`) the step's contacts are blocks (normal, one tangent in the plane or two in space):
 K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w is J v⁺ − b on the normals and the tangential velocity after the step; `relaxed`
-drops mu |w_T| (Anitescu). Contacts that the others' impulses do not make close are left out: solve for those that
-close, see which of the rest the answer closes, and solve again with them. The last answer solves the whole problem.
-Contacts that no common body ties together (zero blocks of W) are problems of their own: islands.
+drops mu |w_T| (Anitescu). The problem is first solved for the closing contacts alone. Contacts that close under this
+solution are then added, and it is solved again; the last solution solves the whole problem. Contacts without a common
+body (zero blocks of W) form separate problems, the islands.
 Source: Stewart and Trinkle (1996); Anitescu and Tasora, Comput. Optim. Appl. 47 (2010).
 """
 
@@ -44,30 +44,30 @@ from reference.complementarity.solvers import daqp_qp, gauss_seidel, quadprog_qp
 
 Floats = NDArray[np.float64]
 
-# Active-set answers carry a few hundred roundings of the velocities involved; anything above is a wrong active set.
+# Active-set solutions have errors of a few hundred roundings of the velocities; a larger error means a wrong set.
 STEP_TOLERANCE = 1e-10
-# Velocities that cancel leave their rounding, however exact the active set: a box of 1 g that carries a tonne gets
-# 250 m/s from above and as much from below. Sums of some dozens of products each.
+# Velocities that cancel leave rounding errors even with the right active set: a box of 1 g under a tonne gets 250 m/s
+# from above and as much from below. Each is a sum of some dozens of products.
 STEP_ROUNDING = 100.0 * float(np.finfo(np.float64).eps)
 
 SCHEMES = ("automatic", "moreau", "stewart-trinkle")
 NEWTON, POISSON = "Newton", "Poisson"
 
 FRICTION_LAWS = ("none", "coulomb", "relaxed")
-# Gauss-Seidel ends at 1e-13 of the velocities where it converges: such an answer is taken at once. On hyperstatic
-# contacts it creeps, and an interior point ends at the root of its own accuracy: then the best of them is taken,
-# down to what `reference.complementarity` calls solved.
+# Gauss-Seidel reaches 1e-13 of the velocities if it converges; such a solution is accepted at once. On hyperstatic
+# contacts it converges slowly, and an interior point stops at the square root of its accuracy. Then the best solution
+# is accepted if it reaches the tolerance of `reference.complementarity`.
 CONVERGED, FRICTION_TOLERANCE = 1e-8, SOLVED_TOLERANCE
 FRICTION_SOLVERS = ("nsgs", "pinocchio_admm", "cvxpy_socp")
 
 
 class RigidStep(NamedTuple):
-    """Outcome of one rigid step.
+    """Result of one rigid step.
 
     velocity : (d,) v⁺
-    impulse : (c,) p >= 0 [N s], zeros for contacts left out; not unique where contacts are redundant
-    residual : natural-map residual of the step's LCP, recomputed, relative to the velocities involved
-    restitution_law : "Newton" or "Poisson", whichever the step obeys
+    impulse : (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
+    residual : recomputed natural-map residual of the step's LCP, relative to the velocities involved
+    restitution_law : "Newton" or "Poisson", the law that the step used
     """
 
     velocity: Floats
@@ -94,17 +94,17 @@ def rigid_step(
     ----------
     contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
     restitution : e in [0, 1], one for all contacts or (c,)
-    stabilization : share in [0, 1] of an overlap that is removed in this step (0: none, as Moreau's step)
-    scheme : "moreau" leaves open contacts alone; "stewart-trinkle" keeps them from passing, by Poisson's law where
-        e > 0; "automatic" treats an open contact as Stewart-Trinkle's step where its e = 0 and as Moreau's where e > 0
+    stabilization : share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's step)
+    scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with Poisson's law if
+        e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its e = 0 and as Moreau's if e > 0
 
-    Where Newton's law has no solution (closed contacts that face each other, e > 0), or would gain energy, the step is
-    Poisson's, and says so.
+    If Newton's law has no solution (opposed closed contacts with e > 0) or would gain energy, the step uses Poisson's
+    law, and `restitution_law` says so.
 
     Raises
     ------
     SolverError
-        where no solver reaches a residual of STEP_TOLERANCE; says with how many contacts, and what each solver said
+        No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and each solver's text.
     """
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
     v_free = velocity + dt * solve_mass(mass_matrix, force)
@@ -116,7 +116,7 @@ def rigid_step(
             if not np.any(restitution) or np.count_nonzero(gap <= 0.0) < 2:
                 raise
         else:
-            # With e = 0 it is a projection that v = 0 satisfies: nothing to gain.
+            # With e = 0 the step is a projection onto a set with v = 0, so it cannot gain energy.
             if not np.any(restitution) or not _gains(newton, contact_jacobian, gamma_minus, v_free):
                 return newton
     compression = velocity_bounds(gap, gamma_minus, 0.0, dt, 0.0 if not poisson else stabilization, scheme)
@@ -126,9 +126,10 @@ def rigid_step(
 
 
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
-    """Whether the contacts did work, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), above the rounding of its terms.
+    """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive beyond rounding.
 
-    The scale knows the load as well: at rest γ⁻ is rounding of either sign, which must not make the load bounce.
+    The scale includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign, which must not
+    trigger a bounce.
     """
     gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
     size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
@@ -139,7 +140,7 @@ def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_fre
 def poisson_step(
     mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats, restitution: Floats
 ) -> RigidStep:
-    """Compress to J v >= b, return e_i of each impulse (c,), and keep J v >= b once more."""
+    """Compress to J v >= b, add e_i times each impulse (c,), and project onto J v >= b once more."""
     compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
     returned = restitution * compressed.impulse
     bounced = compressed.velocity + solve_mass(mass_matrix, contact_jacobian.T @ returned)
@@ -151,10 +152,10 @@ def poisson_step(
 def nearest_velocity(
     mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
 ) -> RigidStep:
-    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf leaves a row out."""
+    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a row."""
     impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
-    if (offset >= 0.0).all():  # nothing is touched: the common step of free motion
+    if (offset >= 0.0).all():  # no contact acts: the common step of free motion
         return RigidStep(v_free, impulse, 0.0)
     factor = _cholesky(mass_matrix)
     rows = _whitened(factor, contact_jacobian[kept])
@@ -164,14 +165,14 @@ def nearest_velocity(
 
 
 def solve_mass(mass_matrix: Floats, right: Floats) -> Floats:
-    """M⁻¹ b for one vector b (d,)."""
+    """Return M⁻¹ b for one vector b (d,)."""
     factor = _cholesky(mass_matrix)
     return np.asarray(_back(factor, _whitened(factor, right[None])[0]))
 
 
 @numba.njit(cache=True, fastmath=False)
 def _cholesky(mass):  # type: ignore[no-untyped-def]
-    """Lower L of M = L Lᵀ; a step is so small that numpy's calls, not LAPACK, would take the time."""
+    """Return the lower L of M = L Lᵀ; for such small matrices, numpy's call overhead would dominate."""
     factor = np.zeros_like(mass)
     for j in range(len(mass)):
         for i in range(j, len(mass)):
@@ -189,7 +190,7 @@ def _cholesky(mass):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _whitened(factor, rows):  # type: ignore[no-untyped-def]
-    """Rows J L⁻ᵀ."""
+    """Return the rows J L⁻ᵀ."""
     found = np.empty(rows.shape)
     for c in range(len(rows)):
         for i in range(len(factor)):
@@ -202,7 +203,7 @@ def _whitened(factor, rows):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _back(factor, right):  # type: ignore[no-untyped-def]
-    """L⁻ᵀ b."""
+    """Return L⁻ᵀ b."""
     found = np.empty(len(right))
     for i in range(len(right) - 1, -1, -1):
         rest = right[i]
@@ -216,7 +217,7 @@ def velocity_bounds(
     gap: Floats, gamma_minus: Floats, restitution: float | Floats, dt: float, stabilization: float = 0.0,
     scheme: str = "automatic",
 ) -> Floats:
-    """Return b (c,) of J v⁺ >= b [m/s], e one or (c,); −inf marks contacts that the step leaves out."""
+    """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step ignores."""
     e = np.asarray(restitution, np.float64)
     if not ((e >= 0.0) & (e <= 1.0)).all() or e.shape not in ((), gap.shape):
         raise ArgumentError("restitution", restitution, "values in [0, 1], one for all or one for each contact")
@@ -233,9 +234,9 @@ def velocity_bounds(
 
 
 def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
-    """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE, or rounding."""
+    """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE or rounding level."""
     said: list[str] = []
-    for solver in (daqp_qp, quadprog_qp, gauss_seidel):  # active sets cycle on some redundant rows, projections do not
+    for solver in (daqp_qp, quadprog_qp, gauss_seidel):  # active sets cycle for some redundant rows, projections do not
         if solver is gauss_seidel and "infeasible" in said[0]:
             continue
         try:
@@ -251,13 +252,13 @@ def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, flo
 
 
 def _cancelling(rows: Floats, impulse: Floats) -> float:
-    """Largest sum of |A| |Aᵀ| |p| [m/s] from which the A Aᵀ p of a contact is left."""
+    """Return the largest entry of |A| |Aᵀ| |p| [m/s], the size of the terms that cancel in A Aᵀ p."""
     sizes = np.abs(rows)
     return float((sizes @ (sizes.T @ np.abs(impulse))).max(initial=0.0))
 
 
 def step_residual(rows: Floats, offset: Floats, impulse: Floats) -> float:
-    """Largest |min(W_ii p_i, w_i)| [m/s] of  0 <= p ⟂ w = A Aᵀ p + offset >= 0; infinite where p is not finite."""
+    """Return the largest |min(W_ii p_i, w_i)| [m/s] of  0 <= p ⟂ w = A Aᵀ p + offset >= 0; inf if p is not finite."""
     if not np.isfinite(impulse).all():
         return np.inf
     w = rows @ (rows.T @ impulse) + offset
@@ -279,13 +280,13 @@ def friction_step(
     Parameters
     ----------
     normal_rows : (c, d) unit-normal rows; tangent_rows : (c, s, d) rows of s = 1 (plane) or 2 (space) unit tangents
-    bound : (c,) of the normal velocities after the step [m/s]; −inf leaves a contact out
+    bound : (c,) lower bounds of the normal velocities after the step [m/s]; −inf ignores a contact
     friction : mu >= 0, one for all contacts or (c,)
 
     Raises
     ------
     SolverError
-        where no solver reaches FRICTION_TOLERANCE; says with how many contacts, and what each solver said
+        No solver reaches FRICTION_TOLERANCE; the message gives the number of contacts and each solver's text.
     """
     count, size = tangent_rows.shape[0], 1 + tangent_rows.shape[1]
     mu = np.broadcast_to(np.asarray(friction, np.float64), count)
@@ -321,7 +322,7 @@ def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> F
 
 
 def _solve_friction(problem: ImpactProblem) -> Floats:
-    """Return p (n,) from the first solver that converges, or the best that reaches FRICTION_TOLERANCE."""
+    """Return p (n,) of the first solver that converges, else the best one if it reaches FRICTION_TOLERANCE."""
     found: list[Solution] = []
     for solver in FRICTION_SOLVERS:
         found.append(solve(problem, solver))

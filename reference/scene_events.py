@@ -1,26 +1,27 @@
-"""Event-driven truth for the project's scenes: smooth motion by a high-order integrator, events found by its roots.
+"""Event-driven reference motion of scenes: smooth motion by a high-order integrator, events by root finding.
 
-Between events M a = f − B − G + Jᵀλ with the lasting contacts held (J a + J̇v = 0); an event is a gap that closes or a
-lasting contact that lets go. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling
-the device moves along (paper section VI): its forces are continuous here, and an impulse on the tool is one on the
-device at the same instant. This is what the "ideal" world's steps must converge to. Configurations with quaternions or
-(cos, sin) move by their rate dq/dt, and are brought back to length one wherever they are looked at.
+Between events M a = f − B − G + Jᵀλ, with lasting contacts kept closed (J a + J̇v = 0). An event is a gap that closes or
+a lasting contact that opens. All closed contacts take part in an impact by the Newton LCP. With a four-channel coupling
+the device is integrated too (paper section VI): its forces are continuous here, and an impulse on the tool acts on the
+device at the same instant. The steps of the "ideal" world must converge to this motion. Configurations with quaternions
+or (cos, sin) are integrated by their rate dq/dt and normalised before each use.
 
-What decides, so that rounding does not (`Tolerances` has the sizes):
+These rules keep rounding from making decisions (`Tolerances` has the values):
 
-- A contact is *closed* where its gap is at most `closed`, and *strikes* where it approaches faster than `at_rest`.
-- A closed contact *lasts* where the complementary acceleration keeps it closed (a of 0 <= λ ⟂ J a + J̇v >= 0 over the
-  contacts at rest), whether it pushes or not. A redundant or unloaded contact lasts like any other: no single λ counts.
-- *Chatter and Zeno*: a contact that leaves too slowly to rise by BOUNCE before it returns lasts too: its velocity is
-  set to zero. So bounces that shrink end after finitely many.
-- A contact *lets go* where the complementary acceleration would open it by more than `released` of those at hand.
-- A contact that *grazes*, so that no velocity jumps and no contact begins or ceases to last, is no event.
-- A contact that has just opened may close again only once it was open by twice `closed`, or overlaps by `closed`.
+- A contact is *closed* if its gap is at most `closed`, and *strikes* if it approaches faster than `at_rest`.
+- A closed contact *lasts* if the complementary acceleration keeps it closed (a of 0 <= λ ⟂ J a + J̇v >= 0 over the
+  contacts at rest), with or without force. Single λ do not count, so redundant and unloaded contacts last as well.
+- *Chatter and Zeno*: a contact that separates too slowly to rise by BOUNCE also lasts, and its velocity is set to zero.
+  So a sequence of shrinking bounces is finite.
+- A contact *lets go* if the complementary acceleration would open it by more than the share `released` of the
+  accelerations involved.
+- A contact that *grazes* is no event: no velocity jumps, and no contact starts or stops to last.
+- A contact that has just opened may close again only after its gap was twice `closed`, or if it overlaps by `closed`.
 
-Every truth is computed three times, with decisions three times finer and coarser (BOUNCE alone is the same) and with
-other steps. Where the events differ in number, a decision hangs on a tolerance, and there is no truth: the error says
-so. Otherwise the largest differences, and what the neglected bounces would have moved, are the truth's `bound`: an
-estimate, not a certified enclosure.
+Every motion is computed three times: with the tolerances, with three times smaller ones and with three times larger
+ones (BOUNCE is the same), and with different steps. If the numbers of events differ, a decision depends on a tolerance,
+and an error says that there is no reference. Otherwise the largest differences, plus the neglected displacement of
+bounces, are the `bound` of the result. It is an estimate, not a certified enclosure.
 """
 
 from __future__ import annotations
@@ -47,12 +48,12 @@ Contact = tuple[int, int, int]
 
 
 class Tolerances(NamedTuple):
-    """What a computation decides by.
+    """Tolerances of one computation.
 
-    accuracy : asked of the integrator, far below the steps' errors (1e-3 to 1e-6)
-    closed : gap [m] of a closed contact: scenes place touching shapes to 1e-9, a root of the integrator errs by 1e-11
-    at_rest : normal velocity [m/s] of a contact at rest: the integrator's error, a factor of a hundred kept
-    released : share of the accelerations; so little a force changes no speed by more than that share
+    accuracy : tolerance of the integrator, far below the errors of time stepping (1e-3 to 1e-6)
+    closed : largest gap [m] of a closed contact: scenes place touching shapes to 1e-9, and event roots err by 1e-11
+    at_rest : largest normal velocity [m/s] of a contact at rest: a hundred times the integrator's error
+    released : share of the accelerations below which an acceleration counts as zero
     steps : least number of steps in the whole duration
     """
 
@@ -68,20 +69,20 @@ COMPUTATIONS = (
     Tolerances(1e-11, 3e-9, 3e-10, 3e-9, 31),
     Tolerances(1e-10, 3e-8, 3e-9, 3e-8, 23),
 )
-BOUNCE = 1e-7  # height [m] of a bounce that is none; above twice every `closed`, so that other bounces do open
-_KEPT = 0.1  # of `released`, by which a contact opens when an event decides: what has let go does not begin to last
+BOUNCE = 1e-7  # largest height [m] of a neglected bounce; above twice every `closed`, so that other bounces open
+_KEPT = 0.1  # of `released`: threshold right after an event, lower so that a contact that let go does not last again
 _DEPENDENT = 1e-9  # singular value, relative to the largest, below which held rows depend on one another
-_DIFFERENCE = 1e-4  # step [s] of the differences of fourth order for J̇v: rounding and truncation both near 1e-12
+_DIFFERENCE = 1e-4  # step [s] of the fourth-order differences for J̇v: rounding and truncation are both near 1e-12
 _COMPARED = 11  # instants between two events at which computations are compared
-_AT_ONCE = 100  # impacts at one instant: Newton's law can leave contacts that approach, for the next one
+_AT_ONCE = 100  # most impacts at one instant: Newton's law can leave contacts that approach
 
 
 class Bound(NamedTuple):
-    """What the truth is worth: the largest differences between the computations, and the integrator's accuracy.
+    """Error estimate of the motion: the largest differences between the computations plus the integrator's accuracy.
 
-    position : of q over time, with the widest gap that an impact took for closed and the bounces neglected [m, rad]
-    velocity : of v between events of the same number; bounces neglected by their mean over time [m/s, rad/s]
-    instant : of the events' times [s]
+    position : error of q, plus the largest gap that counted as closed and the neglected bounces [m, rad]
+    velocity : error of v between equal events, plus the neglected bounces averaged over time [m/s, rad/s]
+    instant : error of the event times [s]
     """
 
     position: float
@@ -91,11 +92,11 @@ class Bound(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneTruth:
-    """The motion: v and q by time, the instants of its events, and what it is worth.
+    """The motion: q and v over time, the instants of its events, and its error estimate.
 
     segments : (start, stop, solution) with solution(t) -> (q, v, device q, device v)
     coordinates, velocities : lengths of q and v
-    bound : of the errors
+    bound : estimate of the errors
     """
 
     coordinates: int
@@ -106,11 +107,11 @@ class SceneTruth:
 
     @property
     def end(self) -> float:
-        """Time up to which it is known [s]."""
+        """Time up to which the motion is known [s]."""
         return self.segments[-1][1]
 
     def state(self, time: Floats) -> tuple[Floats, Floats]:
-        """q and v (n, d) at the times (n,), after an event that falls on one."""
+        """Return q and v (n, d) at the times (n,); at the instant of an event, those after it."""
         starts = np.array([start for start, _, _ in self.segments])
         found = np.array([
             self.segments[max(0, int(np.searchsorted(starts, t, side="right")) - 1)][2](float(t)) for t in time
@@ -120,7 +121,7 @@ class SceneTruth:
 
 
 class _Here(NamedTuple):
-    """v (d,), M (d, d), M⁻¹f (d,), and of the contacts asked for: rows (c, d) and J̇v (c,)."""
+    """v (d,), M (d, d), M⁻¹f (d,), and rows (c, d) and J̇v (c,) of the given contacts."""
 
     v: Floats
     mass: Floats
@@ -131,7 +132,7 @@ class _Here(NamedTuple):
 
 @dataclass
 class _Motion:
-    """The scene's equations; `held` are the contacts that last in the present segment, `leaving` have just opened."""
+    """The scene's equations of motion. `held` are the lasting contacts of this segment; `leaving` have just opened."""
 
     scene: Scene
     coupled: bool
@@ -139,9 +140,9 @@ class _Motion:
     duration: float
     system: System = field(init=False)
     restitution: float = field(init=False)
-    widest: float = 0.0  # gap [m] that an impact took for closed
-    bounced: float = 0.0  # path [m] of the bounces neglected
-    flight: float = np.inf  # least time [s] that a contact which has just opened stays so
+    widest: float = 0.0  # largest gap [m] that counted as closed in an impact
+    bounced: float = 0.0  # path [m] of the neglected bounces
+    flight: float = np.inf  # least time [s] for which a contact that has just opened stays open
     held: list[Contact] = field(default_factory=list)
     leaving: list[Contact] = field(default_factory=list)
 
@@ -161,20 +162,20 @@ class _Motion:
         self.drag = np.asarray(settings.damping if settings is not None and settings.damping else 0.0)
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """q, v, device q, device v of a state; q of length one where it turns."""
+        """Return q, v, device q, device v of a state, with q normalised."""
         nq, t = self.nq, self.tool.stop - self.tool.start if self.coupled else 0
         both = nq + self.d
         q = self.mechanics.normalize(state[:nq])
         return q, state[nq:both], state[both : both + t], state[both + t :]
 
     def rows(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
-        """Gap and row (d,) of every candidate contact."""
+        """Return gap and row (d,) of every candidate contact."""
         found = find_rows(self.system, q, v, np.inf)
         names = identities(found.geometry, range(len(found.gap)))
         return {name: (float(found.gap[i]), found.jacobian[i]) for i, name in enumerate(names)}
 
     def force(self, state: Floats) -> Floats:
-        """Applied − B − G (d,), the coupling included."""
+        """Return the applied force − B − G (d,), including the coupling."""
         q, v, device_q, device_v = self.split(state)
         force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
         force -= self.system.joint_damping * v
@@ -199,7 +200,7 @@ class _Motion:
         return np.asarray(gains.stiffness) * distance + np.asarray(gains.damping) * speed
 
     def _here(self, state: Floats, names: list[Contact]) -> _Here:
-        """What contacts of these names meet in a state; J̇v by differences of fourth order along the motion."""
+        """Return dynamics and rows of the named contacts in a state, with J̇v by fourth-order differences."""
         q, v, _, _ = self.split(state)
         mass = self.mechanics.mass_matrix(q)
         free = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
@@ -215,13 +216,13 @@ class _Motion:
         return _Here(v, mass, free, np.array([found[n][1] for n in names]), drift)
 
     def acceleration(self, state: Floats) -> tuple[Floats, Floats]:
-        """a (d,) with the lasting contacts held, and their generalized force (d,), whatever its sign."""
+        """Return a (d,) with the lasting contacts kept closed, and their generalized force (d,) of either sign."""
         here = self._here(state, self.held)
         change = _least_change(here.mass, here.rows, -(here.rows @ here.free + here.drift))
         return here.free + change, np.asarray(here.mass @ change, np.float64)
 
     def rate(self, _time: float, state: Floats) -> Floats:
-        """Derivative of the state."""
+        """Return the derivative of the state."""
         q, v, device_q, device_v = self.split(state)
         acceleration, contact = self.acceleration(state)
         if self.device is None:
@@ -233,7 +234,7 @@ class _Motion:
         return np.concatenate([v, acceleration, device_v, moved])
 
     def strike(self, state: Floats) -> tuple[Floats, bool]:
-        """The state after an impact of all closed contacts, and whether anything happened; sets `held`, `leaving`."""
+        """Return the state after an impact of all closed contacts, and whether it is an event; set `held`, `leaving`."""
         q, v, device_q, device_v = (part.copy() for part in self.split(state))
         found = self.require_no_overlap(q, v)
         names = [n for n, (gap, _) in found.items() if gap <= self.tolerances.closed or n in self.held]
@@ -261,7 +262,7 @@ class _Motion:
         return after, impacts > 0 or set(before) != set(self.held)
 
     def require_no_overlap(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
-        """The rows; refused where a contact overlaps: an event was missed, or the scene starts so."""
+        """Return the rows; raise SolverError if a contact overlaps (a missed event, or an overlap at the start)."""
         found = self.rows(q, v)
         deepest = min((gap for gap, _ in found.values()), default=0.0)
         if deepest < -3.0 * self.tolerances.closed:
@@ -269,7 +270,7 @@ class _Motion:
         return found
 
     def _lasting(self, state: Floats, names: list[Contact]) -> NDArray[np.bool_]:
-        """Which of the closed contacts (c,) last: those that do not open, and those that fall back before they have."""
+        """Return which closed contacts (c,) last: those that do not open, and those whose bounce is below BOUNCE."""
         here = self._here(state, names)
         speed = here.rows @ here.v
         resting = np.abs(speed) <= self.tolerances.at_rest
@@ -280,38 +281,38 @@ class _Motion:
                 falling = ~resting & (away < 0.0)
                 self.flight = float((speed[falling] / -away[falling]).min(initial=np.inf)) * 2.0
                 return resting & (away <= _KEPT * self._least(here))
-            heights = speed[back] ** 2 / (-2.0 * away[back])  # each bounce e² of the one before, up and down
+            heights = speed[back] ** 2 / (-2.0 * away[back])  # each bounce has e² times the height of the last one
             shrinking = max(1.0 - self.restitution**2, np.finfo(float).tiny)
             self.bounced += float(np.minimum(2.0 * heights / shrinking, speed[back] * self.duration).sum())
             resting |= back
 
     def _away(self, here: _Here, resting: NDArray[np.bool_]) -> Floats:
-        """Accelerations (c,) [m/s²] at which the contacts open where those at rest do not close."""
+        """Return the opening accelerations (c,) [m/s²] of the contacts, with resting contacts kept from closing."""
         bound = np.where(resting, -here.drift, -np.inf)
         return here.rows @ nearest_velocity(here.mass, here.free, here.rows, bound).velocity + here.drift
 
     def _least(self, here: _Here) -> Floats:
-        """Accelerations (c,) [m/s²] that count as none: `released` of the forces' and of v over T, `at_rest` over T."""
+        """Return limits (c,) [m/s²] of zero acceleration: `released` times those of forces and v/T, plus `at_rest`/T."""
         root = np.linalg.cholesky(here.mass)
         size = np.linalg.norm(root.T @ here.free) + np.linalg.norm(root.T @ here.v) / self.duration
         reach = np.linalg.norm(np.linalg.solve(root, here.rows.T), axis=0)
         return np.asarray(self.tolerances.released * size * reach + self.tolerances.at_rest / self.duration)
 
     def pushing(self, state: Floats) -> float:
-        """Positive [m/s²] as long as no held contact would open if it were free to."""
+        """Return a margin [m/s²] that is positive while no held contact would open if it were free."""
         if not self.held:
             return 1.0
         here = self._here(state, self.held)
         return float((self._least(here) - self._away(here, np.ones(len(self.held), np.bool_))).min())
 
     def closing(self, state: Floats) -> float:
-        """Least gap [m] of the contacts that may close; one that has just opened may overlap by `closed`."""
+        """Return the least gap [m] of the contacts that may close; one that has just opened may overlap by `closed`."""
         q, v, _, _ = self.split(state)
         return min((gap + (self.tolerances.closed if n in self.leaving else 0.0)
                     for n, (gap, _) in self.rows(q, v).items() if n not in self.held), default=1.0)  # fmt: skip
 
     def opening(self, state: Floats) -> float:
-        """Largest gap [m] of the contacts that have just opened, less the one from which they are open."""
+        """Return the largest gap [m] of contacts that have just opened, minus the gap at which they count as open."""
         if not self.leaving:
             return -1.0
         q, v, _, _ = self.split(state)
@@ -320,7 +321,7 @@ class _Motion:
 
 
 def _least_change(mass: Floats, rows: Floats, target: Floats) -> Floats:
-    """The least change (d,) of a velocity or acceleration, in the kinetic metric, with rows @ change = target."""
+    """Return the least change (d,) of velocity or acceleration, in the kinetic metric, with rows @ change = target."""
     if not len(rows):
         return np.zeros(len(mass))
     root = np.linalg.cholesky(mass)
@@ -335,18 +336,19 @@ def scene_truth(
     scene: Scene, duration: float, coupled: bool = False, most_events: int = 200,
     start: tuple[Floats, Floats] | None = None, computations: tuple[Tolerances, ...] = COMPUTATIONS,
 ) -> SceneTruth:
-    """Return the event-driven motion of a scene for `duration` [s]; `coupled` with the four-channel coupling's device.
+    """Return the event-driven motion of a scene for `duration` [s]; `coupled` adds the four-channel coupling's device.
 
-    start : q and v at time zero, by default the scene's
-    computations : the first is returned, the others bound it: one alone takes no notice of what hangs on a tolerance
+    start : q and v at time zero; default: the scene's start
+    computations : the first one is returned and the others bound its error; with only one, a decision that depends on
+        a tolerance is not detected
 
     Raises
     ------
     ArgumentError
-        A coupling in a scene whose coordinates may not be added, or without the gains of the coupling.
+        `coupled` is used with quaternion or (cos, sin) coordinates, or without gains of the coupling.
     SolverError
-        No truth can be had; the message says why: contacts that overlap at the start, more events than `most_events`,
-        or a decision that hangs on a tolerance.
+        There is no reference motion. The message says why: contacts overlap at the start, there are more events than
+        `most_events`, or a decision depends on a tolerance.
     """
     motions = [_Motion(scene, coupled, tolerances, duration) for tolerances in computations]
     first, *others = (_compute(motion, most_events, start) for motion in motions)
@@ -366,7 +368,7 @@ def scene_truth(
 
 
 def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | None = None) -> SceneTruth:
-    """The motion by one set of tolerances."""
+    """Compute the motion with one set of tolerances."""
     made = motion.system.make_state()
     q, v = start or (made.q, made.v)
     device = [q[motion.tool], v[motion.tool]] if motion.coupled else []
@@ -387,7 +389,7 @@ def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | N
                 still = 2.0 * motion.tolerances.closed * (1.0 - _KEPT)
                 motion.leaving = [n for n in motion.leaving if found[n][0] < still]
         if now >= duration:
-            for begin, stop, solution in segments:  # an event that the integrator's steps passed over leaves an overlap
+            for begin, stop, solution in segments:  # an event that the integrator missed leaves an overlap
                 for time in np.linspace(begin, stop, _COMPARED):
                     motion.require_no_overlap(*motion.split(solution(float(time)))[:2])
             return SceneTruth(motion.nq, motion.d, tuple(segments), tuple(events))
@@ -411,7 +413,7 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
     for event, direction in zip(found, (-1.0, -1.0, 1.0), strict=True):  # scipy reads these attributes
         event.terminal, event.direction = True, direction
     accuracy, longest = motion.tolerances.accuracy, motion.duration / motion.tolerances.steps
-    if motion.leaving:  # no step may pass over a whole bounce: a quarter of it rises to 3/4 of its height
+    if motion.leaving:  # no step may skip a whole bounce: after a quarter of its time it has 3/4 of its height
         longest = min(longest, 0.25 * motion.flight)
     solution = solve_ivp(
         motion.rate, (now, motion.duration), state, "DOP853", rtol=accuracy, atol=accuracy, events=found,
@@ -423,7 +425,7 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
 
 
 def _apart(one: SceneTruth, other: SceneTruth) -> tuple[float, float, float]:
-    """Largest differences of two computations of a motion, between their events of the same number."""
+    """Return the largest differences of two computations of a motion, compared between equal events."""
     position = velocity = instant = 0.0
     mine, theirs = ((0.0, *truth.events, truth.end) for truth in (one, other))
     for k in range(len(mine) - 1):

@@ -1,7 +1,7 @@
-"""Rigid contacts at velocity level, one QP per step: the law of the "ideal" world and of CBuc.
+"""The contact law of the "ideal" world and of CBuc: rigid contacts at velocity level, one QP per step.
 
-The step itself is in `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction);
-here it becomes a contact law that runs on every scene.
+The step itself is in `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction). This module
+makes it a contact law that runs on every scene.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ __all__ = ["RigidConstraints", "nearest_velocity", "rigid_step", "velocity_bound
 
 Floats = NDArray[np.float64]
 
-# Entries of J in one step: a step of 4 GB and about 15 s. Circles on a floor reach that at 320.
+# Entries of J in one step, which then takes 4 GB and about 15 s. 320 circles on a floor reach this limit.
 MOST_ENTRIES = 50_000_000
-# Measured on AMD EPYC (Zen 4) with 5 to 100 circles and boxes on a floor: 0.13 to 0.9 µs an entry for 50 and more.
+# Measured on AMD EPYC (Zen 4) with 5 to 100 circles and boxes on a floor: 0.13 to 0.9 µs per entry from 50 on.
 SECONDS_A_STEP, SECONDS_AN_ENTRY = 1e-3, 3e-7
 
 
 class _Solved(NamedTuple):
-    """What a step returns for c contacts and d velocities.
+    """Result of a step with c contacts and d velocities.
 
     velocity : (d,) v⁺; normal : (c,) impulses [N s]
-    tangential : (c, 3) impulses [N s], world axes; dragging : (d, c) generalized impulse of each
+    tangential : (c, 3) impulses [N s], world axes; dragging : (d, c) generalized impulse of each of them
     """
 
     velocity: Floats
@@ -61,19 +61,20 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class RigidConstraints:
-    """The law of the rigid worlds: contacts that no step ends by violating.
+    """The law of the rigid worlds: non-penetration is a constraint on the velocity at the end of each step.
 
     Parameters
     ----------
-    margin : contacts with gap <= margin [m] are given to the step; infinity takes every candidate pair, a
+    margin : the step considers contacts with gap <= margin [m]; infinity includes every candidate pair, and a
         finite margin must exceed the largest speed times the step
-    stabilization : share of an overlap removed in each step, 0 for none
+    stabilization : share of an overlap that each step removes, 0 for none
     scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
     friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient
 
-    Restitution is Newton's, of each pair as the scene says; Poisson's in "stewart-trinkle" with e > 0, and in steps
-    without friction where Newton's law has no solution or would gain energy (with one e for all as well: an end that
-    rises and is struck is held at rest, not returned, and somebody pays). With friction Newton's law may gain.
+    Restitution follows Newton's law with the scene's value for each pair. Poisson's law is used in "stewart-trinkle"
+    with e > 0, and in frictionless steps for which Newton's law has no solution or would gain energy. This can happen
+    with one e for all contacts, too (see the example in `reference.rigid_step`). With friction, Newton's law may gain
+    energy.
     """
 
     margin: float = np.inf
@@ -89,13 +90,13 @@ class RigidConstraints:
 
     @property
     def uses(self) -> frozenset[str]:
-        """Parts of the scene that the law uses: restitution, joints, and friction in all but "none"."""
+        """Parts of the scene that the law uses: restitution, joints, and friction unless `friction` is "none"."""
         friction = {FRICTION, IMPACT_FRICTION} if self.friction != "none" else set()
         return frozenset({OWN_RESTITUTION, JOINTS} | friction)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Everything that determines a step besides the scene, whose restitution and friction coefficient count."""
+        """All parameters of a step besides the scene, which gives the coefficients of restitution and friction."""
         return {
             "margin": self.margin,
             "stabilization": self.stabilization,
@@ -105,12 +106,12 @@ class RigidConstraints:
         }
 
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
-        """One step (see `iapb.contact.laws.ContactLaw`).
+        """Do one step (see `iapb.contact.laws.ContactLaw`).
 
-        Impulses of contacts that approached faster than the scene's approach velocity, and of those that bodies pass
-        the blow on to, are reported as collision impulses, the rest as forces p/dt: only their sum is determined by
-        the step. The loads of a step with a blow are among its impulses: with e near 1 they may outweigh its loss.
-        Where joints have damping, a step with a blow is two: the blow, then forces and damping.
+        Impulses are reported as collision impulses at contacts that approached faster than the scene's approach
+        velocity, and at pushing contacts connected to them through bodies. The others are reported as forces p/dt. The
+        step only determines the sum of both. Collision impulses include the loads of the step; with e near 1 their work
+        may exceed the energy loss. With joint damping, a step with a collision has two parts: the collision, then forces and damping.
         """
         entries = len(system.pairs) * system.mechanism.nv
         if entries > MOST_ENTRIES // BOX_CORNERS and (cost := cost_of(system)).too_large:
@@ -125,14 +126,14 @@ class RigidConstraints:
         mass = mechanics.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
         force = applied_force - mechanics.inner_forces(q, v, system.gravity)
-        # Damping of joints, implicit: M + Δt D holds the damped velocities, as in the engine's step.
+        # Joint damping is implicit, by M + Δt D, as in the engine's step.
         damping, approach = system.joint_damping, system.scene.contact.approach_velocity
         damped = mass + dt * np.diag(damping)
         struck = step = self._solve(system, damped, q, v, force - damping * v, dt, found)
         blows = _blows(mass, found, step.normal, approach)
         lasts = ~blows
         if damping.any() and blows.any():
-            # The blow comes first, on M alone: with what damping takes behind it, p on M could gain.
+            # The collision comes first, with M alone: an impulse p solved with damping could gain energy on M.
             struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found)
             blows, lasts = _blows(mass, found, struck.normal, approach), np.ones(len(blows), np.bool_)
             blow = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
@@ -171,7 +172,7 @@ class RigidConstraints:
 
 
 class Cost(NamedTuple):
-    """What a step of the rigid worlds takes: contacts that it is given, coordinates, and an estimate of seconds."""
+    """Cost of a step of the rigid worlds: number of contacts, of coordinates, and estimated seconds."""
 
     contacts: int
     coordinates: int
@@ -179,12 +180,12 @@ class Cost(NamedTuple):
 
     @property
     def too_large(self) -> bool:
-        """Whether the rows of one step are more than the worlds take."""
+        """Whether the rows of one step have more than MOST_ENTRIES entries."""
         return self.contacts * self.coordinates > MOST_ENTRIES
 
 
 def cost_of(system: Any) -> Cost:
-    """Estimate a step from the scene alone: every pair of shapes gives its contacts, near or far.
+    """Estimate the cost of a step from the scene alone, with the contacts of every pair of shapes, near or far.
 
     A circle or ball has one contact with anything, two boxes in the plane up to two, and in space up to eight.
     """
@@ -197,7 +198,7 @@ def cost_of(system: Any) -> Cost:
 
 
 def _restitution(system: Any, found: ContactRows) -> float | Floats:
-    """e of all contacts, or of each (c,) where the pairs that can touch differ."""
+    """Return one e for all contacts, or e of each contact (c,) if the pairs that can touch differ."""
     values = system.restitutions
     if len(values) <= 1:
         return float(values[0]) if len(values) else float(system.scene.contact.restitution)
@@ -206,9 +207,10 @@ def _restitution(system: Any, found: ContactRows) -> float | Floats:
 
 
 def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
-    """Contacts (c,) that struck: those that approached, and all that push and are tied to them by bodies (W_ij ≠ 0).
+    """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to them (W_ij ≠ 0).
 
-    Without the others the middle of a cradle would resist a blow by a force, and the impact alone could gain energy.
+    Without the connected contacts, the middle of a cradle would react with a force, and the impact alone could gain
+    energy.
     """
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""The paper's four worlds (section VI), and what it leaves to the future: a contact law and a coupling by name.
+"""The paper's four worlds (section VI) and its future extensions. A world is a named pair of contact law and coupling.
 
 | world | contact law | coupling |
 |---|---|---|
@@ -10,9 +10,9 @@
 | IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
 | IAPB-push | impulses that only push (two LCPs), and penalties | four-channel |
 
-The engine's are in `iapb.worlds`; this module adds the rigid ones. The paper's rigid worlds, ideal and CBuc, have no
-friction: they ignore the scene's, and a run says so. Restitution that differs between bodies needs no world of its own:
-IAPB does as the scene says.
+The worlds of the engine are in `iapb.worlds`; this module adds the rigid ones. The paper's rigid worlds, ideal and
+CBuc, have no friction: they ignore the friction of the scene, and the run records this. Restitution that differs
+between bodies needs no separate world: IAPB uses the values of the scene.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from iapb.worlds import WORLDS, World, find_world
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 
-# to add a world: a line here
+# to add a world, add a line here
 WORLDS |= {
     "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
     "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
@@ -54,8 +54,8 @@ def run_world(
     ----------
     scene : a checked scene, the path of a scene file, or the name of a scene that comes with the project
     name, rendering : as `find_world` takes them
-    progress : called with (steps done, steps) now and then
-    partial : True: an incomplete run (interrupted, or out of range) is returned; False: it is raised
+    progress : called as progress(steps done, total steps) after every chunk
+    partial : whether to return a run that stopped early; if False, an exception is raised instead
     options : as `iapb.simulate` takes them
 
     Returns
@@ -72,19 +72,19 @@ def run_world(
     if not isinstance(scene, Scene):
         scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
-    with one_thread():  # once for all steps of a rigid world
+    with one_thread():  # entered once for all steps of a rigid world
         run = simulate(scene, world.law, world.coupling_in(scene), world=label_of(name, rendering), progress=progress,
                        **options)  # fmt: skip
     return run if partial else require_complete(run)
 
 
 def label_of(name: str, rendering: str) -> str:
-    """Return what a run in a world says of its world."""
+    """Return the label of a world and rendering for the record of a run."""
     return name if rendering == "full" else f"{name} {rendering}"
 
 
 def require_complete(run: Run) -> Run:
-    """Return the run, or raise what stopped it: half a run is no evidence."""
+    """Return the run if it is complete; otherwise raise the error that stopped it."""
     if run.complete:
         return run
     if run.stopped == INTERRUPTED:

@@ -1,4 +1,4 @@
-"""Impacts as complementarity problems: problems, solutions that judge themselves, solvers, laws."""
+"""Impacts as complementarity problems: problems, solutions with recomputed residuals, solvers and laws."""
 
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Residuals, Solution

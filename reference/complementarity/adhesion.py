@@ -1,7 +1,7 @@
-"""True adhesion told from an artefact of the minimum norm.
+"""Distinguish true adhesion from an artefact of the minimum norm.
 
-With redundant contacts a generalized impulse Jᵀp has many p. A negative entry of the minimum-norm p means
-nothing by itself: only where *no* p >= 0 gives the same Jᵀp do the contacts really pull.
+With redundant contacts, many p give the same generalized impulse Jᵀp. A negative entry of the minimum-norm p alone does
+not mean adhesion: the contacts pull only if *no* p >= 0 gives the same Jᵀp.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from iapb.errors import ArgumentError, SolverError
 
 Floats = NDArray[np.float64]
 
-# Share of |L⁻¹ Jᵀp| left unexplained below which a non-negative impulse exists: the active-set least squares
-# of a consistent problem ends near 1e-13, an inconsistent one far above.
+# Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least squares ends near
+# 1e-13 for a consistent problem and far above for an inconsistent one.
 EXPLAINED = 1e-9
 NONE, ARTEFACT, ADHESIVE = "none", "artefact of the minimum norm", "adhesive"
 
 
 @dataclass(frozen=True)
 class NonNegativeImpulse:
-    """The non-negative impulses nearest to a generalized impulse.
+    """Non-negative impulses whose Jᵀp is nearest to a generalized impulse.
 
     impulse : (c,) p >= 0 [N s]; residual : |L⁻¹(Jᵀp − given)| / |L⁻¹ given| in the kinetic metric
-    exists : the residual is zero to rounding, so p gives the same motion without pulling
+    exists : whether the residual is zero up to rounding, so that p gives the same motion without pulling
     """
 
     impulse: Floats
@@ -48,7 +48,7 @@ def nonnegative_impulse(
     Raises
     ------
     SolverError
-        where the least-squares iteration does not end
+        The least-squares iteration does not converge.
     """
     from scipy.optimize import nnls
 
@@ -71,9 +71,9 @@ def nonnegative_impulse(
 def adhesion(
     contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike, tolerance: float = 1e-12
 ) -> str:
-    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,), whatever rule chose them.
+    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,) of any law.
 
-    `tolerance` is the share of the largest impulse below which a negative one is rounding.
+    A negative impulse smaller than `tolerance` times the largest one counts as rounding error.
     """
     p = np.asarray(impulses, np.float64)
     if p.min(initial=0.0) >= -tolerance * np.abs(p).max(initial=0.0):

@@ -1,4 +1,4 @@
-"""Solvers on problems: one row per pair, judged by recomputed residuals, and the performance profile of the rows.
+"""Benchmark of solvers: one row per solver and problem with recomputed residuals, and their performance profile.
 
 Source of the profile: Dolan and Moré, Benchmarking optimization software with performance profiles (2002).
 """
@@ -23,11 +23,11 @@ Floats = NDArray[np.float64]
 class SolverRow:
     """One solver on one problem.
 
-    verdict : "solved", "refused", "failed", "missing" (the solver is not installed) or "left out" (it was slower than
-        `longest` on a problem before)
-    spread : largest difference of contact velocities from the best solution, relative to the velocity scale;
-        NaN where this solver or no solver solved it. Impulses are not compared: they are not unique
-    asymmetry : of the problem's W, beyond rounding, else 0
+    verdict : "solved", "refused", "failed", "missing" (the solver is not installed) or "left out" (it needed more than
+        `longest` for an earlier problem)
+    spread : largest difference of contact velocities from the best solution, relative to the velocity scale; NaN if
+        this solver did not solve the problem. Impulses are not compared, because they are not unique
+    asymmetry : relative asymmetry of the problem's W if it is beyond rounding, else 0
     """
 
     problem: str
@@ -51,10 +51,10 @@ def run_solvers(
     slow: dict[str, float] | None = None,
     progress: Callable[[str, str], None] | None = None,
 ) -> list[SolverRow]:
-    """Solve every problem by every solver that takes its kind (or by `solvers`); the least time of `repeats`.
+    """Solve every problem with every solver of its kind (or with `solvers`); the time is the least of `repeats`.
 
-    A solver that needs more than `longest` [s] for one problem is not asked again: give the smallest problems first.
-    `slow` holds such solvers and their times from one call to the next.
+    A solver that needs more than `longest` [s] for one problem is left out afterwards, so give the smallest problems
+    first. `slow` keeps such solvers and their times between calls.
     """
     rows: list[SolverRow] = []
     slow = {} if slow is None else slow
@@ -74,9 +74,9 @@ def _unasked(problem: ImpactProblem, solver: str, seconds: float) -> SolverRow:
 
 
 def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
-    """Per solver, the share of problems solved within each factor (>= 1) of the fastest solver's time.
+    """Return per solver the share of problems solved within each factor (>= 1) of the fastest solver's time.
 
-    Problems that no solver solved count as solved by none. A solver that is not installed has no curve.
+    All problems count, including those that no solver solved. A solver that is not installed has no curve.
     """
     names = sorted({row.solver for row in rows if row.verdict != "missing"})
     problems = sorted({row.problem for row in rows})

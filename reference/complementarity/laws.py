@@ -1,8 +1,8 @@
-"""Impact laws by name: what each states, where it comes from, under which hypotheses it is consistent.
+"""Impact laws by name: the statement of each, its source, and the hypotheses under which it is consistent.
 
-All act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`), E = diag(restitution), and return
-v⁺ and the impulses. The equality laws share no algorithm with the engine: they solve A x = target by singular
-values (lstsq), where the engine orthogonalises rows.
+All laws act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`) with E = diag(restitution), and
+return v⁺ and the impulses. The equality laws share no algorithm with the engine: they solve A x = target by singular
+values (lstsq), while the engine orthogonalises rows.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from reference.complementarity.solvers import solve
 
 Floats = NDArray[np.float64]
 
-# A solve of a law's LCP whose residual is above this share of the velocity scale is an error, not an outcome.
+# A solution of a law's LCP with a residual above this share of the velocity scale raises an error.
 LAW_TOLERANCE = 1e-9
-# Asked in this order for a frictionless LCP: active sets cycle, and Lemke ends on a ray, for some redundant rows and
-# some rounding; projections (Gauss-Seidel) do not, but may be slow. Each answer is judged by its recomputed residual.
+# Solvers for a frictionless LCP, tried in this order. For some redundant rows, active sets cycle and Lemke ends
+# on a ray; projections (Gauss-Seidel) do not, but may be slow. Each solution's residual is recomputed.
 LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a law makes of an impact.
+    """Result of a law for an impact.
 
     velocity : (d,) v⁺; impulse : (n,) p [N s]; residual : largest recomputed residual of the problems solved
     """
@@ -53,13 +53,13 @@ class Law:
 
 
 def newton_lcp(problem: ImpactProblem, solver: str | None = None) -> Outcome:
-    """0 <= p ⟂ gamma_plus + E gamma_minus >= 0."""
+    """Apply Newton's law as an LCP: 0 <= p ⟂ gamma_plus + E gamma_minus >= 0."""
     impulse, residual = _solved(problem, solver)
     return Outcome(problem.velocity_plus(impulse), impulse, residual)
 
 
 def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
-    """Compression 0 <= p_c ⟂ gamma_c >= 0, then expansion 0 <= p_e − E p_c ⟂ gamma_plus >= 0; p = p_c + p_e."""
+    """Apply Poisson's law, p = p_c + p_e: 0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e − E p_c ⟂ gamma_plus >= 0."""
     compression = replace(problem, restitution=np.zeros(problem.contacts))
     p_c, first = _solved(compression, solver)
     returned = problem.restitution * p_c
@@ -70,12 +70,12 @@ def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
 
 
 def newton_equality(problem: ImpactProblem) -> Outcome:
-    """gamma_plus = −E gamma_minus on every row, p of either sign and of least norm (the paper's (20)-(21)).
+    """Apply gamma_plus = −E gamma_minus on every row, with p of either sign and least norm (the paper's (20)-(21)).
 
     Raises
     ------
     SolverError
-        where redundant rows with different e contradict one another: no velocity meets all of them
+        Redundant rows with different e contradict each other, so no velocity satisfies all of them.
     """
     change, impulse, residual = _equality(problem)
     if residual > LAW_TOLERANCE:
@@ -84,28 +84,28 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
 
 
 def coulomb_ncp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
-    """K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus with E gamma_minus added to its normals."""
+    """Apply Coulomb's law K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals."""
     impulse, residual = _solved(replace(problem, relaxed=False), solver)
     return Outcome(problem.velocity_plus(impulse), impulse, residual)
 
 
 def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
-    """K ∋ p ⟂ u ∈ K*: Coulomb's law without the shift, a convex program."""
+    """Apply K ∋ p ⟂ u ∈ K*, Coulomb's law without the shift, which is a convex program."""
     impulse, residual = _solved(replace(problem, relaxed=True), solver)
     return Outcome(problem.velocity_plus(impulse), impulse, residual)
 
 
 def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
-    """Rows of (13)-(14): nᵀJ_a and nᵀJ_b apart (each (c, d)), where (12) has their difference; zero rows left out."""
+    """Return the rows nᵀJ_a and nᵀJ_b of (13)-(14) (each (c, d)), without zero rows; (12) has their difference."""
     stacked = np.vstack([np.asarray(jacobian_a, np.float64), np.asarray(jacobian_b, np.float64)])
     return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
-    """p (n,) and its recomputed residual by that solver, or by the first of LADDER that reaches LAW_TOLERANCE.
+    """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches LAW_TOLERANCE.
 
-    The residual is relative to `speed` [m/s] where the problem's own velocities are smaller: what compression has
-    stopped leaves rounding, which opposed rows may contradict.
+    The residual is relative to `speed` [m/s] if the problem's own velocities are smaller. After compression, only
+    rounding errors may be left, and opposed rows may contradict each other in them.
     """
     said, own = [], velocity_scale(problem)
     for name in LADDER if solver is None else (solver,):
@@ -118,7 +118,7 @@ def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> t
 
 
 def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
-    """Δv, p and residual of the least change of velocity, in the kinetic metric, that meets all equalities."""
+    """Return Δv, p and residual of the least velocity change, in the kinetic metric, that satisfies all equalities."""
     mass = _known(problem.mass_matrix)
     rows, cholesky = problem.factor, np.linalg.cholesky(mass)
     target = -problem.offset
@@ -128,7 +128,7 @@ def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
     unit = np.where(length > 0.0, length, 1.0)[:, None]
     dependent = _dependent(rows, cholesky)
     change = np.linalg.lstsq(rows / unit, target / unit[:, 0], rcond=dependent)[0]
-    shortest = float(unit.min() / unit.max())  # least norm asks for the rows as they are
+    shortest = float(unit.min() / unit.max())  # the least norm of p needs the rows without scaling
     impulse = np.linalg.lstsq(rows.T, change, rcond=dependent * shortest)[0]
     scale = np.abs(target).max() or 1.0
     residual = float(np.abs(rows @ change - target).max() / scale)
@@ -136,10 +136,10 @@ def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
 
 
 def _dependent(rows: Floats, cholesky: NDArray[Any]) -> float:
-    """Share of the largest singular value of the unit rows below which a direction counts as none.
+    """Return the share of the largest singular value of the unit rows below which a singular value counts as zero.
 
-    A = J L⁻ᵀ comes from a triangular solve whose relative error is up to n ε κ(L): what is smaller than that may be the
-    rounding of rows that depend on one another, and dividing by it would make impulses out of noise.
+    A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller singular value may be
+    rounding error of dependent rows, and dividing by it would turn noise into impulses.
     """
     return float(max(rows.shape) * np.finfo(np.float64).eps * np.linalg.cond(cholesky))
 

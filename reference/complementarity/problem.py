@@ -3,8 +3,8 @@
 Frictionless, by Newton's law:  0 <= p ⟂ gamma_plus + E gamma_minus >= 0,  gamma_plus = gamma_minus + W p.
 With friction mu and blocks (normal, tangent...):  K ∋ p ⟂ u + mu |u_T| n ∈ K*  (Coulomb's law, an NCP),
 where u is gamma_plus with E gamma_minus added to its normals. `relaxed` drops the shift mu |u_T|: the CCP.
-A joint is a block with gamma_plus = 0 in all its components and p of either sign: a mixed problem (MLCP). Components
-that a joint does not have are rows of zeros.
+A joint is a block with gamma_plus = 0 in all components and p of either sign; the problem is then mixed (MLCP). If a
+joint has fewer components than a block, the other rows are zero.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from iapb.errors import ArgumentError, SolverError
 
 Floats = NDArray[np.float64]
 
-# Rounding of n products keeps W symmetric to n·eps, files printed with 12 digits to 1e-11; above this the
+# Rounding of n products leaves an asymmetry of n·eps, files with 12 digits 1e-11; above this tolerance the
 # matrix itself is asymmetric.
 SYMMETRY_TOLERANCE = 1e-9
 
-# W made in single precision, or by subtraction, has eigenvalues down to -1e-7 of the largest. Up to here the
-# nearest semidefinite W is solved instead; the solution is still judged by the W that was given.
+# A W from single precision or subtraction has eigenvalues down to -1e-7 of the largest. Up to this tolerance the
+# nearest semidefinite W is solved instead; residuals still use the given W.
 INDEFINITE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class ImpactProblem:
-    """A contact problem in n = contacts x contact_size unknown impulses p [N s].
+    """A contact problem with n = contacts x contact_size unknown impulses p [N s].
 
     Attributes
     ----------
     delassus : (n, n) W = J M⁻¹ Jᵀ [1/kg]
     gamma_minus : (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
-    restitution : (k,) Newton's e of each contact, in [0, 1]; joints have none
+    restitution : (k,) Newton's e of each contact, in [0, 1]; it is ignored for joints
     friction : (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
     contact_size : components per contact, normal first: 1, 2 (planar friction) or 3
     relaxed : True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
-    bilateral : (k,) True where the block is a joint's, or None
-    mass_matrix, contact_jacobian, velocity : the mechanics (d, d), (n, d), (d,) where they are known
+    bilateral : (k,) True for blocks of joints, or None
+    mass_matrix, contact_jacobian, velocity : the mechanics (d, d), (n, d), (d,), if known
     """
 
     delassus: Floats
@@ -97,7 +97,7 @@ class ImpactProblem:
         bilateral: ArrayLike | None = None,
         name: str = "",
     ) -> ImpactProblem:
-        """Return the problem of W (n, n) and gamma_minus (n,); with e = 0 the LCP (W, gamma_minus)."""
+        """Return the problem of W (n, n) and gamma_minus (n,); with e = 0 it is the LCP (W, gamma_minus)."""
         w = _finite("delassus", delassus, 2)
         gamma = _finite("gamma_minus", gamma_minus, 1)
         if w.shape != (len(gamma), len(gamma)):
@@ -110,7 +110,7 @@ class ImpactProblem:
 
     @property
     def two_sided(self) -> NDArray[np.bool_]:
-        """`bilateral` (k,), all False where it is None."""
+        """`bilateral` (k,), or all False if it is None."""
         return np.zeros(self.contacts, np.bool_) if self.bilateral is None else self.bilateral
 
     @property
@@ -125,7 +125,7 @@ class ImpactProblem:
 
     @property
     def friction_or_zero(self) -> Floats:
-        """Friction coefficients (k,), zeros where the problem is frictionless."""
+        """Friction coefficients (k,), zeros if the problem is frictionless."""
         return np.zeros(self.contacts) if self.friction is None else self.friction
 
     @cached_property
@@ -137,7 +137,7 @@ class ImpactProblem:
 
     @cached_property
     def asymmetry(self) -> float:
-        """Largest |W - Wᵀ| relative to the largest |W|; a Delassus matrix has none beyond rounding."""
+        """Largest |W - Wᵀ| relative to the largest |W|; a Delassus matrix is symmetric up to rounding."""
         largest = np.abs(self.delassus).max(initial=0.0)
         if largest == 0.0:
             return 0.0
@@ -145,12 +145,12 @@ class ImpactProblem:
 
     @cached_property
     def factor(self) -> Floats:
-        """A (n, r) with W = A Aᵀ: J L⁻ᵀ where the mechanics is known, else from the eigenvectors of W.
+        """A (n, r) with W = A Aᵀ, which is J L⁻ᵀ if the mechanics is known, else from the eigenvectors of W.
 
         Raises
         ------
         SolverError
-            if W is not symmetric positive semidefinite: then no convex problem is equivalent.
+            W is not symmetric positive semidefinite, so there is no equivalent convex problem.
         """
         if self.mass_matrix is not None and self.contact_jacobian is not None:
             return _mechanical_factor(self.mass_matrix, self.contact_jacobian)
@@ -159,15 +159,15 @@ class ImpactProblem:
         return _eigen_factor(self.delassus)
 
     def contact_velocity(self, impulse: Floats) -> Floats:
-        """w = W p + b (n,): the velocity that complements the impulse, before Coulomb's shift [m/s]."""
+        """Return w = W p + b (n,), the velocity complementary to the impulse, before Coulomb's shift [m/s]."""
         return self.delassus @ impulse + self.offset
 
     def gamma_plus(self, impulse: Floats) -> Floats:
-        """Contact velocities after the impact, gamma_minus + W p (n,) [m/s]."""
+        """Return the contact velocities after the impact, gamma_minus + W p (n,) [m/s]."""
         return self.delassus @ impulse + self.gamma_minus
 
     def velocity_plus(self, impulse: Floats) -> Floats:
-        """Generalized velocity after the impact, v + M⁻¹ Jᵀ p (d,); needs the mechanics."""
+        """Return the generalized velocity after the impact, v + M⁻¹ Jᵀ p (d,); this needs the mechanics."""
         if self.mass_matrix is None or self.contact_jacobian is None or self.velocity is None:
             raise ArgumentError("problem", self.name or "without mechanics", "a problem made by from_impact")
         return self.velocity + np.linalg.solve(self.mass_matrix, self.contact_jacobian.T @ impulse)
@@ -213,7 +213,7 @@ def _joints(bilateral: ArrayLike | None, blocks: int) -> NDArray[np.bool_] | Non
 
 
 def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:
-    """A = J L⁻ᵀ (n, d) with M = L Lᵀ: contact rows in coordinates where the kinetic energy is ½|u|²."""
+    """Return A = J L⁻ᵀ (n, d) with M = L Lᵀ: contact rows in coordinates with the kinetic energy ½|u|²."""
     try:
         cholesky = np.linalg.cholesky(mass)
     except np.linalg.LinAlgError:

@@ -1,6 +1,6 @@
-"""Solution: what a solver answered, judged by residuals recomputed from the problem alone.
+"""Solution: the answer of a solver, with residuals recomputed from the problem alone.
 
-A contact's block has 1 (normal), 2 or 3 components, normal first. Coulomb's cone with friction mu is
+The block of a contact has 1 (normal), 2 or 3 components, normal first. Coulomb's cone with friction mu is
 K = {(n, t): |t| <= mu n}; its dual is K* = {(n, t): n >= mu |t|}. Without friction K = K* = {n >= 0}.
 Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008), section 3.9.
 """
@@ -17,16 +17,16 @@ from reference.complementarity.problem import ImpactProblem
 
 Floats = NDArray[np.float64]
 
-# First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting ones 1e-12.
+# First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting solvers 1e-12.
 SOLVED_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a solver's file hands back: impulse (n,) [N s] or None, and what the solver said.
+    """Return value of a solver module: impulse (n,) [N s] or None, and the solver's message.
 
-    refused : True when the solver does not take this kind of problem
-    seconds : [s] where the solver keeps its own time
+    refused : True if the solver does not accept this kind of problem
+    seconds : time [s] if the solver measures it itself
     """
 
     impulse: Floats | None
@@ -37,12 +37,12 @@ class Answer:
 
 @dataclass(frozen=True)
 class Residuals:
-    """How far an impulse is from solving its problem, relative to the velocity scale; inf = unknown.
+    """Residuals of an impulse, relative to the velocity scale; inf = unknown.
 
-    impulse_cone : distance of the scaled impulse from its cone (frictionless: adhesive impulses)
+    impulse_cone : distance of the scaled impulse from its cone (without friction: adhesive impulses)
     velocity_cone : distance of the complementary velocity from the dual cone (penetrating velocities)
     complementarity : largest |p_i · w_i| of a contact
-    natural_map : largest component of p - proj_K(p - w), which vanishes at solutions only
+    natural_map : largest component of p - proj_K(p - w), which is zero only at solutions
     """
 
     impulse_cone: float = np.inf
@@ -52,7 +52,7 @@ class Residuals:
 
     @property
     def worst(self) -> float:
-        """The largest of the four."""
+        """The largest of the four residuals."""
         return max(self.impulse_cone, self.velocity_cone, self.complementarity, self.natural_map)
 
 
@@ -62,10 +62,10 @@ class Solution:
 
     Attributes
     ----------
-    impulse : (n,) p [N s], or None when the solver gave none
+    impulse : (n,) p [N s], or None if the solver returned none
     solver : name in the table of solvers
-    note : what the solver said; shown, never believed
-    refused : True when the solver does not take this kind of problem
+    note : the solver's message, which is shown but not used for the verdict
+    refused : True if the solver does not accept this kind of problem
     seconds : wall time of the call [s]
     """
 
@@ -78,7 +78,7 @@ class Solution:
 
     @cached_property
     def residuals(self) -> Residuals:
-        """Residuals recomputed from the problem; all infinite when there is no usable impulse."""
+        """Residuals recomputed from the problem; all infinite without a usable impulse."""
         if self.impulse is None or self.impulse.shape != self.problem.gamma_minus.shape:
             return Residuals()
         if not np.isfinite(self.impulse).all():
@@ -90,13 +90,13 @@ class Solution:
         return self.residuals.worst <= tolerance
 
     def verdict(self, tolerance: float = SOLVED_TOLERANCE) -> str:
-        """Return "solved", "refused" or "failed"; a refusal is never counted as an answer."""
+        """Return "solved", "refused" or "failed"."""
         if self.solved(tolerance):
             return "solved"
         return "refused" if self.refused else "failed"
 
     def answer(self) -> Floats:
-        """Return the impulse (n,), or NaN where there is none, so that nothing is silently zero."""
+        """Return the impulse (n,), or NaN if there is none."""
         return np.full(self.problem.size, np.nan) if self.impulse is None else self.impulse
 
     @property
@@ -111,12 +111,12 @@ class Solution:
 
 
 def velocity_scale(problem: ImpactProblem) -> float:
-    """Largest |b| [m/s], against which residuals are measured; 1 for the trivial problem b = 0."""
+    """Return the scale of residuals: the largest |b| [m/s], or 1 for the trivial problem b = 0."""
     return float(np.abs(problem.offset).max(initial=0.0)) or 1.0
 
 
 def impulse_scale(problem: ImpactProblem) -> Floats:
-    """Per contact (k,) the largest |W| entry of its rows [1/kg]: turns an impulse into a velocity."""
+    """Return per contact (k,) the largest |W| entry of its rows [1/kg], which converts an impulse into a velocity."""
     scale = np.abs(problem.delassus).max(axis=1, initial=0.0).reshape(-1, problem.contact_size).max(axis=1)
     return np.where(scale > 0.0, scale, 1.0)
 
@@ -153,12 +153,12 @@ def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
 
 
 def distance_to_cone(blocks: Floats, friction: Floats) -> Floats:
-    """Distance (k,) of each row of `blocks` from Coulomb's cone."""
+    """Return the distance (k,) of each row of `blocks` from Coulomb's cone."""
     return np.linalg.norm(blocks - project_on_cone(blocks, friction), axis=1)
 
 
 def distance_to_dual_cone(blocks: Floats, friction: Floats) -> Floats:
-    """Distance (k,) of each row from the dual cone: by Moreau's decomposition |proj_K(-x)|."""
+    """Return the distance (k,) of each row from the dual cone, |proj_K(-x)| by Moreau's decomposition."""
     return np.linalg.norm(project_on_cone(-blocks, friction), axis=1)
 
 
