@@ -14,9 +14,9 @@ solution also if Newton's law has none (opposed closed contacts with e > 0). Eac
 
 Newton's step can gain energy, even with equal e_i: approaching rows get J v⁺ = −e J v⁻, but separating rows get
 J v⁺ >= 0, which amounts to a different e. Example: a bar of 1 kg on two closed contacts with e = 1, one end falling at
-1 m/s and the other rising at 0.1 m/s. Then p = (0.65, 0.3) N s, and the impulse on the other end, which comes to rest, adds 0.015 J.
-The contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) after the forces. If e > 0 and both are positive,
-Poisson's step is used, which never gains energy.
+1 m/s and the other rising at 0.1 m/s. Then p = (0.65, 0.3) N s, and the impulse on the other end, which comes to rest,
+adds 0.015 J. The contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) after the forces. If e > 0 and
+both are positive, Poisson's step is used, which never gains energy.
 Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
 (1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
 

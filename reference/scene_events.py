@@ -234,7 +234,7 @@ class _Motion:
         return np.concatenate([v, acceleration, device_v, moved])
 
     def strike(self, state: Floats) -> tuple[Floats, bool]:
-        """Return the state after an impact of all closed contacts, and whether it is an event; set `held`, `leaving`."""
+        """Return the state after an impact of all closed contacts, and whether it is an event; update `held`."""
         q, v, device_q, device_v = (part.copy() for part in self.split(state))
         found = self.require_no_overlap(q, v)
         names = [n for n, (gap, _) in found.items() if gap <= self.tolerances.closed or n in self.held]
@@ -292,7 +292,7 @@ class _Motion:
         return here.rows @ nearest_velocity(here.mass, here.free, here.rows, bound).velocity + here.drift
 
     def _least(self, here: _Here) -> Floats:
-        """Return limits (c,) [m/s²] of zero acceleration: `released` times those of forces and v/T, plus `at_rest`/T."""
+        """Return thresholds (c,) [m/s²] of opening: `released` times those of forces and v/T, plus `at_rest`/T."""
         root = np.linalg.cholesky(here.mass)
         size = np.linalg.norm(root.T @ here.free) + np.linalg.norm(root.T @ here.v) / self.duration
         reach = np.linalg.norm(np.linalg.solve(root, here.rows.T), axis=0)
