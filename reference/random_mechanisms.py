@@ -54,7 +54,7 @@ def random_body(rng: np.random.Generator, name: str, parent: str | None, kind: s
 def random_mechanism(
     rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
 ) -> Mechanism:
-    """Return trees of `joints` bodies each, in depth-first order, from chains to bushy trees, with joints of `kinds`."""
+    """Return trees of `joints` bodies each, depth first, from chains to bushy trees, with `kinds` of joints."""
     bodies: list[Body] = []
     for tree in range(trees):
         chain: list[str] = []  # from the root to the newest body

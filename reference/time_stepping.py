@@ -111,8 +111,8 @@ class RigidConstraints:
         Impulses are reported as collision impulses at contacts that approached faster than the scene's approach
         velocity, and at pushing contacts connected to them through bodies. The others are reported as forces p/dt. The
         step only determines the sum of both. Collision impulses include the loads of the step; with e near 1 their work
-        may exceed the energy loss. With joint damping, a step with a collision has two parts: the collision, then forces
-        and damping.
+        may exceed the energy loss. With joint damping, a step with a collision has two parts: the collision, then
+        forces and damping.
         """
         entries = len(system.pairs) * system.mechanism.nv
         if entries > MOST_ENTRIES // BOX_CORNERS and (cost := cost_of(system)).too_large:
