@@ -1,8 +1,8 @@
-"""`make mutants`: small faults put into the physics one at a time, each of which some test has to notice.
+"""`make mutants`: mutation testing of the physics modules. Tests must detect small faults, inserted one at a time.
 
-A sample of the faults is judged in throw-away clones of the last commit, with the kernels interpreted
-(NUMBA_DISABLE_JIT=1). The share that the tests notice is printed. A survivor is either a gap in the tests or changes
-nothing that matters; the latter are listed with their reasons in mutants.toml.
+A sample of the faults is tested in temporary clones of the last commit, with interpreted kernels
+(NUMBA_DISABLE_JIT=1), and the share of detected faults is printed. A fault that no test detects is either a gap in the
+tests or an irrelevant change; irrelevant changes are listed with reasons in mutants.toml.
 
 1. Every test file runs once under a tracer: which functions of the physics does each test call, and in what time?
 2. `places` lists where a fault can be put (see `faults`); a hash of the place and the seed draws the sample.
@@ -59,7 +59,7 @@ _DECLARED = re.compile(r"^ +(\w+): np\.ndarray  # \(1,\)", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change of one file: the bytes from start to stop become others."""
+    """One fault: the bytes from start to stop of one file are replaced."""
 
     file: str
     function: str  # qualified name; empty outside of all functions
@@ -72,13 +72,13 @@ class Mutant:
     new: str
 
     def source(self, text: str) -> str:
-        """The file's text with the change."""
+        """Return the file's text with the fault."""
         content = text.encode()
         return (content[: self.start] + self.new.encode() + content[self.stop :]).decode()
 
 
 def faults(tree: ast.AST, content: bytes, one_entry: frozenset[str]) -> Iterator[tuple[str, int, int, str]]:
-    """Yield (kind, start, stop, new text) of every fault: other operators, numbers ± 1, dropped statements …"""
+    """Yield (kind, start, stop, new text) of every fault: changed operators, numbers ± 1, removed statements …"""
     begins = [0, *(found.end() for found in re.finditer(rb"\n", content))]
 
     def start(node: Any) -> int:
@@ -128,7 +128,7 @@ def faults(tree: ast.AST, content: bytes, one_entry: frozenset[str]) -> Iterator
 
 
 def _code(node: ast.AST) -> Iterator[ast.AST]:
-    """Every node but type hints of records and messages of errors, which no test should pin, and format strings."""
+    """Yield every node except type hints of records, raise statements and format strings, which need no test."""
     for child in ast.iter_child_nodes(node):
         hint = isinstance(child, ast.AnnAssign) and child.value is None
         if not (hint or isinstance(child, ast.Raise | ast.JoinedStr)):
@@ -147,7 +147,7 @@ def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, range]]:
 
 
 def places(file: str, text: str, one_entry: frozenset[str] = frozenset()) -> Iterator[Mutant]:
-    """All mutants of one file."""
+    """Yield all mutants of one file."""
     tree, content, lines = ast.parse(text), text.encode(), text.splitlines()
     spans = sorted(functions(tree), key=lambda span: len(span[1]))
     for kind, start, stop, new in faults(tree, content, one_entry):
@@ -158,7 +158,7 @@ def places(file: str, text: str, one_entry: frozenset[str] = frozenset()) -> Ite
 
 
 def all_places(root: Path, only: str = "") -> list[Mutant]:
-    """All mutants of the physics whose file's path contains `only`."""
+    """Yield all mutants of the physics modules whose path contains `only`."""
     files = sorted({path for pattern in PHYSICS for path in root.glob(pattern)})
     one_entry = frozenset(name for path in files for name in _DECLARED.findall(path.read_text()))
     named = ((str(path.relative_to(root)), path) for path in files)
@@ -166,7 +166,7 @@ def all_places(root: Path, only: str = "") -> list[Mutant]:
 
 
 def sample(mutants: Iterable[Mutant], count: int, seed: int) -> list[Mutant]:
-    """The `count` mutants with the smallest hash of seed and content: an edit elsewhere does not change them."""
+    """Return the `count` mutants with the smallest hash of seed and content, which edits elsewhere do not change."""
     drawn: list[tuple[str, Mutant]] = []
     seen: Counter[tuple[str, ...]] = Counter()
     for mutant in mutants:
@@ -191,7 +191,7 @@ _START, _SLOWER = 20, 4  # [s] of CPU to start pytest, generously; a mutant that
 
 
 def git(*arguments: str, folder: Path = REPOSITORY) -> str:
-    """Output of a git command."""
+    """Return the output of a git command."""
     return subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
 
 
@@ -203,7 +203,7 @@ class Clone:
         git("clone", "-q", str(REPOSITORY), str(self.root))
 
     def pytest(self, arguments: Sequence[str], seconds: int, calls: str = "") -> tuple[str, str]:
-        """Run pytest on some tests, at most so many seconds of CPU; return what became of it and the first failure."""
+        """Run pytest with a limit of CPU seconds; return its outcome and the first failure."""
         said = self.root / "said.txt"
         options = ["-q", "--tb=no", "-p", "no:cacheprovider", "-p", "tools.mutants", *arguments]
         process = _PROCESSES.Process(target=_run_pytest, args=(self.root, options, seconds, calls, said))
@@ -224,7 +224,7 @@ class Clone:
 
 
 def _run_pytest(root: Path, options: Sequence[str], seconds: int, calls: str, said: Path) -> None:
-    """In a process of its own, where all big libraries are loaded but the engine is not: pytest in a clone."""
+    """Run pytest in a clone, in a new process with the large libraries loaded but not the engine."""
     import pytest
 
     os.environ[_CALLS] = calls
@@ -240,9 +240,9 @@ def _run_pytest(root: Path, options: Sequence[str], seconds: int, calls: str, sa
 
 
 def prepare() -> None:
-    """Settings of all test processes: interpreted kernels; one thread, so that CPU time is the time of the work.
+    """Set up all test processes: interpreted kernels, and one thread so that CPU time measures the work.
 
-    No byte code is written: of a file that changes twice within a second it would be stale.
+    No byte code is written, because it would be stale for a file that changes twice within a second.
     """
     os.environ.update(NUMBA_DISABLE_JIT="1", PYTHONDONTWRITEBYTECODE="1", OMP_NUM_THREADS="1",
                       OPENBLAS_NUM_THREADS="1", IAPB_HYPOTHESIS_PROFILE="quick")  # fmt: skip
@@ -250,7 +250,7 @@ def prepare() -> None:
 
 
 def in_clones(work: Callable[[Clone, Any], Any], things: Iterable[Any], clones: Sequence[Clone]) -> Iterator[Any]:
-    """Results of `work(clone, thing)` as they are done, one at a time in each clone."""
+    """Yield the results of `work(clone, thing)` as they complete, one at a time in each clone."""
     free: queue.SimpleQueue[Clone] = queue.SimpleQueue()
     for clone in clones:
         free.put(clone)
@@ -279,13 +279,14 @@ _SLOWEST_TEST, _LONGEST_FILE = 4.0, 40.0  # [s] of CPU, traced; a slower test wo
 
 
 class _TooSlow(BaseException):
-    """No Exception: hypothesis would take it for a failure of the test and search for a smaller one."""
+    """A time limit was exceeded. It is no Exception, which hypothesis would treat as a failure and try to shrink."""
 
 
 class Calls:
-    """Notes the calls, the outcome and the CPU seconds of each test.
+    """Records the calls, the outcome and the CPU seconds of each test.
 
-    What a shared fixture calls is noted at the first test that uses it; therefore a survivor is judged by whole files.
+    Calls of a shared fixture are recorded for the first test that uses it. Therefore undetected mutants are also tested
+    by whole files.
     """
 
     def __init__(self) -> None:
@@ -315,7 +316,7 @@ class Calls:
             self.tests[item.nodeid].update(seconds=seconds, calls=sorted(calls))
 
     def pytest_pyfunc_call(self, pyfuncitem: Any) -> Generator[None, Any, Any]:
-        """Stop a slow test; only inside its own function, where pytest takes that for a failure."""
+        """Stop a slow test, only within its own function, where pytest counts this as a failure."""
 
         def stop(number: int, frame: Any) -> None:
             raise _TooSlow
@@ -328,17 +329,17 @@ class Calls:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        """A test counts only if all its phases pass (a skipped one does not)."""
+        """Record whether all phases of a test passed; a skipped test does not count as passed."""
         if not report.passed:
             self.tests[report.nodeid]["passed"] = False
 
     def pytest_sessionfinish(self) -> None:
-        """Write what was seen."""
+        """Write the record to its file."""
         Path(os.environ[_CALLS]).write_text(json.dumps(self.tests))
 
 
 def pytest_configure(config: Any) -> None:
-    """Trace calls where a file for them is named."""
+    """Trace calls if the environment names a file for them."""
     import pytest
 
     if os.environ.get(_CALLS):
@@ -348,7 +349,7 @@ def pytest_configure(config: Any) -> None:
 
 
 def pytest_collection() -> None:
-    """Hypothesis stops at the first counterexample (after the profiles of tests/conftest.py, before the tests)."""
+    """Let hypothesis stop at the first counterexample; this runs after tests/conftest.py and before the tests."""
     from hypothesis import Phase, settings
 
     settings.register_profile("mutants", settings.default, phases=(Phase.explicit, Phase.generate))
@@ -362,7 +363,7 @@ FIRST_LOOK, SECOND_LOOK = 10.0, 40.0  # [s] of CPU for the tests of a mutant, as
 
 @dataclass(frozen=True)
 class MeasuredTest:
-    """One test that passes with interpreted kernels: its CPU seconds and the functions that it calls."""
+    """A test that passes with interpreted kernels, with its CPU seconds and the functions that it calls."""
 
     name: str
     seconds: float
@@ -370,12 +371,12 @@ class MeasuredTest:
 
     @property
     def file(self) -> str:
-        """The file that it stands in."""
+        """The file of the test."""
         return self.name.split("::")[0]
 
 
 def measured(clones: Sequence[Clone], told: Callable[[str], None]) -> list[MeasuredTest]:
-    """Measure every test file, or take what was measured: a file of results for each version of a test file."""
+    """Return measurements of all tests; each version of a test file is measured once and its results are kept."""
     folder, root = OUT / "calls", clones[0].root
     folder.mkdir(parents=True, exist_ok=True)
     files = [str(path.relative_to(root)) for part in TESTS for path in sorted((root / part).rglob("test_*.py"))]
@@ -395,9 +396,9 @@ def measured(clones: Sequence[Clone], told: Callable[[str], None]) -> list[Measu
 
 
 def looks(mutant: Mutant, tests: Sequence[MeasuredTest]) -> tuple[list[MeasuredTest], list[MeasuredTest]]:
-    """The quickest tests that call the mutant's function, its own test file first; then the rest of their files.
+    """Return the quickest tests that call the mutant's function, its own test file first; then others of their files.
 
-    For a constant, or a function newer than the measurement, the tests that call anything of its module.
+    For a constant, or a function newer than the measurement, these are the tests that call anything of its module.
     """
     calling = [test for test in tests if mutant.function and f"{mutant.file}::{mutant.function}" in test.calls]
     calling = calling or [test for test in tests if any(name.startswith(f"{mutant.file}::") for name in test.calls)]
@@ -417,7 +418,7 @@ def _within(tests: Iterable[MeasuredTest], seconds: float) -> list[MeasuredTest]
 
 @dataclass(frozen=True)
 class Judgement:
-    """What became of one mutant."""
+    """The verdict on one mutant."""
 
     file: str
     function: str
@@ -432,12 +433,12 @@ class Judgement:
 
     @property
     def killed(self) -> bool:
-        """Did some test fail, or never end?"""
+        """Whether a test failed or did not end."""
         return self.verdict in (NOTICED, TOO_LONG)
 
 
 def kept_verdicts(path: Path, code: str) -> dict[str, Judgement]:
-    """Verdicts that stand: a noticed mutant's while its file is the same, a survivor's while engine and tests are."""
+    """Return the verdicts still valid: a detected mutant's for the same file, others' for the same engine and tests."""
     lines = path.read_text().splitlines() if path.exists() else []
     judged = (Judgement(**json.loads(line)) for line in lines)
     return {old.key: old for old in judged if old.killed or old.code == code}
@@ -446,7 +447,7 @@ def kept_verdicts(path: Path, code: str) -> dict[str, Judgement]:
 def judge(
     mutant: Mutant, tests: Sequence[MeasuredTest], clone: Clone, known: dict[str, Judgement], code: str
 ) -> Judgement:
-    """Look up or find out one verdict; the clone is left as it was."""
+    """Return the kept verdict or test the mutant; the clone is restored."""
     path = clone.root / mutant.file
     text = path.read_text()
     key = _stamp(mutant.file + mutant.source(text))
@@ -465,7 +466,7 @@ def judge(
 
 
 def _tried(mutant: Mutant, tests: Sequence[MeasuredTest], clone: Clone) -> tuple[str, str, int]:
-    """(verdict, the test that noticed, number of tests that passed)."""
+    """Return the verdict, the test that detected the mutant, and the number of passed tests."""
     passed = 0
     for chosen in filter(None, looks(mutant, tests)):
         patience = _START + round(_SLOWER * sum(test.seconds for test in chosen))
@@ -482,13 +483,13 @@ def _tried(mutant: Mutant, tests: Sequence[MeasuredTest], clone: Clone) -> tuple
 
 
 def explanation(one: Judgement, table: Sequence[dict[str, str]]) -> dict[str, str] | None:
-    """Why a survivor is no gap in the tests, or None."""
+    """Return the entry that explains why an undetected mutant is no gap in the tests, or None."""
     return next((entry for entry in table if (entry["file"], entry["line"]) == (one.file, one.line)
                  and entry.get("becomes", one.becomes) == one.becomes), None)  # fmt: skip
 
 
 def score(judged: Sequence[Judgement], table: Sequence[dict[str, str]]) -> tuple[float, float, list[Judgement]]:
-    """Share of all mutants noticed; share without the survivors that change nothing; survivors without explanation."""
+    """Return the share detected, the share without irrelevant mutants, and the undetected ones without explanation."""
     survivors = [one for one in judged if not one.killed]
     reasons = [explanation(one, table) for one in survivors]
     killed, equivalent = len(judged) - len(survivors), sum(why is not None and why["kind"] == "equivalent"
@@ -498,7 +499,7 @@ def score(judged: Sequence[Judgement], table: Sequence[dict[str, str]]) -> tuple
 
 
 def sentences(judged: Sequence[Judgement], table: Sequence[dict[str, str]], number: int) -> Iterator[str]:
-    """Score per module, the survivors with their lines, and the score of all."""
+    """Yield the score per module, the undetected mutants with their lines, and the total score."""
     for file, count in sorted(Counter(one.file for one in judged).items()):
         yield f"{file}: {sum(one.killed for one in judged if one.file == file)} of {count} noticed"
     for one in sorted((one for one in judged if not one.killed), key=lambda one: (one.file, one.number)):
@@ -514,7 +515,7 @@ def sentences(judged: Sequence[Judgement], table: Sequence[dict[str, str]], numb
 
 
 def main() -> int:
-    """Return 1 if too few mutants are noticed or a survivor is not explained."""
+    """Return 1 if too few mutants are detected or an undetected mutant is not explained."""
     parser = argparse.ArgumentParser(prog="python -m tools.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("-n", dest="count", type=int, default=100, help="size of the sample")
     parser.add_argument("--seed", type=int, default=0, help="another seed draws another sample")

@@ -1,8 +1,8 @@
-"""`make packages`: build the wheel and the sdist, and use each in empty environments of every Python at hand.
+"""`make packages`: build the wheel and the sdist, and test each in new environments of every installed Python.
 
-An environment gets the newest packages that pip finds, or the lowest that pyproject.toml allows. In each one a process
-imports iapb, simulates a scene and resolves an impact; another does so from the cache. The numbers must be equal to the
-last bit in all of them. With --extra the environments get that extra, too, and judge an impact resolver.
+An environment gets the newest packages that pip finds, or the lowest that pyproject.toml allows. In each environment a
+process imports iapb, simulates a scene and resolves an impact; a second process does the same from the cache. The
+results must be equal to the last bit. With --extra the environments also get that extra and test an impact resolver.
 
     python -m tools.packages --extra all        (a gigabyte for each Python)
 """
@@ -47,7 +47,7 @@ print(json.dumps({"passed": bool(passed), "verdict": time.perf_counter() - start
 
 
 def main() -> int:
-    """Build, try each environment, print a table; 1 where one fails or gives other numbers."""
+    """Build, test each environment and print a table; return 1 if one fails or gives different numbers."""
     parser = argparse.ArgumentParser(prog="python -m tools.packages", description=__doc__.splitlines()[0])
     parser.add_argument("--extra", default="", help="an extra of pyproject.toml to install, too: verify, report or all")
     parser.add_argument("--pythons", nargs="+", metavar="COMMAND", default=[
@@ -95,7 +95,7 @@ def lowest(extra: str) -> list[str]:
 
 
 def try_one(folder: Path, python: str, archive: Path, low: bool, extra: str) -> dict[str, object]:
-    """Install `archive` into a new environment and use it twice; return what was seen, or "failed"."""
+    """Install `archive` into a new environment and use it twice; return the results, or "failed"."""
     row: dict[str, object] = {"python": "", "from": "sdist" if archive.suffix == ".gz" else "wheel",
                               "versions": "lowest" if low else "newest"}  # fmt: skip
     print(f"trying {python}, {row['from']}, {row['versions']} ...", file=sys.stderr)
@@ -121,7 +121,7 @@ def try_one(folder: Path, python: str, archive: Path, low: bool, extra: str) -> 
 
 
 def told(command: list[object], where: Path | None = None) -> str:
-    """Run a command and return what it prints."""
+    """Run a command and return its output."""
     done = subprocess.run([str(part) for part in command], cwd=where, capture_output=True, text=True, check=True)
     return done.stdout.strip()
 

@@ -1,15 +1,15 @@
-"""`make portable`: the same verdicts on every processor, tried by running everything under other settings of this one.
+"""`make portable`: check that verdicts do not depend on the processor, by runs under different machine settings.
 
 A setting chooses other machine code for BLAS (OPENBLAS_CORETYPE), numpy (NPY_DISABLE_CPU_FEATURES), compiled kernels
 (NUMBA_CPU_NAME), the C library's sin and exp (GLIBC_TUNABLES) or the number of threads. Every setting is compared
-with `default`, the settings that the machine picks by itself:
+with `default`, the settings that the machine chooses itself:
 
 - runs of engine worlds, and impacts: equal bit for bit, for the kernels call no BLAS
 - runs of the other worlds (they solve by LAPACK): q within Q_TOLERANCE
 - numerical tests (TESTS): none fails
-- `iapb reproduce`: ends with 0, and every outcome that rests on no measured time is the same
+- `iapb reproduce`: exits with 0, and every outcome that does not depend on measured times is the same
 
-A part that is done for this state of the sources is kept in out/portable and not repeated.
+Results for the current state of the sources are kept in out/portable and not computed again.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ from xml.etree import ElementTree
 import numpy as np
 
 ROOT = Path.cwd()
-# The tests whose outcome rests on numbers: all but those of the documents, the browser, the live view and the tools.
+# The numerical tests: all tests except those of documents, browser, live view and tools.
 TESTS = ("tests/iapb", "tests/reference", "tests/verification", "tests/reports",
          "--ignore=tests/reports/browser", "--ignore=tests/reports/live")  # fmt: skip
 # A rigid world solves a problem by LAPACK in each step. Its rounding (1e-16 of a position) grows over some 2,000 steps
-# by contacts that part: 1.3e-9 m was seen (peg_hole_space in CBuc), 4e-12 m in the plane. The smallest length that a
-# verdict compares is a penetration of 1e-4 m, ten thousand times as large.
+# as contacts separate: to 1.3e-9 m at most (peg_hole_space in CBuc), and 4e-12 m in the plane. The smallest length in a
+# verdict is a penetration of 1e-4 m, ten thousand times as large as the tolerance.
 Q_TOLERANCE = 1e-8
-JUDGED = ("outcome", "holds", "law")  # columns of verdicts: of findings and cases, of each trial, of other engines
+JUDGED = ("outcome", "holds", "law")  # columns with verdicts: of findings and cases, of single trials, of other engines
 IMPACTS = 200
 BLAS = {name: {"OPENBLAS_CORETYPE": name} for name in ("Haswell", "SkylakeX", "Sandybridge", "Zen", "Prescott")}
 SETTINGS: dict[str, dict[str, str]] = {
     "default": {},
     **BLAS,
-    "numpy-baseline": {"NPY_DISABLE_CPU_FEATURES": "?"},  # the names are asked of numpy: it ignores wrong ones silently
+    "numpy-baseline": {"NPY_DISABLE_CPU_FEATURES": "?"},  # numpy gives the names; it silently ignores wrong ones
     "numba-generic": {"NUMBA_CPU_NAME": "generic"},
     "libm-baseline": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"},
     "one-thread": {"OPENBLAS_NUM_THREADS": "1"},
     "two-threads": {"OPENBLAS_NUM_THREADS": "2"},
 }
-# What OpenBLAS calls the kernels that it takes for a name, where that is not the name itself.
+# Names that OpenBLAS reports for a requested name, if they differ from it.
 BLAS_NAMES = {"Zen": {"Zen", "Haswell"}, "Prescott": {"Prescott", "Katmai"}}
 
 
 def main() -> int:
-    """Try the settings, print and write the table; 1 where one of them does not give the same."""
+    """Run all settings, print and write the table; return 1 if a setting gives different results."""
     parser = argparse.ArgumentParser(prog="python -m tools.portable", description=__doc__.splitlines()[0])
     parser.add_argument("--settings", nargs="+", choices=SETTINGS, default=list(SETTINGS), metavar="NAME",
                         help=f"default: all of {', '.join(SETTINGS)}")  # fmt: skip
@@ -83,7 +83,7 @@ def main() -> int:
 
 
 def state_of_sources() -> str:
-    """The commit, the version of Python, and a hash of what differs from the commit."""
+    """Return the commit, the version of Python, and a hash of uncommitted changes."""
     commit = _git("rev-parse", "--short=12", "HEAD")
     untracked = _git("ls-files", "--others", "--exclude-standard")
     changed = _git("diff", "HEAD") + untracked
@@ -97,7 +97,7 @@ def _git(*arguments: str) -> str:
 
 
 def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict[str, Any]:
-    """One row of the table: what the setting gave, and what of it is wrong."""
+    """Return one row of the table: the results under the setting, and the list of differences."""
     here = folder / name
     here.mkdir(parents=True, exist_ok=True)
     machine = _facts({}, here / "machine.json")
@@ -121,7 +121,7 @@ def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict
 
 
 def environment(name: str, machine: dict[str, Any], here: Path) -> tuple[dict[str, str], str]:
-    """The variables of a setting on this machine, or why it cannot be tried."""
+    """Return the environment variables of a setting on this machine, and why it cannot be tried (or empty)."""
     setting = dict(SETTINGS[name])
     lacking = {"SkylakeX": "AVX512_SKX", "Haswell": "AVX2", "Zen": "AVX2", "Sandybridge": "AVX",
                "libm-baseline": "FMA3"}.get(name)  # fmt: skip
@@ -131,13 +131,13 @@ def environment(name: str, machine: dict[str, Any], here: Path) -> tuple[dict[st
         if not machine["optional"]:
             return setting, "the processor has none of the features that numpy has code for"
         setting["NPY_DISABLE_CPU_FEATURES"] = " ".join(machine["optional"])
-    if name == "numba-generic":  # a cache of its own: nothing compiled for this processor is taken for generic
+    if name == "numba-generic":  # a separate cache, so that no code for this processor is used
         setting["NUMBA_CACHE_DIR"] = str(here / "numba")
     return setting, ""
 
 
 def not_in_force(name: str, facts: dict[str, Any], machine: dict[str, Any]) -> str:
-    """What a setting should have changed in the process and did not; empty where it did."""
+    """Return which change of the setting had no effect in the process; empty if all took effect."""
     if name in BLAS and not set(facts["blas"]) <= BLAS_NAMES.get(name, {name}):
         return f"OpenBLAS took {facts['blas']}"
     if name == "numpy-baseline" and facts["optional"]:
@@ -160,7 +160,7 @@ def _facts(setting: dict[str, str], path: Path) -> dict[str, Any]:
 
 
 def _run(command: list[str], setting: dict[str, str], log: Path) -> int:
-    """Run a command under a setting and nothing else of the kind; its output goes to a file."""
+    """Run a command under one setting only, with its output in a file."""
     clean = {key: value for key, value in os.environ.items() if all(key not in one for one in SETTINGS.values())}
     with log.open("w", encoding="utf-8") as file:
         return subprocess.run(command, cwd=ROOT, stdout=file, stderr=subprocess.STDOUT,
@@ -168,7 +168,7 @@ def _run(command: list[str], setting: dict[str, str], log: Path) -> int:
 
 
 def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
-    """The numerical tests: how many passed, and which did not."""
+    """Run the numerical tests; return how many passed and which failed."""
     here, path = folder / name, folder / name / "tests.xml"
     kept = path.is_file()
     if not kept:
@@ -186,7 +186,7 @@ def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) ->
 
 
 def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
-    """Every shipped scene in every world, and impacts: which are equal to the default's."""
+    """Run every shipped scene in every world, and impacts; compare them with those of the default."""
     path = folder / name / "runs.json"
     kept = path.is_file()
     if not kept and _run([sys.executable, __file__, "--child", "runs", str(path)], setting, path.with_suffix(".log")):
@@ -209,7 +209,7 @@ def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> 
 
 
 def _differences(first: Path, second: Path) -> tuple[float, float]:
-    """Largest difference of q, and of any array; infinite where one has other entries than the other."""
+    """Return the largest difference of q and of any array; infinite if the two files have different entries."""
     if not (first.is_file() and second.is_file()):
         return np.inf, np.inf  # one of them was not computed
     q, largest = 0.0, 0.0
@@ -228,7 +228,7 @@ def _differences(first: Path, second: Path) -> tuple[float, float]:
 
 
 def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
-    """`iapb reproduce`: its exit status, and its outcomes beside those of the default."""
+    """Run `iapb reproduce`; return its exit status and a comparison with the outcomes of the default."""
     from iapb import IapbError
     from reports.difference import CLOSE, DIFFERS, EXACT, TIMING, compare_reports
     from reports.numbers_file import read_numbers
@@ -261,7 +261,7 @@ PARTS = {"tests": run_tests, "runs": run_runs, "report": run_report}
 
 
 def child_facts(path: Path) -> None:
-    """What this process really uses."""
+    """Write which libraries and processor features this process really uses."""
     import math
 
     import scipy.linalg  # noqa: F401 - loads its own BLAS
@@ -283,7 +283,7 @@ def child_facts(path: Path) -> None:
 
 
 def child_runs(path: Path) -> None:
-    """Compute every run and the impacts; hashes go to `path`, arrays beside it."""
+    """Compute every run and the impacts; write hashes to `path` and arrays next to it."""
     found = {}
     for label, kind, arrays in [*_runs(), *_impacts()]:
         hashes = {key: hashlib.sha256(f"{x.dtype}{x.shape}".encode() + x.tobytes()).hexdigest() for key, x in arrays}
@@ -293,7 +293,7 @@ def child_runs(path: Path) -> None:
 
 
 def _runs() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
-    """Label, kind of world and arrays of each run; of a world that refuses a scene, its words."""
+    """Yield label, kind of world and arrays of each run, or the message of a world that refuses the scene."""
     from iapb import IapbError, find_scene, load_scene
     from iapb.scene import scene_names
     from reference.worlds import WORLDS, find_world, run_world
@@ -311,7 +311,7 @@ def _runs() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
 
 
 def _arrays(place: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Every array of a record by its place in it; measured times are left out."""
+    """Yield every array of a record with its place, without measured times."""
     if is_dataclass(value):
         for field in fields(value):
             if not field.name.startswith("chunk_"):
@@ -324,7 +324,7 @@ def _arrays(place: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _impacts() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
-    """Impacts whose input is made of whole numbers, so that it is the same everywhere."""
+    """Yield impacts with integer input, which is the same on every machine."""
     from iapb import resolve_impact
 
     rng = np.random.default_rng(0)
@@ -343,7 +343,7 @@ CHILDREN = {"facts": child_facts, "runs": child_runs}
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """The settings as lines of text, and beneath them what is wrong."""
+    """Return the table of settings as text, followed by the differences found."""
     heads = ("setting", "BLAS", "tests passed/failed", "outcomes equal", "engine runs equal", "other runs equal",
              "largest difference", "of q", "result")  # fmt: skip
     lines = [heads, *(_line(row) for row in rows)]

@@ -1,4 +1,4 @@
-"""Adapters to other engines, and the fixed set of scenes on which they are compared. Each engine is optional."""
+"""Adapters to other engines, and the fixed set of scenes for their comparison. Each engine is optional."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = [
 
 _HERE = "reference.simulators"
 
-# name -> module:class; to add an engine: a file and a line here
+# name -> module:class; to add an engine, add its module and a line here
 SIMULATORS: dict[str, str] = {
     "iapb": f"{_HERE}.own_engines:ImpulseAugmentedEngine",
     "rigid": f"{_HERE}.own_engines:RigidWorld",
@@ -29,7 +29,7 @@ SIMULATORS: dict[str, str] = {
 
 
 def find_simulator(name: str) -> Simulator:
-    """The adapter of that name; the engine itself is imported when it is first used."""
+    """Return the adapter of that name; the engine itself is imported at its first use."""
     if name not in SIMULATORS:
         raise ArgumentError("simulator", name, one_of(name, SIMULATORS))
     module, kind = SIMULATORS[name].split(":")

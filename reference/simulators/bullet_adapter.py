@@ -14,7 +14,7 @@ from reference.simulators.trajectory import Recorder, Trajectory, steps_between_
 
 DEFAULT_STEP = 1.0 / 240.0  # [s]
 DEFAULT_ERP = 0.2  # share of an overlap that the solver removes in a step
-ITERATIONS, ITERATIONS_OF_A_STACK = 50.0, 1e4  # the default; the best of 50, 1000 and 10 000 for the stack
+ITERATIONS, ITERATIONS_OF_A_STACK = 50.0, 1e4  # the default; for the stack the best of 50, 1000 and 10 000
 
 
 class Bullet:
@@ -23,18 +23,18 @@ class Bullet:
     title = "Bullet"
 
     def version(self) -> str:
-        """Installed version."""
+        """Return the installed version."""
         _pybullet()
         from importlib.metadata import version
 
         return version("pybullet")
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Its step of 1/240 s, and nothing that hides restitution: thresholds and damping are zero.
+        """Return Bullet's step of 1/240 s with zero thresholds and damping, which would hide restitution.
 
-        Static boxes, not planes, and e as the product of two equal roots. Overlaps are pushed out for one box at rest
-        only: the default contactERP turns the depth at which an impact is found into energy, three times the start's
-        with two balls and a wall.
+        Walls are static boxes, not planes, and each body has the restitution √e, because Bullet multiplies the two.
+        Overlaps are corrected only for a single box at rest: at an impact, the default contactERP turns the overlap
+        into energy, which for two balls and a wall reached three times the initial energy.
         """
         stacked = scene.rests and len(scene.bodies) > 1
         push_out = DEFAULT_ERP if scene.rests and not stacked else 0.0
@@ -47,7 +47,7 @@ class Bullet:
         return Settings(step or DEFAULT_STEP, options)
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Simulate by `stepSimulation`."""
+        """Simulate with `stepSimulation`."""
         bullet = _pybullet()
         world = bullet.connect(bullet.DIRECT)
         try:

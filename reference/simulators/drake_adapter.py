@@ -1,4 +1,4 @@
-"""Drake: compliant point contacts; an error-controlled integrator for bouncing, its discrete solver for fixed steps."""
+"""Drake: compliant point contacts, with an error-controlled integrator for impacts or the discrete solver."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajector
 STEP = 1e-3  # [s] its default for discrete plants
 NO_RESTITUTION = "no coefficient e: a stiffness and, for e < 1, Hunt and Crossley's damping at the known speed stand in"
 DISSIPATES = "no coefficient e, and discrete steps dissipate even undamped contacts"
-# Radius [m] of the small balls at a box's corners, inset by it (faces would meet in one point). A ball that sinks in
-# by more than its radius at the rim of a face is pushed out sideways: under a heavy load they are larger.
+# Radius [m] of the small balls inside a box's corners; faces would have only one contact point. Near the edge of a
+# face, a ball with more overlap than its radius is pushed out sideways, so balls under a heavy load are larger.
 CORNER, LOADED_CORNER = 1e-3, 2e-2
-OWN_STIFFNESS = 1e7  # [N/m] half a period of 1 ms with 1 kg
-# [N/m] at 1 ms, the best of 1e2 to 1e6: for e = 1 undamped, for e = 1/2 where the step's own loss makes it
+OWN_STIFFNESS = 1e7  # [N/m] the half period is 1 ms with 1 kg
+# [N/m] the best of 1e2 to 1e6 at 1 ms: for e = 1 without damping, for e = 1/2 with the loss of the step itself
 GIVEN_STIFFNESS, GIVEN_LOSSY_STIFFNESS = 1e4, 1e5
 DISCRETE, CONTINUOUS = "discrete (SAP)", "continuous (runge_kutta3)"
 
@@ -30,14 +30,18 @@ class Drake:
     title = "Drake"
 
     def version(self) -> str:
-        """Installed version."""
+        """Return the installed version."""
         _pydrake()
         from importlib.metadata import version
 
         return version("drake")
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Its discrete defaults at rest; undamped springs for bouncing, integrated with error control where it may."""
+        """Return the discrete defaults for resting scenes. Impact scenes get a given contact stiffness.
+
+        Without a given step, impacts are integrated with error control and with damping for e < 1; with a given step,
+        by the discrete solver without damping.
+        """
         stacked = scene.rests and len(scene.bodies) > 1
         corners: dict[str, str | float] = {"corner radius": LOADED_CORNER if stacked else CORNER}
         if scene.rests:
@@ -51,7 +55,7 @@ class Drake:
                                "sap_near_rigid_threshold": 0.0, **corners}, DISSIPATES)  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Simulate by `Simulator.AdvanceTo`."""
+        """Simulate with `Simulator.AdvanceTo`."""
         drake = _pydrake()
         plant, diagram, bodies = _build(drake, scene, settings, step)
         simulator = drake.Simulator(diagram)
@@ -78,7 +82,7 @@ def _pydrake() -> Any:
 
 
 def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tuple[Any, Any, list[Any]]:
-    """Plant, diagram and bodies."""
+    """Return plant, diagram and bodies."""
     builder = drake.DiagramBuilder()
     time_step = 0.0 if settings.options["mode"] == CONTINUOUS else step
     plant, geometry = drake.AddMultibodyPlantSceneGraph(builder, time_step)
@@ -98,12 +102,12 @@ def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tu
     plant.Finalize()
     if any(isinstance(shape, Cuboid) for body in scene.bodies for shape in body.shapes):
         rules = drake.CollisionFilterDeclaration().ExcludeWithin(balls).ExcludeWithin(boxes)
-        geometry.collision_filter_manager().Apply(rules)  # corners meet faces, nothing else
+        geometry.collision_filter_manager().Apply(rules)  # only corners and faces collide
     return plant, builder.Build(), bodies
 
 
 def _material(drake: Any, settings: Settings) -> Any:
-    """Frictionless; two equal springs in series make a contact."""
+    """Return a frictionless material; a contact has two equal springs in series."""
     given, properties = settings.options, drake.ProximityProperties()
     stiffness = given.get("point_contact_stiffness")
     drake.AddContactMaterial(
@@ -117,7 +121,7 @@ def _material(drake: Any, settings: Settings) -> Any:
 
 def _add(drake: Any, plant: Any, body: RigidBody, material: Any, radius: float, others: bool, balls: Any,
          boxes: Any) -> Any:  # fmt: skip
-    """Add a body; a box is small balls at its corners and, where others may touch it, its faces."""
+    """Add a body. A box has small balls at its corners and, if there are other bodies, also its faces."""
     unit = [moment / body.mass for moment in body.inertia]
     inertia = drake.SpatialInertia(body.mass, np.zeros(3), drake.UnitInertia(*unit))
     made = plant.AddRigidBody(body.name, inertia)

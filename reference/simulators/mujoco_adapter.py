@@ -1,4 +1,4 @@
-"""MuJoCo: soft contacts with a reference acceleration; no coefficient of restitution."""
+"""MuJoCo: soft contacts with a reference acceleration, without a coefficient of restitution."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from reference.simulators.trajectory import Recorder, Trajectory, steps_between_
 
 NO_RESTITUTION = "no coefficient e: a spring and damper per contact, stiff enough to part impacts, stand in for it"
 OWN_STEP, STACK_STEP, DEFAULT_STEP = 1e-5, 2e-5, 2e-3  # [s] for bouncing, for the stack, and the engine's default
-# A spring's half period in steps. Fewer, and the step makes or takes energy; more, and impacts run into each other.
+# A spring's half period in steps. With fewer, the step adds or removes energy; with more, impacts overlap in time.
 OWN_STEPS_OF_AN_IMPACT = 100.0
 GIVEN_STEPS_OF_AN_IMPACT = 8.0  # the best of 3, 5, 8, 12 and 20 at 1 ms, over the impact scenes
-HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: the largest impedance that MuJoCo takes
-MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the default impedance, a share of the lightest mass, carries nothing
+HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: the largest impedance that MuJoCo accepts
+MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the default impedance is too small to carry the load
 
 
 class MuJoCo:
@@ -28,11 +28,11 @@ class MuJoCo:
     title = "MuJoCo"
 
     def version(self) -> str:
-        """Installed version."""
+        """Return the installed version."""
         return str(_mujoco().__version__)
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Defaults at rest, hard contacts for the stack; a direct (negative) solref with e's damping for bouncing."""
+        """Return defaults for resting scenes, hard contacts for the stack, a negative solref with damping for impacts."""
         common: dict[str, str | float] = {"condim": 1.0, "integrator": "Euler", "tolerance": 1e-12}
         if scene.rests and np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min():
             return Settings(step or DEFAULT_STEP, {**common, "solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2"})
@@ -46,7 +46,7 @@ class MuJoCo:
         return Settings(chosen, {**common, **hard}, NO_RESTITUTION)
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Simulate by `mj_step(model, data, nstep)`."""
+        """Simulate with `mj_step(model, data, nstep)`."""
         mujoco = _mujoco()
         model = mujoco.MjModel.from_xml_string(_model_text(scene, settings, step))
         state = mujoco.MjData(model)
@@ -71,7 +71,7 @@ def _mujoco() -> ModuleType:
 
 
 def _start(scene: FixedScene, state: Any) -> None:
-    """Free joints: position and w, x, y, z; linear velocity in world axes, angular in body axes."""
+    """Set free joints: position and w, x, y, z; linear velocity in world axes, angular velocity in body axes."""
     for k, body in enumerate(scene.bodies):
         x, y, z, w = body.orientation
         state.qpos[7 * k : 7 * k + 7] = [*body.position, w, x, y, z]
@@ -87,7 +87,7 @@ def _keep(record: Recorder, state: Any) -> None:
 
 
 def _model_text(scene: FixedScene, settings: Settings, step: float) -> str:
-    """The scene as MJCF."""
+    """Return the scene as MJCF."""
     given = settings.options
     contact = f'condim="{given["condim"]:g}" solref="{given["solref"]}" solimp="{given["solimp"]}"'
     walls = "".join(

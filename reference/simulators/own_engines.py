@@ -1,6 +1,6 @@
-"""Our engine and our rigid world behind the adapters' protocol: the yardstick, judged like the others.
+"""Adapters of this project's engine and rigid world, which are evaluated like the other engines.
 
-`own_scene` makes a fixed scene one of ours, `world_state` our states a trajectory's.
+`own_scene` converts a fixed scene to a `Scene`; `world_state` converts q and v to the arrays of a `Trajectory`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Trajectory, steps_between_samples
 from reference.time_stepping import RigidConstraints
 
-COORDINATES, VELOCITIES = 7, 6  # of a free flyer
-STEP = 1e-3  # [s] the haptic rate, for which both are made
+COORDINATES, VELOCITIES = 7, 6  # number per free flyer
+STEP = 1e-3  # [s] the step at the haptic rate, for which both are designed
 IMPACT = {"stiffness": 1e3, "damping": 0.0, "coherence_distance": 2e-3}  # the paper's walls, lossless
 REST = {"stiffness": 1e4, "damping": 40.0, "coherence_distance": 1e-3}
 STACK_STEP = 5e-6  # [s] springs that carry 1000 kg are stable against 1 g only at such steps
@@ -28,7 +28,7 @@ STACK = {"stiffness": 4e6, "damping": 2.5, "coherence_distance": 1e-3}
 
 
 class ImpulseAugmentedEngine:
-    """iapb: impulses where a contact is new, penalties while it lasts."""
+    """iapb, with impulses at new contacts and penalty forces at lasting ones."""
 
     title = "iapb (ours)"
 
@@ -37,7 +37,7 @@ class ImpulseAugmentedEngine:
         return _own_version()
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Stiffness and damping per corner, as a scene's author would choose them."""
+        """Return stiffness and damping per corner, as an author of a scene would choose them."""
         if not scene.rests:
             return Settings(step or STEP, dict(IMPACT))
         heavy = max(body.mass for body in scene.bodies) > 100.0
@@ -47,12 +47,12 @@ class ImpulseAugmentedEngine:
                         if heavy else "")  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """By the compiled loop."""
+        """Simulate with the compiled loop."""
         return _simulated(scene, settings, step, duration, None)
 
 
 class RigidWorld:
-    """Rigid contacts at velocity level: one QP per step."""
+    """Rigid contacts at velocity level, with one QP per step."""
 
     title = "ideal world (ours)"
 
@@ -61,11 +61,11 @@ class RigidWorld:
         return _own_version()
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Moreau's step where e > 0, Stewart and Trinkle's where e = 0; overlaps are left."""
+        """Return Moreau's step for e > 0 and Stewart and Trinkle's for e = 0, without correction of overlaps."""
         return Settings(step or STEP, {"scheme": "automatic", "margin": 0.02})
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """By the Python loop."""
+        """Simulate with the Python loop."""
         law = RigidConstraints(scheme=str(settings.options["scheme"]), margin=float(settings.options["margin"]))
         return _simulated(scene, Settings(step), step, duration, law)
 
@@ -88,7 +88,7 @@ def _own_version() -> str:
 
 
 def own_scene(scene: FixedScene, step: float, duration: float, **contact: float) -> Scene:
-    """The scene in our terms (JSON is YAML), with contact settings by our names."""
+    """Return a fixed scene as a `Scene`, with contact settings by the names of a scene file."""
     document = {
         "name": scene.name, "dimensions": 3, "rate": 1.0 / step, "duration": duration,
         "gravity": list(scene.gravity), "bodies": [_body(body) for body in scene.bodies],
@@ -116,13 +116,13 @@ def _shape(shape: Sphere | Cuboid) -> dict[str, Any]:
 
 
 def _roll_pitch_yaw(turn: Floats) -> list[float]:
-    """Angles about the fixed x, y and z axes, for turns short of a quarter about y."""
+    """Return angles about the fixed x, y and z axes, for rotations of less than 90 degrees about y."""
     return [float(np.arctan2(turn[2, 1], turn[2, 2])), float(np.arcsin(-turn[2, 0])),
             float(np.arctan2(turn[1, 0], turn[0, 0]))]  # fmt: skip
 
 
 def world_state(q: Floats, v: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Position, orientation, velocity and spin (..., b, 3 or 4) of free flyers from q (..., 7 b) and v (..., 6 b)."""
+    """Return position, orientation, velocity, spin (..., b, 3 or 4) of free flyers from q (..., 7 b), v (..., 6 b)."""
     places = q.reshape(*q.shape[:-1], -1, COORDINATES)
     local = v.reshape(*v.shape[:-1], -1, VELOCITIES)
     turn = rotation(places[..., 3:])

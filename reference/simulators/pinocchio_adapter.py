@@ -1,7 +1,7 @@
-"""Pinocchio: free motion by its articulated-body algorithm, impacts by its `impulseDynamics` when a contact is found.
+"""Pinocchio: free motion by its articulated-body algorithm, impacts by its `impulseDynamics`.
 
-It has no simulator of its own: contacts are found by our detection, the same that the rigid world gets, and rows
-that approach are given to it. `impulseDynamics` is bilateral and takes one e for all rows.
+Pinocchio is not a simulator. The contact detection of the rigid world finds the contacts here, and the approaching rows
+are passed to `impulseDynamics`, which is bilateral and has one e for all rows.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from reference.simulators.scene import FixedScene, Floats
 from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
-STEP = 1e-3  # [s] it has none of its own
+STEP = 1e-3  # [s] Pinocchio has no default step
 DAMPING, DAMPING_OF_A_STACK = 1e-12, 1e-8  # [1/kg] the best of 0, 1e-14, 1e-12, 1e-10, 1e-8 and 1e-6 on these scenes
 MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the larger damping is needed
-APPROACHES = 1e-12  # [m/s] slower is rounding of a contact at rest
+APPROACHES = 1e-12  # [m/s] a slower approach is rounding error of a contact at rest
 
 
 class Pinocchio:
@@ -31,19 +31,20 @@ class Pinocchio:
     title = "Pinocchio"
 
     def version(self) -> str:
-        """Installed version."""
+        """Return the installed version."""
         return str(_pinocchio().__version__)
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """The damping of the Delassus matrix that redundant rows need: without it the wedge loses a third of its
-        energy.
+        """Return the settings, with the damping of the Delassus matrix that redundant rows need.
+
+        Without the damping, the wedge loses a third of its energy.
         """
         damping = DAMPING if np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min() else DAMPING_OF_A_STACK
         return Settings(step or STEP, {"inv_damping": damping, "contacts found by": "our detection"},
                         "no contact detection and no stepping of its own; bilateral rows that approach")  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Semi-implicit steps; the rows that touch and approach are resolved at once, at the step's start."""
+        """Simulate with semi-implicit steps; touching, approaching rows are resolved at once at the start of a step."""
         pinocchio = _pinocchio()
         system = System(own_scene(scene, step, duration))
         start = system.make_state()
@@ -64,7 +65,7 @@ class Pinocchio:
     @staticmethod
     def _struck(system: System, model: Any, memory: Any, q: Floats, v: Floats, restitution: float,
                 settings: Settings) -> tuple[Floats, int]:  # fmt: skip
-        """Velocity after the impact of what touches and approaches, and how many points touch."""
+        """Return the velocity after the impact of touching, approaching contacts, and the number of touching points."""
         found = find_rows(system, q, v, 0.0)
         rows = found.jacobian[found.gamma < -APPROACHES]
         if not len(rows):

@@ -1,11 +1,11 @@
-"""A scene that every engine can be given: rigid bodies of spheres and boxes, fixed boxes, gravity, one restitution.
+"""Scenes for every engine: rigid bodies of spheres and boxes, fixed boxes, gravity and one restitution.
 
-Plain numbers only, SI units. Contacts are frictionless. Quaternions are x, y, z, w and turn body axes into world axes;
-velocities are of the centre of mass, world axes.
+A scene has plain numbers in SI units. Contacts are frictionless. Quaternions are x, y, z, w and rotate body axes into
+world axes; velocities are those of the centre of mass in world axes.
 
-`FIXED_SCENES` is the set on which engines are compared, each with its truth or its law. Impact scenes are free of
-gravity, so that the velocities after the last impact are known exactly; distances are no multiples of a step. Resting
-scenes start touching, and must stay.
+`FIXED_SCENES` is the set for comparisons of engines; each scene has an exact result or a law. Impact scenes have no
+gravity, so the velocities after the last impact are known exactly; distances are not multiples of a step. In resting
+scenes the bodies touch at the start and must stay in place.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Cuboid:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A free body; its centre of mass is its origin, its axes are principal.
+    """A free body; its origin is the centre of mass, and its axes are principal axes.
 
     mass [kg], inertia: three principal moments [kg m2], velocity [m/s] and spin [rad/s] in world axes
     """
@@ -64,7 +64,7 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A fixed box: full side lengths, centre [m] and turn."""
+    """A fixed box: full side lengths [m], centre [m] and orientation."""
 
     name: str
     size: Vector
@@ -74,11 +74,11 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class FixedScene:
-    """One scene of the set, and what is known about its motion.
+    """One scene of the set, and the known facts of its motion.
 
-    law : what must hold, in words
+    law : the condition that the motion must satisfy, in words
     final_velocities : (bodies, 3) world axes, after the last impact; None for a scene that stays at rest
-    length : size of the bodies [m], against which depths are read
+    length : size of the bodies [m], the scale of overlaps
     """
 
     name: str
@@ -94,12 +94,12 @@ class FixedScene:
 
     @property
     def rests(self) -> bool:
-        """Whether the bodies must stay where they are."""
+        """Whether the bodies must stay in place."""
         return self.final_velocities is None
 
     @property
     def masses(self) -> Floats:
-        """(bodies,) [kg]."""
+        """Masses (bodies,) [kg]."""
         return np.array([body.mass for body in self.bodies])
 
     @property
@@ -109,7 +109,7 @@ class FixedScene:
 
 
 def rotation(quaternion: Any) -> Floats:
-    """Rotations (..., 3, 3) of quaternions (..., 4), x, y, z, w, of any length but zero."""
+    """Return rotations (..., 3, 3) of quaternions (..., 4), x, y, z, w, of any nonzero length."""
     q = np.asarray(quaternion, np.float64)
     x, y, z, w = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
     entries = [
@@ -127,7 +127,7 @@ MASS_RATIO_OF_BALLS = 100.0  # the heavy ball and the light one collide with eac
 
 
 def elastic_cradle() -> FixedScene:
-    """Five equal balls, 4 mm apart: the collisions come one after another."""
+    """Five equal balls, 4 mm apart, so that the collisions are successive."""
     gap = 0.0041
     places = [-2.0 * RADIUS - 0.0203, *(k * (2.0 * RADIUS + gap) for k in range(4))]
     balls = tuple(
@@ -139,7 +139,7 @@ def elastic_cradle() -> FixedScene:
 
 
 def bernoulli() -> FixedScene:
-    """A ball strikes two touching ones at once (Johann Bernoulli 1742): energy, momentum and symmetry decide."""
+    """A ball strikes two touching balls at once (Bernoulli 1742); energy, momentum and symmetry give the result."""
     start = -sqrt(3.0) * RADIUS - 0.0203
     balls = (_ball("striker", 1.0, start, 0.0, 1.0), _ball("upper", 1.0, 0.0, RADIUS, 0.0),
              _ball("lower", 1.0, 0.0, -RADIUS, 0.0))  # fmt: skip
@@ -160,7 +160,7 @@ def two_balls_and_a_wall() -> FixedScene:
 
 
 def after_all_collisions(ratio: float) -> tuple[float, float]:
-    """Velocities of the heavy ball (1 at the start) and the light one when no collision is left; the wall is at +x."""
+    """Return the final velocities of the heavy ball (1 at the start) and the light one; the wall is at +x."""
     heavy, light = 1.0, 0.0
     while heavy > light or light > 0.0:
         if heavy > light:
@@ -172,19 +172,19 @@ def after_all_collisions(ratio: float) -> tuple[float, float]:
 
 
 def box_on_four_corners() -> FixedScene:
-    """A box lands flat on its face: four corners at once."""
+    """A box lands flat on its face, with four corners at once."""
     return _dropped("box_on_four_corners", "Box dropped on four corners", (Cuboid((SIDE,) * 3),))
 
 
 def box_on_sixteen_corners() -> FixedScene:
-    """A box on four square feet lands flat: sixteen corners at once, thirteen of them redundant."""
+    """A box on four square feet lands flat, with sixteen corners at once; thirteen of them are redundant."""
     foot, at = 0.02, 0.04
     feet = tuple(Cuboid((foot,) * 3, (x, y, -at)) for x in (-at, at) for y in (-at, at))
     return _dropped("box_on_sixteen_corners", "Box dropped on sixteen corners", feet)
 
 
 def redundant_wedge() -> FixedScene:
-    """A cube falls edge first into a right-angled groove: eight corners at once, three of them independent."""
+    """A cube falls edge first into a right-angled groove, with eight corners at once; three are independent."""
     clear = 0.0103
     start = (0.0, 0.0, sqrt(2.0) * (0.5 * SIDE + clear))
     cube = RigidBody("cube", 1.0, _cube_inertia(1.0), (Cuboid((SIDE,) * 3),), start, _about_y(pi / 4),
@@ -195,13 +195,13 @@ def redundant_wedge() -> FixedScene:
 
 
 def heavy_stack() -> FixedScene:
-    """Four boxes, each a hundred times the mass of the one below."""
+    """Four stacked boxes, each with a hundred times the mass of the one below."""
     boxes = tuple(_box(f"box {k + 1}", mass, (k + 0.5) * SIDE) for k, mass in enumerate((1e-3, 0.1, 10.0, 1000.0)))
     return FixedScene("heavy_stack", "Stack with mass ratio 10⁶", "it stays", boxes, (FLOOR,), 0.0, 1.0, SIDE, WEIGHT)
 
 
 def resting_box() -> FixedScene:
-    """A box on the floor, for a minute."""
+    """A box that rests on the floor for a minute."""
     return FixedScene("resting_box", "Resting box", "it stays", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0, 60.0,
                       SIDE, WEIGHT)  # fmt: skip
 
@@ -214,7 +214,7 @@ FIXED_SCENES: dict[str, Callable[[], FixedScene]] = {
 
 
 def fixed_scene(name: str) -> FixedScene:
-    """The scene of that name."""
+    """Return the scene of that name."""
     if name not in FIXED_SCENES:
         raise ArgumentError("scene", name, one_of(name, FIXED_SCENES))
     return FIXED_SCENES[name]()
@@ -246,7 +246,7 @@ def _about_y(angle: float) -> tuple[float, float, float, float]:
 
 
 def _slope(name: str, side: float) -> Obstacle:
-    """Half of the groove: a box whose upper face rises from the origin to the `side` at 45 degrees."""
+    """Return half of the groove: a box whose upper face rises from the origin to the `side` at 45 degrees."""
     width, depth, root = 1.0, 0.2, sqrt(0.5)
     along, normal = (side * root, root), (-side * root, root)
     center = tuple(0.5 * width * a - 0.5 * depth * n for a, n in zip(along, normal, strict=True))

@@ -1,4 +1,4 @@
-"""Siconos: Moreau-Jean time-stepping with Newton's impact law, in a process of the Python it is installed for."""
+"""Siconos: Moreau-Jean time stepping with Newton's impact law, in a process of the system's Python."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s]
-SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's python3-siconos is for this one only
+SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's python3-siconos is for this Python only
 PROGRAM = Path(__file__).with_name("siconos_program.py")
-# Residual of the solver, relative, above which a step is none: Siconos prints a warning and goes on. Gauss-Seidel
-# creeps on redundant corners at rest (1e-5); a solver that has not settled leaves 1e-1.
+# Relative residual of the solver above which a step is invalid; Siconos only prints a warning. Gauss-Seidel converges
+# slowly for redundant corners at rest (1e-5); a solver that has not converged leaves 1e-1.
 CONVERGED = 1e-3
 
 
@@ -30,20 +30,20 @@ class Siconos:
     title = "Siconos"
 
     def version(self) -> str:
-        """Version of the Debian package, or of the import where there is none."""
+        """Return the version of the Debian package, or "unknown" without one."""
         found = _version()
         if not found:
             raise MissingDependencyError("siconos", "The Siconos adapter", "apt-get install python3-siconos")
         return found
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Theta 1/2, which conserves at e = 1; Gauss-Seidel, since Lemke's method fails on redundant corners."""
+        """Return theta = 1/2, which conserves energy at e = 1, and Gauss-Seidel: Lemke fails for redundant corners."""
         return Settings(step or STEP, {"theta": 0.5, "solver": "NSGS", "iterations": 1e3, "tolerance": 1e-10,
                                        "contactBreakingThreshold": 2e-3, "minimumPointsPerturbationThreshold": 3.0,
                                        "margins": 0.0})  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Simulate in a process of its own."""
+        """Simulate in a separate process."""
         self.version()
         task = _task(scene, settings, step, duration)
         with TemporaryDirectory() as folder:
@@ -62,7 +62,7 @@ class Siconos:
 
 @cache
 def _version() -> str:
-    """Version, or "" where it cannot be imported."""
+    """Return the version, or "" if Siconos cannot be imported."""
     ask = ("import siconos.kernel, siconos.mechanics.collision.bullet, subprocess\n"
            "print(subprocess.run(['dpkg-query', '-W', '-f', '${Version}', 'python3-siconos'], "
            "capture_output=True, text=True).stdout or 'unknown')")  # fmt: skip

@@ -1,7 +1,8 @@
-"""Siconos on one scene: a program for the Python that Siconos is installed for, without our code. JSON in, JSON out.
+"""Simulate one scene with Siconos: a program for the system's Python without this project's code, from JSON to JSON.
 
-Moreau-Jean steps with theta; contacts by Siconos' own use of Bullet's detection, without margins; frictionless
-impact law solved by nonsmooth Gauss-Seidel. Siconos prints to standard output: the answer goes to the file named last.
+It uses Moreau-Jean steps with theta, Siconos' interface to Bullet's contact detection without margins, and a
+frictionless impact law solved by nonsmooth Gauss-Seidel. Siconos prints to standard output, so the answer is written to
+the file of the last argument.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from siconos.mechanics.collision.bullet import (  # type: ignore[import-not-foun
 
 
 def shape_of(given: Any) -> Any:
-    """A ball or a box without margins."""
+    """Return a ball or a box without margins."""
     shape = SiconosSphere(given["radius"]) if "radius" in given else SiconosBox(*given["size"])
     shape.setInsideMargin(0.0)
     shape.setOutsideMargin(0.0)
@@ -35,7 +36,7 @@ def shape_of(given: Any) -> Any:
 
 
 def contactors(shapes: Any, kept: list[Any]) -> Any:
-    """Return the contactor set of shapes at their centres; `kept` holds what Siconos only refers to."""
+    """Return the contactor set of shapes at their centres; `kept` keeps objects alive that Siconos only refers to."""
     made = SiconosContactorSet()
     for given in shapes:
         shape = shape_of(given)
@@ -47,13 +48,13 @@ def contactors(shapes: Any, kept: list[Any]) -> Any:
 
 
 def pose(position: Any, orientation: Any) -> list[float]:
-    """Return x, y, z, w, x, y, z."""
+    """Return the pose as position x, y, z and quaternion w, x, y, z."""
     x, y, z, w = orientation
     return [*position, w, x, y, z]
 
 
 def body_of(given: Any, gravity: Any, kept: list[Any]) -> Any:
-    """A rigid body under gravity; the spin is given in body axes."""
+    """Return a rigid body under gravity; the spin is given in body axes."""
     made = RigidBodyDS(pose(given["position"], given["orientation"]), [*given["velocity"], *given["local_spin"]],
                        given["mass"], np.diag(given["inertia"]))
     made.setContactors(contactors(given["shapes"], kept))
@@ -64,7 +65,7 @@ def body_of(given: Any, gravity: Any, kept: list[Any]) -> Any:
 
 
 def simulation_of(task: Any, model: Any, kept: list[Any]) -> Any:
-    """The time-stepping with integrator, solver and collision manager."""
+    """Return the time-stepping simulation with integrator and collision manager, and its solver."""
     options = SiconosBulletOptions()
     options.contactBreakingThreshold = task["contactBreakingThreshold"]
     options.minimumPointsPerturbationThreshold = int(task["minimumPointsPerturbationThreshold"])

@@ -1,7 +1,8 @@
-"""What an adapter is: an engine behind one protocol, its settings in the open.
+"""The protocol of adapters to engines, and the settings of an engine.
 
-Engines without a coefficient e are given a spring and damper that makes it. Per unit of effective mass,
-x'' = −k x − b x' while that pushes; contact ends when the force does (Schwager and Pöschel, Granular Matter 9, 2007).
+For engines without a coefficient e, a spring and damper give the wanted restitution. Per unit of effective mass,
+x'' = −k x − b x' while the force pushes; contact ends when the force is zero (Schwager and Pöschel, Granular Matter 9,
+2007).
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ from iapb.errors import ArgumentError
 from reference.simulators.scene import FixedScene
 from reference.simulators.trajectory import Trajectory
 
-LOWEST = 0.14  # e of a spring that hardly swings; below, it creeps back and has no half period
+LOWEST = 0.14  # e of a nearly critically damped spring; below it there is no half period
 
 @dataclass(frozen=True)
 class Settings:
-    """What an engine is run with.
+    """Settings of an engine for a scene.
 
-    step : the longest step it takes [s]; an integrator with error control may take shorter ones
-    options : everything else that decides, by the engine's own names
-    note : what the engine cannot do, and what stands in for it
+    step : the longest step [s]; an integrator with error control may take shorter ones
+    options : all other relevant settings, by the engine's own names
+    note : what the engine cannot do, and what replaces it
     """
 
     step: float
@@ -31,7 +32,7 @@ class Settings:
     note: str = ""
 
     def __str__(self) -> str:
-        """One line."""
+        """Return the settings on one line."""
         return ", ".join([f"step {1e3 * self.step:g} ms", *(f"{name} {_text(value)}"
                                                             for name, value in self.options.items())])  # fmt: skip
 
@@ -41,22 +42,22 @@ def _text(value: str | float) -> str:
 
 
 class Simulator(Protocol):
-    """An engine. Adapters import theirs only in `version` and `run`."""
+    """An adapter of an engine. It imports the engine only in `version` and `run`."""
 
     title: str
 
     def version(self) -> str:
-        """Version of the installed engine.
+        """Return the version of the installed engine.
 
         Raises
         ------
         MissingDependencyError
-            It is not installed; the message says how to install it.
+            The engine is not installed; the message says how to install it.
         """
         ...
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """The engine's own best settings for the scene; with `step` [s], its best at this step."""
+        """Return the engine's best settings for the scene; if `step` [s] is given, the best ones at this step."""
         ...
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
@@ -65,14 +66,14 @@ class Simulator(Protocol):
 
 
 def spring_restitution(damping_ratio: float) -> float:
-    """e of a spring and damper that do not pull; damping_ratio = b/(2 √k) in [0, 1)."""
+    """Return e of a spring and damper that do not pull; damping_ratio = b/(2 √k) in [0, 1)."""
     z = damping_ratio
     turning = sqrt(1.0 - z * z)
     return exp(-z / turning * (pi - atan2(2.0 * z * turning, 1.0 - 2.0 * z * z)))
 
 
 def damping_for(restitution: float, stiffness: float) -> float:
-    """b [1/s] for e in [LOWEST, 1] and k [1/s2] per unit of mass, by bisection."""
+    """Return b [1/s] for e in [LOWEST, 1] and k [1/s2] per unit of mass, by bisection."""
     if restitution < LOWEST:
         raise ArgumentError("restitution", restitution, f"at least {LOWEST}: a spring that swings")
     if restitution >= 1.0:
@@ -85,9 +86,9 @@ def damping_for(restitution: float, stiffness: float) -> float:
 
 
 def viscous_dissipation_for(restitution: float, speed: float) -> float:
-    """d [s/m] of Hunt and Crossley's force k x (1 + d x') for which a mass that arrives at `speed` leaves with e.
+    """Return d [s/m] of Hunt and Crossley's force k x (1 + d x') that gives restitution e at impact speed `speed`.
 
-    From the orbit in (x, x'): d v (1 + e) = log((1 + d v) / (1 − e d v)).
+    The orbit in (x, x') gives d v (1 + e) = log((1 + d v) / (1 − e d v)).
     """
     if restitution >= 1.0:
         return 0.0

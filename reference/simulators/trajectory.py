@@ -1,4 +1,4 @@
-"""Trajectory: what an engine did with a scene, in one form for all engines; and the depths in it."""
+"""Trajectory: the recorded motion of a scene, in one form for all engines, and its largest overlap."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from reference.simulators.scene import Cuboid, FixedScene, Floats, Sphere, rotation
 
-SAMPLE_INTERVAL = 1e-3  # [s] states are kept this often, or every step where steps are longer
+SAMPLE_INTERVAL = 1e-3  # [s] interval of kept states; longer steps are all kept
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Sampled motion of n instants and b bodies, world axes.
+    """Sampled motion at n instants of b bodies, in world axes.
 
     time (n,) [s]; position (n, b, 3) [m]; orientation (n, b, 4) x, y, z, w; velocity (n, b, 3) [m/s];
-    spin (n, b, 3) [rad/s]; contacts (n,) how many points the engine says touch, −1 where it does not say
+    spin (n, b, 3) [rad/s]; contacts (n,) number of touching points that the engine reports, −1 if it reports none
     """
 
     time: Floats
@@ -29,54 +29,54 @@ class Trajectory:
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one."""
+        """Whether all numbers are finite."""
         return all(np.isfinite(part).all() for part in (self.position, self.orientation, self.velocity, self.spin))
 
     def kinetic_energy(self, scene: FixedScene) -> Floats:
-        """(n,) [J]: ½ m v² and ½ I ω² in principal axes."""
+        """Return the kinetic energy (n,) [J], ½ m v² and ½ I ω² in principal axes."""
         inertia = np.array([body.inertia for body in scene.bodies])
         local = np.einsum("nbji,nbj->nbi", rotation(self.orientation), self.spin)
         moving = 0.5 * np.einsum("b,nbi->n", scene.masses, self.velocity**2)
         return np.asarray(moving + 0.5 * np.einsum("bi,nbi->n", inertia, local**2))
 
     def potential_energy(self, scene: FixedScene) -> Floats:
-        """(n,) [J]: of gravity, zero at the world's origin."""
+        """Return the potential energy of gravity (n,) [J], which is zero at the world's origin."""
         return np.asarray(-np.einsum("b,nbi,i->n", scene.masses, self.position, np.array(scene.gravity)))
 
     def momentum(self, scene: FixedScene) -> Floats:
-        """(n, 3) [N s]."""
+        """Return the momentum (n, 3) [N s]."""
         return np.asarray(np.einsum("b,nbi->ni", scene.masses, self.velocity))
 
 
 class Recorder:
-    """Collects the states of an adapter's loop."""
+    """Collects the states in an adapter's loop."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[float, Floats, Floats, Floats, Floats, int]] = []
 
     def add(self, time: float, position: Floats, orientation: Floats, velocity: Floats, spin: Floats,
             contacts: int) -> None:  # fmt: skip
-        """Keep copies of one instant's (b, 3), (b, 4), (b, 3), (b, 3)."""
+        """Keep copies of the arrays (b, 3), (b, 4), (b, 3), (b, 3) of one instant."""
         row = (time, np.array(position), np.array(orientation), np.array(velocity), np.array(spin), contacts)
         self._rows.append(row)
 
     def trajectory(self) -> Trajectory:
-        """All instants."""
+        """Return the trajectory of all kept instants."""
         time, position, orientation, velocity, spin, contacts = (np.array(part) for part in
                                                                  zip(*self._rows, strict=True))  # fmt: skip
         return Trajectory(time, position, orientation, velocity, spin, contacts)
 
 
 def steps_between_samples(step: float) -> int:
-    """How many steps of this length [s] pass from one sample to the next."""
+    """Return the number of steps of this length [s] between two samples."""
     return max(1, round(SAMPLE_INTERVAL / step))
 
 
 def deepest_overlap(scene: FixedScene, motion: Trajectory, instants: int = 2000) -> float:
-    """Largest depth [m] by which shapes overlap at up to so many instants of the motion.
+    """Return the largest overlap [m] of shapes at up to so many instants of the motion.
 
-    One measure for all engines, from positions alone: balls by their distance, boxes by the smallest
-    overlap along the normals of their faces (separating axes; the edges' are not needed for faces that meet).
+    This measure is the same for all engines and uses positions alone: for balls the distance, for boxes the smallest
+    overlap along the normals of their faces (separating axes; edge axes are not needed for faces in contact).
     """
     every = max(1, len(motion.time) // instants)
     frames = [(motion.position[::every, k], rotation(motion.orientation[::every, k]), body.shapes)
@@ -95,7 +95,7 @@ def deepest_overlap(scene: FixedScene, motion: Trajectory, instants: int = 2000)
 
 
 def _overlap(a: Sphere | Cuboid, frame_a: tuple, b: Sphere | Cuboid, frame_b: tuple) -> Floats:
-    """Depth (n,) of two shapes, negative or zero where they are apart."""
+    """Return the overlap (n,) of two shapes; it is negative or zero if they are apart."""
     apart = (frame_b[0] + frame_b[1] @ np.array(b.center)) - (frame_a[0] + frame_a[1] @ np.array(a.center))
     if isinstance(a, Sphere) and isinstance(b, Sphere):
         return np.asarray(a.radius + b.radius - np.linalg.norm(apart, axis=1))
@@ -115,7 +115,7 @@ def _overlap(a: Sphere | Cuboid, frame_a: tuple, b: Sphere | Cuboid, frame_b: tu
 
 
 def _sphere_in_box(ball: Sphere, box: Cuboid | Sphere, offset: Floats, turn: Floats) -> Floats:
-    """Depth (n,) of a ball whose centre lies at `offset` from the box's; exact while the centre is outside."""
+    """Return the overlap (n,) of a ball at `offset` from a box's centre; exact while the ball's centre is outside."""
     half = 0.5 * np.array(box.size if isinstance(box, Cuboid) else (0.0,) * 3)
     local = np.einsum("nji,nj->ni", turn, offset)
     outside = np.linalg.norm(np.maximum(np.abs(local) - half, 0.0), axis=1)

@@ -1,7 +1,7 @@
-"""One table of solvers, one file each; a solver's package is imported when the solver is first called.
+"""The table of solvers. Each solver has its own module; its package is imported at the solver's first call.
 
-A solver module offers ``solve(problem) -> Answer``. It may raise SolverError to refuse a problem.
-To add one: write the file, add a line to SOLVERS.
+A solver module has a function ``solve(problem) -> Answer``, which may raise SolverError to refuse a problem.
+To add a solver, write its module and add a line to SOLVERS.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from reference.complementarity.solution import Answer, Solution
 
 @dataclass(frozen=True)
 class SolverEntry:
-    """A solver by name: its module here, its call, the packages it needs and what it takes.
+    """A solver: its module, the packages it needs, its method and the problems it accepts.
 
-    `takes`: "lcp" any frictionless problem, "convex" only with symmetric semidefinite W, "cone" friction.
+    `takes`: "lcp" = any frictionless problem, "convex" = only symmetric semidefinite W, "cone" = friction.
     """
 
     module: str
     package: str
     method: str
     takes: str
-    bilateral: bool = False  # takes two-sided rows as well
-    option: str = ""  # handed to the module's solve where it serves several solvers
-    of_the_machine: bool = False  # no package of this environment: the module starts it, and says where it is not
+    bilateral: bool = False  # accepts two-sided rows as well
+    option: str = ""  # argument of the module's solve if it serves several solvers
+    of_the_machine: bool = False  # not a package of this environment: the module starts it, or says that it is missing
 
 
 _CVXPY = "reference.complementarity.solvers.cvxpy_qp"
@@ -65,7 +65,7 @@ SOLVERS: dict[str, SolverEntry] = {
     "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", False, "NSGS", True),
     "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", False, "NSN_AC", True),
 }
-_INSTALL_NAMES = {"pinocchio": "pin"}  # where a package is not installed under the name it is imported by
+_INSTALL_NAMES = {"pinocchio": "pin"}  # packages whose install name differs from their import name
 
 
 def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
@@ -82,11 +82,11 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
     Raises
     ------
     ArgumentError
-        for an unknown name
+        The name is unknown.
     MissingDependencyError
-        when the solver's package is not installed, with the install line
+        The solver's package is not installed; the message says how to install it.
 
-    A solver that refuses or breaks gives a Solution without impulse, whose residuals are infinite.
+    If the solver refuses or fails, the Solution has no impulse, and its residuals are infinite.
     """
     if solver not in SOLVERS:
         raise ArgumentError("solver", solver, one_of(solver, SOLVERS))
@@ -112,8 +112,8 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
 def import_alone(name: str) -> ModuleType:
     """Import a module of another package, one process at a time.
 
-    Two processes that import quantecon for the first time at once spoil its cache of compiled code: every later
-    import then aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock is on the package's own file.
+    If two processes import quantecon for the first time at once, they corrupt its cache of compiled code, and every
+    later import aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock is on the package's own file.
     """
     package = name.partition(".")[0]
     found = find_spec(package)
@@ -141,7 +141,7 @@ def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
 
 
 def _known_without_solver(problem: ImpactProblem, entry: SolverEntry) -> Answer | None:
-    """Refuse friction to a frictionless solver and the other way round: these are different questions."""
+    """Answer without the solver: refuse a problem of the wrong kind, or solve one without contacts; else None."""
     if (entry.takes == "cone") != (problem.friction is not None):
         kind = "frictionless problems only" if entry.takes != "cone" else "problems with friction only"
         return Answer(None, f"refused: takes {kind}", refused=True)

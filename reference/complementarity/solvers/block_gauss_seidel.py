@@ -1,7 +1,7 @@
-"""Nonsmooth block Gauss-Seidel (NSGS): sweep the contacts, each projected on its cone, and the joints, which have none.
+"""Nonsmooth block Gauss-Seidel (NSGS): sweep contacts and joints; each contact's impulse is projected on its cone.
 
-p_k <- proj_K(p_k − rho_k (u_k + shift_k)), shift = mu |u_T| of Coulomb's law (none where relaxed), rho_k one over
-the largest eigenvalue of the contact's own block of W, a few times per contact and sweep.
+p_k <- proj_K(p_k − rho_k (u_k + shift_k)), a few times per contact and sweep. Here shift = mu |u_T| is that of
+Coulomb's law (none if relaxed), and 1/rho_k is the largest eigenvalue of the contact's own block of W.
 Source: Jourdan, Alart, Jean, Comput. Methods Appl. Mech. Eng. 155 (1998); Acary and Brogliato (2008), section 13.7.
 """
 
@@ -17,9 +17,9 @@ from reference.complementarity.solution import Answer, velocity_scale
 
 _SWEEPS = 20_000
 _INNER = (
-    4  # projections per contact and sweep: one is enough for a scalar block, friction blocks gain from some
+    4  # projections per contact and sweep; one is enough for a scalar block, friction blocks need more
 )
-_STILL = 1e-13  # a sweep that moves no contact velocity by more than this share of the scale is the last one
+_STILL = 1e-13  # stop after a sweep that changes no contact velocity by more than this share of the scale
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -42,7 +42,7 @@ def _project(p, mu):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _sweep_until_still(w, b, mu, joints, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
-    """Sweep in place; return the number of sweeps done, or -1 where the limit came first."""
+    """Sweep in place; return the number of sweeps done, or -1 if the limit is reached."""
     size = len(trial)
     for sweep in range(sweeps):
         largest = 0.0
@@ -70,7 +70,7 @@ def _sweep_until_still(w, b, mu, joints, inertia, relaxed, p, u, trial, sweeps, 
 
 
 def solve(problem: ImpactProblem) -> Answer:
-    """Return the impulse after the last sweep, converged or not: the residuals tell."""
+    """Return the impulse after the last sweep; its residuals show whether it converged."""
     size, k = problem.contact_size, problem.contacts
     blocks = problem.delassus.reshape(k, size, k, size)[np.arange(k), :, np.arange(k)]
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))

@@ -1,7 +1,7 @@
 """cvxpy: the impulse form  min ½|Aᵀp|² + bᵀp  subject to  p >= 0,  by Clarabel, OSQP or SCS.
 
-Written with the factor A, never as a quadratic form of W, which redundant contacts make rank deficient. Where
-all contacts have the same e, b = (1 + e) A u and this is ½|Aᵀp + (1 + e) u|² up to a constant.
+The objective uses the factor A, not a quadratic form of W, because redundant contacts make W rank deficient. If all
+contacts have the same e, then b = (1 + e) A u and the objective is ½|Aᵀp + (1 + e) u|² up to a constant.
 Source: Moreau's least-squares form of plastic impacts; Anitescu and Potra, Nonlinear Dynamics 14 (1997).
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-# Accuracy asked for, on a problem scaled to unit W and b; defaults stop at 1e-4 to 1e-6. Clarabel below 1e-11
-# walks along the unbounded set of impulses of opposed contacts (p to 6e9, residual back up to 4e-6).
+# Requested accuracy for a problem scaled to unit W and b; the defaults are 1e-4 to 1e-6. Below 1e-11, Clarabel drifts
+# along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
 _OPTIONS: dict[str, dict[str, Any]] = {
     "CLARABEL": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "OSQP": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20_000, "polishing": True, "time_limit": 10.0},
@@ -34,7 +34,7 @@ def solve(problem: ImpactProblem, backend: str) -> Answer:
     energy = 0.5 * cp.sum_squares((rows.T / root) @ p) + (problem.offset / speed) @ p
     program = cp.Problem(cp.Minimize(energy), [p[one_sided] >= 0.0] if len(one_sided) else [])
     try:
-        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals judge
+        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
             warnings.simplefilter("ignore", UserWarning)
             program.solve(solver=backend, **_OPTIONS[backend])
     except cp.error.SolverError as error:

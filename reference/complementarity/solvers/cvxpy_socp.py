@@ -1,8 +1,8 @@
-"""cvxpy with Clarabel: friction as a second-order cone program, Coulomb's law by a fixed point on it.
+"""cvxpy with Clarabel: relaxed friction as a second-order cone program, Coulomb's law by fixed-point iteration.
 
-The relaxed law is  min ½|Aᵀp|² + bᵀp  over Coulomb's cones. Coulomb's own law is that program with mu |u_T|
-added to the normal part of b, which depends on the solution: repeat until it stops changing (it need not). The
-impulses of joints are free.
+The relaxed law is  min ½|Aᵀp|² + bᵀp  over Coulomb's cones. Coulomb's law is that program with mu |u_T| added to the
+normal part of b. This shift depends on the solution, so the program is solved repeatedly until the shift is constant
+(convergence is not guaranteed). The impulses of joints are free.
 Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary, Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
 """
 
@@ -19,13 +19,13 @@ from reference.complementarity.solution import Answer, velocity_scale
 
 Floats = NDArray[np.float64]
 
-_ACCURACY = 1e-12  # asked of the interior point at unit W and b; the natural map gets its root near the apex
-_ROUNDS = 50  # of the fixed point
-_STILL = 1e-9  # change of the shift, relative to the velocity scale, at which the fixed point has arrived
+_ACCURACY = 1e-12  # requested at unit W and b; near the apex the natural map reaches its square root
+_ROUNDS = 50  # most fixed-point iterations
+_STILL = 1e-9  # change of the shift, relative to the velocity scale, at which the iteration stops
 
 
 def solve(problem: ImpactProblem) -> Answer:
-    """Return the impulse of the relaxed problem, or of Coulomb's law where `problem.relaxed` is False."""
+    """Return the impulse of the relaxed problem, or of Coulomb's law if `problem.relaxed` is False."""
     rows, speed = problem.factor, velocity_scale(problem)
     program, p, offset = _program(problem, rows)
     root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
@@ -34,7 +34,7 @@ def solve(problem: ImpactProblem) -> Answer:
         scaled = problem.offset / speed
         scaled[:: problem.contact_size] += shift
         offset.value = scaled
-        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals judge
+        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
             warnings.simplefilter("ignore", UserWarning)
             program.solve(solver="CLARABEL", tol_gap_abs=_ACCURACY, tol_gap_rel=_ACCURACY, tol_feas=_ACCURACY)
         if p.value is None:
@@ -49,7 +49,7 @@ def solve(problem: ImpactProblem) -> Answer:
 
 
 def _program(problem: ImpactProblem, rows: Floats) -> tuple[Any, Any, Any]:
-    """The scaled program with its variable and its offset, which is a parameter so that rounds are cheap."""
+    """Return the scaled program, its variable, and its offset, a parameter so that repeated solves are cheap."""
     import cvxpy as cp
 
     root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
@@ -68,6 +68,6 @@ def _program(problem: ImpactProblem, rows: Floats) -> tuple[Any, Any, Any]:
 
 
 def _shift(problem: ImpactProblem, impulse: Floats) -> Floats:
-    """mu |u_T| per contact (k,) [m/s]."""
+    """Return mu |u_T| per contact (k,) [m/s]."""
     u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
     return np.where(problem.two_sided, 0.0, problem.friction_or_zero * np.linalg.norm(u[:, 1:], axis=1))

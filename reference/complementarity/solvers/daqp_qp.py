@@ -1,7 +1,7 @@
 """DAQP: dual active set on the velocity form  min ½|x|²  subject to  A x + b >= 0.
 
-x = Aᵀp is the change of velocity in kinetic coordinates and p the multipliers. The Hessian is the identity
-whatever the rank of W, so redundant contacts do no harm.
+Here x = Aᵀp is the change of velocity in kinetic coordinates, and p are the multipliers. The Hessian is the identity
+for any rank of W, so redundant contacts are no problem.
 Source: Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022).
 """
 
@@ -17,8 +17,8 @@ from reference.complementarity.solution import Answer
 Floats = NDArray[np.float64]
 
 _INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
-_ACCURACY = 1e-13  # of unit rows and unit velocities: a few hundred roundings
-_INFINITE = 1e30  # daqp's own mark of an absent bound
+_ACCURACY = 1e-13  # for unit rows and unit velocities: a few hundred roundings
+_INFINITE = 1e30  # daqp's value for an absent bound
 
 
 def solve(problem: ImpactProblem) -> Answer:
@@ -37,7 +37,7 @@ def multipliers(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | Non
     Raises
     ------
     SolverError
-        where daqp ends without a solution (exit flag below 1; -1 is an infeasible problem)
+        daqp ends without a solution (exit flag below 1; -1 means infeasible).
     """
     import daqp
 

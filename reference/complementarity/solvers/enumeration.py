@@ -1,8 +1,8 @@
-"""Enumeration: every choice of active contacts, for small n; finds all solutions, or that there is none.
+"""Enumeration of all sets of active contacts, for small n: finds all solutions, or shows that there is none.
 
-On an active set a:  W_aa p_a = -b_a, p_a >= 0, p elsewhere 0, w elsewhere >= 0. Where W_aa is singular the
-solutions of the piece form a polyhedron: a linear program decides whether it is empty and returns one point. Its
-tolerances are absolute, so everything is computed for D W D and D b with D_i = 1/√W_ii, b of size one: the same
+On an active set a,  W_aa p_a = -b_a, p_a >= 0, and elsewhere p = 0, w >= 0. If W_aa is singular, the solutions of this
+piece form a polyhedron; a linear program decides whether it is empty and returns one point. The tolerances of the
+linear program are absolute, so it uses D W D and D b with D_i = 1/√W_ii, scaled to b of size one. This is the same
 complementarity problem in other units.
 Source: Cottle, Pang, Stone (1992), section 1.3 (complementary cones).
 """
@@ -21,14 +21,14 @@ from reference.complementarity.solution import Answer, residuals
 Floats = NDArray[np.float64]
 
 LARGEST_SIZE = 14  # 16384 active sets, some of them linear programs: seconds
-_SAME = 1e-9  # two solutions closer than this share of the larger are one
+_SAME = 1e-9  # two solutions closer than this share of the larger one count as one
 _ACCEPTED = 1e-9  # residual below which a candidate is a solution: solves of small systems reach 1e-13
 _SINGULAR = 1e-12  # reciprocal condition below which W_aa is taken as singular
-_FEASIBLE = 1e-10  # of the linear program, the least that HiGHS takes: a tenth of _ACCEPTED, by default 1e-7
+_FEASIBLE = 1e-10  # tolerance of the linear program, the least that HiGHS accepts; its default is 1e-7
 
 
 def all_solutions(problem: ImpactProblem) -> list[Floats]:
-    """Return one solution (n,) per complementary piece that has any, fewest contacts first, no duplicates."""
+    """Return one solution (n,) per active set that has any, fewest contacts first, without duplicates."""
     if np.count_nonzero(~problem.two_sided) > LARGEST_SIZE:
         raise SolverError(f"refused: {problem.size} contacts, enumeration takes at most {LARGEST_SIZE}")
     found: list[Floats] = []
@@ -52,7 +52,7 @@ def all_solutions(problem: ImpactProblem) -> list[Floats]:
 
 
 def solve(problem: ImpactProblem) -> Answer:
-    """Return the solution with the fewest active contacts; the note says how many there are."""
+    """Return the solution with the fewest active contacts; the note gives the number of solutions."""
     found = all_solutions(problem)
     if not found:
         return Answer(None, f"no active set gives a solution whose residual is at most {_ACCEPTED:.0e}")

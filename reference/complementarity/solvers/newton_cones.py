@@ -1,9 +1,9 @@
-"""Semismooth Newton on Coulomb's cones, from where ADMM leads: contacts with friction, and joints beside them.
+"""Semismooth Newton on Coulomb's cones with an ADMM start, for contacts with friction and for joints.
 
-ADMM splits  ½ pᵀWp + (b + s)ᵀp  over the cones, with the shift s = mu |u_T| of Coulomb's law from the iterate before
-(none where relaxed). One eigendecomposition of W serves every penalty rho, which follows the residuals. Newton's steps
-are on the natural map F(p) = p − proj_K(p − w), in which a joint has F = w, by least squares of least norm: W is
-singular where contacts are redundant. The answer of either that leaves the smaller F is returned.
+ADMM minimises  ½ pᵀWp + (b + s)ᵀp  over the cones, with the shift s = mu |u_T| of Coulomb's law from the last iterate
+(none if relaxed). One eigendecomposition of W serves every penalty rho, which is adapted to the residuals. Newton's
+steps solve the natural map F(p) = p − proj_K(p − w) = 0, with F = w for joints. They use least squares of least norm,
+because W is singular for redundant contacts. The Newton result with the smallest F is returned.
 Source: Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991); Carpentier, Montaut, Le Lidec, RSS (2024).
 """
 
@@ -21,9 +21,9 @@ from reference.complementarity.solution import Answer, de_saxce_shift, project_o
 Floats = NDArray[np.float64]
 
 _ITERATIONS = 20_000  # of ADMM
-_TRIED = 250  # iterations after which Newton is tried first; then each time twice as many
+_TRIED = 250  # iterations before the first Newton attempt; doubled for each further attempt
 _NEWTON_STEPS = 30
-_BALANCE = 10.0  # ratio of ADMM's two residuals above which rho is changed, by its root
+_BALANCE = 10.0  # ratio of ADMM's two residuals above which rho changes by the square root of the ratio
 _BALANCED_EVERY = 20
 _SOLVED = 1e-12  # largest |F| at unit W and b; Newton's last step leaves some hundred roundings
 _SHORTEST = 2.0**-12  # of Newton's step in the line search
@@ -31,7 +31,7 @@ _DEPENDENT = 1e-11  # share of the largest singular value of F' below which a di
 
 
 def solve(problem: ImpactProblem) -> Answer:
-    """Return the impulse, converged or not: the residuals tell."""
+    """Return the impulse; its residuals show whether it converged."""
     if problem.asymmetry > SYMMETRY_TOLERANCE:
         raise SolverError(f"refused: W is asymmetric (relative {problem.asymmetry:.1e})")
     unit = _in_units(problem)
@@ -40,7 +40,7 @@ def solve(problem: ImpactProblem) -> Answer:
 
 
 class _Unit(NamedTuple):
-    """The problem at unit blocks of W and unit b: p = length * (unit p), contact by contact."""
+    """The problem scaled to unit blocks of W and unit b, with p = length * (unit p)."""
 
     W: Floats
     b: Floats
@@ -50,16 +50,16 @@ class _Unit(NamedTuple):
     length: Floats
 
     def velocity(self, p: Floats) -> Floats:
-        """W p + b with Coulomb's shift (k, m)."""
+        """Return W p + b with Coulomb's shift (k, m)."""
         w = (self.W @ p.ravel() + self.b).reshape(p.shape)
         return w if self.relaxed else de_saxce_shift(w, self.mu)
 
     def project(self, p: Floats) -> Floats:
-        """On the cones; a joint's p is free."""
+        """Project p on the cones; a joint's p is unchanged."""
         return np.where(self.joints[:, None], p, project_on_cone(p, self.mu))
 
     def natural_map(self, p: Floats) -> Floats:
-        """F (k, m)."""
+        """Return F (k, m)."""
         w = self.velocity(p)
         return np.where(self.joints[:, None], w, p - project_on_cone(p - w, self.mu))
 
@@ -76,7 +76,7 @@ def _in_units(problem: ImpactProblem) -> _Unit:
 
 
 def _admm(unit: _Unit) -> tuple[Floats, str]:
-    """p (k, m) and how it was found; Newton is tried now and then."""
+    """Return p (k, m) and a note; Newton is tried at increasing intervals."""
     shape = (len(unit.mu), -1)
     values, vectors = np.linalg.eigh(unit.W)
     values = np.clip(values, 0.0, None)
@@ -88,7 +88,7 @@ def _admm(unit: _Unit) -> tuple[Floats, str]:
     for done in range(1, _ITERATIONS + 1):
         right = rho * z - y - unit.b - shift
         x = vectors @ ((vectors.T @ right) / (values + rho))
-        if not unit.relaxed:  # the velocity of x is what is left of the right side
+        if not unit.relaxed:  # the velocity of x follows from the residual of the right side
             slip = (right - rho * x + unit.b).reshape(shape)[:, 1:]
             shift.reshape(shape)[:, 0] = unit.mu * np.linalg.norm(slip, axis=1)
         before, z = z, unit.project((x + y / rho).reshape(shape)).ravel()
@@ -108,7 +108,7 @@ def _admm(unit: _Unit) -> tuple[Floats, str]:
 
 
 def _newton(unit: _Unit, p: Floats) -> tuple[Floats, float, int]:
-    """p, largest |F| and the steps taken, until F vanishes or no step makes it smaller."""
+    """Return p, largest |F| and the number of steps, after F vanishes or no step reduces it."""
     from scipy.linalg import lstsq
 
     F = unit.natural_map(p)
@@ -129,7 +129,7 @@ def _newton(unit: _Unit, p: Floats) -> tuple[Floats, float, int]:
 
 
 def _derivative(unit: _Unit, p: Floats) -> Floats:
-    """A generalized derivative of F at p (n, n)."""
+    """Return a generalized derivative of F at p (n, n)."""
     k, m = p.shape
     w = (unit.W @ p.ravel() + unit.b).reshape(k, m)
     G = unit.W.reshape(k, m, k * m).copy()  # derivative of the shifted velocity
@@ -145,7 +145,7 @@ def _derivative(unit: _Unit, p: Floats) -> Floats:
 
 
 def _projection_derivative(x: Floats, mu: Floats) -> Floats:
-    """Derivative of the projection on each cone (k, m, m)."""
+    """Return the derivative of the projection on each cone (k, m, m)."""
     k, m = x.shape
     tangent = np.linalg.norm(x[:, 1:], axis=1)
     inside = (x[:, 0] >= 0.0) & (tangent <= mu * x[:, 0])

@@ -1,6 +1,6 @@
 """Pinocchio's contact solvers, projected Gauss-Seidel and ADMM, on Coulomb's law or its relaxation.
 
-Pinocchio orders a contact (tangent, tangent, normal); rows are turned on the way in and out.
+Pinocchio orders a contact (tangent, tangent, normal), so rows are reordered before and after the call.
 Source: Carpentier, Montaut, Le Lidec, From compliant to rigid contact simulation, RSS (2024).
 """
 
@@ -15,12 +15,12 @@ from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-_ACCURACY = 1e-12  # asked for at unit W and b
+_ACCURACY = 1e-12  # requested at unit W and b
 _ITERATIONS = 20_000
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
-    """Return the impulse by `method` ("PGS" or "ADMM"), converged or not: the residuals tell."""
+    """Return the impulse by `method` ("PGS" or "ADMM"), whose residuals show whether it converged."""
     import pinocchio as pin
 
     if problem.contact_size != 3:
@@ -47,12 +47,12 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
 
 
 def _normal_last(contacts: int) -> NDArray[np.int64]:
-    """Indices of (t, t, n) of every contact in our order (n, t, t)."""
+    """Return the indices that reorder (n, t, t) into (t, t, n) for every contact."""
     return (np.array([1, 2, 0]) + 3 * np.arange(contacts)[:, None]).ravel()
 
 
 def _contacts(pin: Any, problem: ImpactProblem) -> tuple[Any, Any]:
-    """One point contact per contact, which carries nothing but its friction."""
+    """Return one Pinocchio point contact per contact, of which only the friction is set."""
     model = pin.Model()
     models, states = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
     for mu in problem.friction_or_zero:

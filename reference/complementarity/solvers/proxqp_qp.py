@@ -10,7 +10,7 @@ import numpy as np
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-_ACCURACY = 1e-10  # asked for, relative to a problem scaled to unit W and b; what is reached is measured
+_ACCURACY = 1e-10  # requested for a problem scaled to unit W and b; the reached accuracy is measured
 
 
 def solve(problem: ImpactProblem) -> Answer:

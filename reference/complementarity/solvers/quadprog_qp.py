@@ -1,6 +1,6 @@
 """quadprog through qpsolvers: Goldfarb and Idnani's dual active set on the velocity form.
 
-min ½|x|² subject to A x + b >= 0; the multipliers are the impulses.
+The program is min ½|x|² subject to A x + b >= 0; its multipliers are the impulses.
 Source: Goldfarb, Idnani, Mathematical Programming 27 (1983).
 """
 
@@ -32,7 +32,7 @@ def multipliers(rows: Floats, offset: Floats) -> Floats:
     Raises
     ------
     SolverError
-        where quadprog finds none; it can take redundant rows for contradicting ones
+        quadprog finds no solution; it can mistake redundant rows for contradictory ones.
     """
     from qpsolvers import Problem, solve_problem
 

@@ -1,8 +1,8 @@
 """Siconos (INRIA), through the system's Python: Lemke, nonsmooth Gauss-Seidel, Alart-Curnier Newton.
 
-Siconos is a package of the machine, not of this environment: one process of the system's Python answers all problems.
-Its time is that of its solve alone, without the way there and back. A process that dies or does not answer in time is
-a failed solve; the next problem gets a new one.
+Siconos is a package of the system's Python, not of this environment. One process of the system's Python solves all
+problems. The reported time is that of the solver alone, without data transfer. If the process dies or does not answer
+in time, the solve has failed, and the next problem gets a new process.
 Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008); Siconos 4.
 """
 
@@ -29,13 +29,13 @@ INSTALL = "apt-get install python3-siconos"
 _METHODS = {
     "LEMKE": "SICONOS_LCP_LEMKE", "NSGS": "SICONOS_FRICTION_3D_NSGS", "NSN_AC": "SICONOS_FRICTION_3D_NSN_AC",
 }  # fmt: skip
-_ACCURACY = 1e-12  # asked for at unit W and b
+_ACCURACY = 1e-12  # requested at unit W and b
 _ITERATIONS = 20_000
-_LONGEST = 120.0  # seconds that an answer may take; the largest stored problems take a few
+_LONGEST = 120.0  # longest time of an answer [s]; the largest stored problems take a few seconds
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
-    """Return the impulse by `method` ("LEMKE", "NSGS" or "NSN_AC"), converged or not: the residuals tell.
+    """Return the impulse by `method` ("LEMKE", "NSGS" or "NSN_AC"), whose residuals show whether it converged.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
 
 
 def start() -> None:
-    """Start the process, so that its imports do not count as a solver's time; nothing where it runs already.
+    """Start the process unless it runs already, so that its imports do not count as a solver's time.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def start() -> None:
 
 
 class _Worker:
-    """The process with its pipes."""
+    """The solver process with its pipes."""
 
     def __init__(self) -> None:
         script = Path(__file__).with_name("siconos_worker.py")
@@ -75,7 +75,7 @@ class _Worker:
         self.to, self.of = cast(BinaryIO, self.process.stdin), cast(BinaryIO, self.process.stdout)
 
     def ask(self, asked: dict[str, Any], *arrays: Floats) -> tuple[dict[str, Any], Floats]:
-        """One problem, one answer."""
+        """Send one problem and return its answer."""
         try:
             self.to.write(json.dumps(asked).encode() + b"\n")
             for array in arrays:
@@ -102,7 +102,7 @@ class _Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it can still be asked."""
+        """Whether the process still runs."""
         return self.process.poll() is None
 
 
@@ -110,7 +110,7 @@ _running: list[_Worker] = []
 
 
 def _process() -> _Worker:
-    """The running process, or a new one."""
+    """Return the running process, or start a new one."""
     if _running and _running[0].alive:
         return _running[0]
     _running.clear()

@@ -1,7 +1,7 @@
-"""Run by the system's Python, not imported: answers contact problems from standard input by Siconos until it ends.
+"""Program for the system's Python: solve contact problems from standard input with Siconos until the input ends.
 
-One request: a line of JSON {kind, method, accuracy, iterations, unknowns, contacts}, then W by columns, q and mu, all
-doubles. One answer: a line of JSON {status, iterations, seconds}, then the impulse; seconds are of the solve alone.
+A request is a line of JSON {kind, method, accuracy, iterations, unknowns, contacts}, then W by columns, q and mu, all
+doubles. An answer is a line of JSON {status, iterations, seconds}, then the impulse; seconds are those of the solver.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 
 def main() -> None:
-    """Serve until standard input ends."""
+    """Answer requests until standard input ends."""
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # Siconos prints to standard output, which carries our answers
     numerics = importlib.import_module("siconos.numerics")
