@@ -32,7 +32,7 @@ class MuJoCo:
         return str(_mujoco().__version__)
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Return defaults for resting scenes, hard contacts for the stack, a negative solref with damping for impacts."""
+        """Return defaults at rest, hard contacts for the stack, and for impacts a negative solref with damping."""
         common: dict[str, str | float] = {"condim": 1.0, "integrator": "Euler", "tolerance": 1e-12}
         if scene.rests and np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min():
             return Settings(step or DEFAULT_STEP, {**common, "solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2"})
