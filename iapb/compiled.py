@@ -226,6 +226,10 @@ class Block:
             if isinstance(member, Block):
                 yield from member._with_nested()
 
+    def __reduce__(self) -> Any:
+        """Refuse copy and pickle: a copy would hold the address of this block's memory."""
+        raise TypeError("compiled state cannot be copied or pickled; start another Simulation of the scene")
+
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays, including those of nested blocks."""
         nested = [member.arrays() for member in self._content if isinstance(member, Block)]

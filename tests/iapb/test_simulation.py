@@ -343,6 +343,13 @@ def test_a_changed_value_gives_the_bits_of_a_scene_that_is_read_anew(name: str) 
         assert any(ours[array].tobytes() != first[array].tobytes() for array in ours.keys() & first.keys()), values
 
 
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps], ids=["deepcopy", "pickle"])
+def test_a_simulation_refuses_to_be_copied(copied) -> None:
+    """A copy would step the original's memory: its blocks hold addresses."""
+    with pytest.raises(TypeError, match="cannot be copied or pickled"):
+        copied(Simulation(PEG))
+
+
 def test_what_follows_from_a_run_is_computed_when_it_is_asked_for(monkeypatch) -> None:
     scene = load_scene(find_scene("peg_corner")).with_values({"contact.stiffness": 1e4})
     texts = count_calls(monkeypatch, {model: "scene_text", recording: "energy_of_run distrust_of"})
