@@ -76,7 +76,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     compiled = compile_as_whole(function, fastmath=False, _nrt=False)
     try:
         compiled.enable_caching()
-    except RuntimeError:  # no folder for it can be written, as where others installed the package
+    except RuntimeError:  # no cache folder is writable, for example in a system-wide installation
         warnings.warn("kernels are compiled anew in each process, half a minute: neither the package's folder nor the "
                       "user's cache can be written; NUMBA_CACHE_DIR names one that can", stacklevel=1)  # fmt: skip
         return compiled

@@ -312,7 +312,7 @@ class Recorder:
     def _part(self, world: str, stopped: str) -> tuple[Run, Callable[[Run], dict[str, Floats]]]:
         """Return the Run, and the function that computes all its energies."""
         simulation, system = self.simulation, self.simulation.system
-        more = bool(stopped)  # a run may go on, and whoever has this part may change it
+        more = bool(stopped)  # the run may continue, and the holder of this part may change it
         steps = self.joined("steps", self.start, copied=more)
         states = {each.name: steps.pop(each.name) for each in STATES}
         counts = self._counts()

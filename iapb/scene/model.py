@@ -186,7 +186,7 @@ def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
 
 
 class SpatialHand(Hand):
-    """The hand in space."""
+    """The hand of a scene in space."""
 
     point: Vector3 = Field(ORIGIN, description="where it holds the body [m], body axes")  # type: ignore[assignment]
     force: tuple[Number, Number, Number, Number, Number, Number] = Field(  # type: ignore[assignment]
