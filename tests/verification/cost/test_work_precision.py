@@ -118,7 +118,7 @@ def test_where_a_rival_is_faster_is_said() -> None:
     kernels = table_of(C22_COLUMNS, [dict(zip(keys, row, strict=True)) for row in rows])
     said = where_iapb_loses.draw({"work_precision": KNOWN, "C22/C22": kernels}).caption
     assert "On pile IAPB is clearly slower at 1 of 3 sizes, from 8 to 8 contacts: at worst, it takes 2 times as long" in said
-    assert "On 2 of the nine hard impacts with 4 contacts another solver is faster" in said
+    assert "On 2 of the 9 hard impacts with 4 contacts another solver is faster" in said
     assert "Lemke by up to 1.2 times" in said and "The reason: " in said
 
 
