@@ -267,16 +267,16 @@ _NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4")
 _INTEGRATORS = {method: STYLES[name] for method, name in zip(INTEGRATORS, _NAMES, strict=True)}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
 _READ = (
-    "Lower left is better. Each mark is a run with one time step; finer steps are further right. The number at a curve "
-    "is the factor by which the computing time grows for ten times the accuracy on that scene: a power fitted to the "
-    "filled marks (thick straight line). At hollow marks the finer step divides the error by less than "
-    f"{GAINED:g}; they are not fitted. The error depends on where an impact falls within a step, so curves are "
-    "uneven. The table gives medians over the scenes, and in brackets the range. “Then level” or “stays at”: no "
-    "shorter step reduces this error, which comes from the contact model. “Too few runs”: finer steps took longer than "
-    "allowed. The grey steps join the runs that no other "
-    "run beats in both time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at "
-    "the lower rim: the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end "
-    "at the instant of impact; it is not fitted either. "
+    "Lower left is better. Each mark is a run with one time step; finer steps are further right. The number at a "
+    "curve is the factor by which the computing time grows for ten times the accuracy on that scene: a power fitted "
+    "to the filled marks (thick straight line). At hollow marks the finer step divides the error by less than "
+    f"{GAINED:g}; they are not fitted. The error depends on where an impact falls within a step, so curves are uneven. "
+    "The table gives medians over the scenes, and in brackets the range. “Then level” or “stays at”: no shorter step "
+    "reduces this error, which comes from the contact model. “Too few runs”, “cut short”: finer steps would take "
+    "longer than allowed, though the error still falls. The grey steps join the runs that no other run beats in both "
+    "time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at the lower rim: "
+    "the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end at the instant "
+    "of impact; it is not fitted either. "
 )
 
 
@@ -351,7 +351,7 @@ def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[st
     if row["scenes fitted"]:
         ends = f" ({times(row['least cost'])} to {times(row['largest cost'])})" if row["scenes fitted"] > 1 else ""
         cost = f"{times(row['tenfold accuracy costs'])} the time{ends}"
-    best = _NEVER
+    best = f"nowhere yet; {row['cut short']} of {scenes} scenes cut short" if row["cut short"] else _NEVER
     if row["best for its time"]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
         best = f"on {row['best for its time']} of {scenes} scenes, errors {' to '.join(errors)}"
@@ -490,8 +490,8 @@ def effect_steps(numbers: Table, machine: str) -> Drawn:
         for place, row in zip(places, rows, strict=True):
             largest = ", ".join(row["shares of the step"].split(", ")[:3])
             axes.text(1.8 * longest, place, largest, va="center", fontsize=7.0, color=MUTED).set_in_layout(False)
-        axes.text(1.8 * longest, len(rows) - 0.3, "share of the step that an effect takes", va="bottom", fontsize=7.5,
-                  color=INK).set_in_layout(False)
+        axes.text(1.8 * longest, len(rows) - 0.3, "share of the step saved by leaving one effect out", va="bottom",
+                  fontsize=7.5, color=INK).set_in_layout(False)
         plot.log("time of a step [µs]", "", "x", xlim=(0.1, 1.5e5 * longest), ylim=(-0.6, len(rows) + 0.2))
         axes.grid(visible=False)
         axes.set_xticks([10.0**k for k in range(-1, int(np.log10(longest)) + 1)])

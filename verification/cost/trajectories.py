@@ -105,7 +105,7 @@ ENGINES = ("mujoco", "bullet", "drake")  # adapters of engines that accept any s
 REPEATS = 5  # number of repetitions of runs below ONCE seconds
 _SET_UPS = 3  # number of timed set-ups; the least time is subtracted, since a disturbed one would be too long
 ONCE = 0.05
-LONGEST = {"quick": 0.2, "full": 20.0}  # [s] largest time of one run
+LONGEST = {"quick": 2.0, "full": 20.0}  # [s] largest time of one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene, step, duration -> motion, seconds
@@ -180,6 +180,7 @@ class Curve:
     cost : factor in computing time for a tenth of the error; None if the error falls less than threefold.
     front : runs such that no other run of the scene is better in both time and error.
     too_few : whether there is no cost because finer steps would take too long.
+    cut_short : whether the error still falls at the finest step that was run, and finer steps would take too long.
     """
 
     scene: str
@@ -189,6 +190,7 @@ class Curve:
     cost: float | None
     front: tuple[Record, ...]
     too_few: bool
+    cut_short: bool
 
     @property
     def runs(self) -> list[Record]:
@@ -246,7 +248,7 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
             late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
             found.append(Curve(scene, method, tuple(kept), tuple(left_out), cost,
                                tuple(run for run in runs if on_front(run, honest)),
-                               cost is None and late and len(fitted) == len(runs)))
+                               cost is None and late and len(fitted) == len(runs), late and fitted[-1] is runs[-1]))
     return found
 
 
@@ -280,7 +282,7 @@ WORTH_COLUMNS = (
     Column("largest cost", timed=True), Column("scenes fitted", timed=True), Column("error stays", timed=True),
     Column("least error", timed=True), Column("best for its time", "scenes", timed=True), Column("scenes", timed=True),
     Column("most exact there", timed=True), Column("least exact there", timed=True), Column("energy made", timed=True),
-    Column("failed", "runs", timed=True),
+    Column("cut short", "scenes", timed=True), Column("failed", "runs", timed=True),
 )
 
 
@@ -288,7 +290,8 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
     """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
     The cost is the median over the scenes on which it can be fitted. "Error stays" is the number of scenes on which the
-    error does not fall. "Best for its time" is the number of scenes in which the method is on the front.
+    error does not fall. "Best for its time" is the number of scenes in which the method is on the front. "Cut short" is
+    the number of scenes in which the method might still reach the front with steps that would take too long.
     """
     found = curves(motions, methods)
     records: list[dict[str, Any]] = []
@@ -308,6 +311,7 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
             "best for its time": sum(bool(curve.front) for curve in mine),
             "most exact there": min(front, default=None), "least exact there": max(front, default=None),
             "energy made": max(run["energy made"] for curve in mine for run in curve.runs),
+            "cut short": sum(curve.cut_short for curve in mine),
             "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
     return table_of(WORTH_COLUMNS, records, digits=2, note=(
         "Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "

@@ -30,8 +30,28 @@ from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
 from verification.cost.start_up import COLUMNS as START_COLUMNS
 from verification.cost.step_cost import COST_COLUMNS, IAPB, KERNEL
-from verification.cost.study import KERNELS, RATE, SOLVERS, _rate, compute, finding, quoting
-from verification.cost.trajectories import BELOW, INTEGRATORS, WORLDS, by_chance, curves, tenfold_cost, worth
+from verification.cost.study import (
+    KERNELS,
+    RATE,
+    SOLVERS,
+    _rate,
+    _say_motions,
+    _say_worth,
+    compute,
+    finding,
+    quoting,
+)
+from verification.cost.trajectories import (
+    BELOW,
+    IDEAL,
+    INTEGRATORS,
+    TIMED_OUT,
+    WORLDS,
+    by_chance,
+    curves,
+    tenfold_cost,
+    worth,
+)
 from verification.cost.trajectories import COLUMNS as MOTION_COLUMNS
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table, table_of, titled
 from verification.mechanics.robot_timing import MANY, ONE
@@ -208,6 +228,29 @@ def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
     assert late["best for its time"] == 0 and late["error stays"] == 1
 
 
+@pytest.mark.parametrize(("errors", "undecided"), [((9e-1, 3e-1), 1), ((9e-1, 8.9e-1), 0)])
+def test_a_method_that_our_limit_of_time_cuts_short_is_not_called_worthless(
+    errors: tuple[float, ...], undecided: int
+) -> None:
+    """Its error still falls where we stop it; where it is level, more time would not help it."""
+    runs = [*_table(good=(1e-1, 1e-2, 1e-3), slow=errors).records(), _run("slow", 1e-3, None, 1e9, TIMED_OUT)]
+    motions = table_of(MOTION_COLUMNS, [run | {"time": 2.0 * run["time"]} if run["method"] == "slow" else run
+                                        for run in runs])  # fmt: skip
+    good, slow = worth(motions, ("good", "slow")).records()
+    assert (good["cut short"], slow["cut short"], slow["best for its time"]) == (0, undecided, 0)
+    [part] = _say_worth({"worth": worth(motions, ("good", "slow"))})
+    assert ("another: slow." in part.sentence) == (not undecided)
+    assert ("not decided, because finer steps would take too long: slow on 1 of 1 scenes" in part.sentence) == undecided
+
+
+def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
+    errors = {"IAPB, semi-implicit Euler": (1e-1, 1e-2), "PB, semi-implicit Euler": (1.0,), IDEAL: (1e-1, 5e-3)}
+    [part] = _say_motions({"motions": _table(**errors)})
+    assert part.verdict == MIXED and "no step of IAPB is as exact as ideal (1.0e-02 against 5.0e-03)" in part.miss
+    [part] = _say_motions({"motions": _table(**errors | {IDEAL: (1e-1, 2e-2)})})
+    assert part.verdict == REPRODUCED
+
+
 @pytest.mark.parametrize(("errors", "fitted", "words"), [
     ((1e-1, 1e-2, 1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×"),
     ((1e-1, 1e-2, 0.9e-2, 1.1e-2), (1e-1, 1e-2), "10× costs 100×, then level"),
@@ -246,7 +289,7 @@ def test_a_fit_uses_exactly_the_filled_marks_that_are_drawn(
     assert drawn.numbers.rows == worth(motions, methods).rows  # the table in the picture is that of the same runs
     for row in drawn.numbers.records():
         assert ("never worth" in drawn.panels[0].alt.split("best for its time: ")[1 + methods_of(drawn, row)]) == (
-            row["best for its time"] == 0)  # fmt: skip
+            row["best for its time"] == row["cut short"] == 0)  # fmt: skip
 
 
 def methods_of(drawn: Any, row: Any) -> int:
