@@ -41,11 +41,12 @@ from verification.finding import Column, Failure, Table, attempt, table_of
 _BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
 _PEG = (0.021, 0.0105, 0.0105)  # [m] the sides of the paper's peg, and a third side
 _TILT, _PUSH = 0.05, (-0.8, 0.0, -1.0)  # [rad] about y, [m/s2] towards wall and floor
+_LATER = 0.5e-3 * (sqrt(5.0) - 1.0)  # [s] the golden ratio of a millisecond: no step divides it
 
 
 def cradle() -> FixedScene:
     """The elastic cradle of the fixed scenes, until all four collisions are over."""
-    return replace(fixed_scene("elastic_cradle"), title="cradle, e = 1")
+    return later(replace(fixed_scene("elastic_cradle"), title="cradle, e = 1"))
 
 
 def bouncing_ball() -> FixedScene:
@@ -72,12 +73,11 @@ def peg_landing() -> FixedScene:
                       0.185, _PEG[0], _PUSH)  # fmt: skip
 
 
-def later(name: str) -> FixedScene:
-    """Return a fixed scene whose impacts are later by `_LATER`, because its bodies start earlier in their flight.
+def later(scene: FixedScene) -> FixedScene:
+    """Return the scene with its first impact `_LATER` later, because its bodies start earlier in their flight.
 
-    In the fixed scene itself an impact is at a multiple of the step, and a run with that step is exact by chance.
+    In the scene itself an impact is at a multiple of the step, and a run with that step is exact by chance.
     """
-    scene = fixed_scene(name)
     gravity = np.array(scene.gravity)
 
     def earlier(body: RigidBody) -> RigidBody:
@@ -89,10 +89,13 @@ def later(name: str) -> FixedScene:
     return replace(scene, bodies=tuple(map(earlier, scene.bodies)))
 
 
-_LATER = 0.5e-3 * (sqrt(5.0) - 1.0)  # [s] the golden ratio of a millisecond: no step divides it
+def _later_fixed(name: str) -> FixedScene:
+    return later(fixed_scene(name))
+
+
 TRAJECTORY_SCENES: dict[str, Callable[[], FixedScene]] = {
     made.__name__: made for made in (cradle, bouncing_ball, peg_landing)
-} | {name: partial(later, name) for name in ("bernoulli", "box_on_four_corners", "box_on_sixteen_corners")}
+} | {name: partial(_later_fixed, name) for name in ("bernoulli", "box_on_four_corners", "box_on_sixteen_corners")}
 
 
 Floats = NDArray[np.float64]

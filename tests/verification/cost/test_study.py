@@ -297,12 +297,6 @@ def methods_of(drawn: Any, row: Any) -> int:
     return int(drawn.numbers.column("method").index(row["method"]))
 
 
-def test_the_scenes_have_no_impact_at_a_multiple_of_a_step() -> None:
-    """Otherwise a run is exact by chance, and its method seems better than it is."""
-    runs = kept_tables()["haptic-rate/motions"].where(outcome="ok").records()
-    assert len(runs) > 150 and not any(by_chance(run) for run in runs)
-
-
 def test_a_report_measures_each_quantity_once_and_quotes_it(
     tables: Tables, monkeypatch: pytest.MonkeyPatch
 ) -> None:
