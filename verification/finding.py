@@ -234,8 +234,7 @@ class Part:
     cases : number of cases in the decided trials, if it is below LEAST_DECIDED
     region : region in which the part is reproduced, if the verdict is WHERE; fails : conditions of the failed trials
     timed : True if measured times enter
-    optional : True if the part needs software that the project does not include, such as another engine; if that
-        software is absent, the other parts decide the verdict
+    optional : True if the part needs software that the project does not include; the other parts decide without it
     miss : one short clause for the first page that says where our method falls short; otherwise ""
     quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
     """
