@@ -40,7 +40,21 @@ from verification.cost.impacts import (
     lost_to_rivals,
     short_time,
 )
-from verification.cost.trajectories import GAINED, INTEGRATORS, WORLDS, Curve, by_chance, curves, times, worth
+from verification.cost.step_cost import IDEAL
+from verification.cost.trajectories import (
+    FIT_FALL,
+    FIT_RUNS,
+    GAINED,
+    IMPULSES,
+    INTEGRATORS,
+    PENALTIES,
+    WORLDS,
+    Curve,
+    by_chance,
+    curves,
+    times,
+    worth,
+)
 from verification.finding import Table
 
 Row = Mapping[str, Any]
@@ -262,31 +276,34 @@ def _share(numbers: Table, tolerance: float) -> str:
     return plot.svg
 
 
-_WORLDS = {method: STYLES[method.split(",")[0].removesuffix(" (QP per step)")] for method in WORLDS}
+_ENGINES = {method: replace(STYLES[method], filled=False) for method in WORLDS if method in STYLES}
+_WORLDS = {IMPULSES: STYLES["IAPB"], PENALTIES: STYLES["PB"], IDEAL: STYLES["ideal, Python"], **_ENGINES}
 _NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4")
 _INTEGRATORS = {method: STYLES[name] for method, name in zip(INTEGRATORS, _NAMES, strict=True)}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
 _READ = (
-    "Lower left is better. Each mark is a run with one time step; finer steps are further right. The number at a "
-    "curve is the factor by which the computing time grows for ten times the accuracy on that scene: a power fitted "
-    "to the filled marks (thick straight line). At hollow marks the finer step divides the error by less than "
-    f"{GAINED:g}; they are not fitted. The error depends on where an impact falls within a step, so curves are uneven. "
-    "The table gives medians over the scenes, and in brackets the range. “Then level” or “stays at”: no shorter step "
-    "reduces this error, which comes from the contact model. “Too few runs”, “cut short”: finer steps would take "
-    "longer than allowed, though the error still falls. The grey steps join the runs that no other run beats in both "
-    "time and error. Crosses at the upper rim: the run failed or took too long. A hollow triangle at the lower rim: "
-    "the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end at the instant "
-    "of impact; it is not fitted either. "
+    "Lower left is better. Each mark is a run with one time step; finer steps are further right. Filled marks: "
+    "compiled; hollow marks: called from Python. Small pale marks, filled or hollow: the finer step divides the "
+    f"error by less than {GAINED:g}, so the number at the curve does not use them. “10× costs 4×”: ten times the "
+    f"accuracy takes four times as long, a power (thick straight line) fitted to at least {FIT_RUNS} runs over which "
+    f"the error falls at least {FIT_FALL:g}-fold. “7× costs 2× (2 runs)”: fewer runs or a smaller fall; this is only "
+    "the measured factor from the first to the last of them. The error depends on where an impact falls within a "
+    "step, so curves are uneven. The table gives the median of the fits, in brackets their range, then the number of "
+    "scenes with a fit. “Then level”, “stays at”: no shorter step reduces this error, which comes from the contact "
+    "model. “Too few runs”, “cut short”: finer steps would take longer than allowed, though the error still falls. "
+    "The grey steps join the runs that no other run beats in both time and error. Crosses at the upper rim: the run "
+    "failed or took too long. An arrow at the lower rim: the error is below the accuracy of the exact motion (about "
+    "1e-10), because a step happens to end at the instant of impact; it is not used either. "
 )
 
 
 @recipe(
     "trajectory-precision", "What accuracy of a whole motion costs, by world", "haptic-rate/motions",
     section="accuracy",
-    caption=_READ + "Worlds: IAPB and PB by semi-implicit Euler, compiled; ideal: rigid contacts by a QP per step, "
-    "from Python. CBuc is not drawn: it differs from ideal only in its coupling to a device, and these scenes have no "
-    "device. Energy made: the largest excess of kinetic plus potential energy over its value at the start, relative to "
-    "the largest kinetic energy.",
+    caption=_READ + "Worlds: IAPB and PB by semi-implicit Euler; ideal: rigid contacts by a QP per step, all in "
+    "Python. Other engines run their own compiled steps; Python calls them and records. CBuc is not drawn: it differs "
+    "from ideal only in its coupling to a device, and these scenes have no device. Energy made: the largest excess of "
+    "kinetic plus potential energy over its value at the start, relative to the largest kinetic energy.",
 )  # fmt: skip
 def trajectory_precision(motions: Table) -> Drawn:
     """Draw the worlds: a panel with a table, and a panel per scene."""
@@ -298,7 +315,8 @@ def trajectory_precision(motions: Table) -> Drawn:
     section="accuracy",
     caption="The same worlds with other integrators; the grey steps join the best of these runs. An integrator of "
     "higher order is more exact only between impacts. The step that contains an impact dominates the error, so "
-    "Runge-Kutta 4 needs four evaluations and gains little. Marks and numbers as above.",
+    "Runge-Kutta 4 needs four evaluations and gains little. All are compiled, so all marks are filled; small pale "
+    "marks, grey steps and numbers as above.",
 )  # fmt: skip
 def integrator_precision(motions: Table) -> Drawn:
     """Draw the integrators in the same way as the worlds."""
@@ -320,14 +338,14 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Draw
     return Drawn(tuple(panels), told, (*((look.name, look) for look in looks.values()), ("best for its time", _FRONT)))
 
 
-_HEADINGS = ((0.03, ""), (0.16, "ten times the accuracy costs"), (0.43, "smallest error"),
-             (0.545, "best for its time (on the grey steps)"), (0.87, "energy made"))
+_HEADINGS = ((0.03, ""), (0.155, "called"), (0.265, "ten times the accuracy costs (scenes)"),
+             (0.545, "smallest error"), (0.65, "best for its time (grey), errors"), (0.885, "energy made"))
 
 
 def _worth(key: str, told: Table, looks: Mapping[str, LineStyle]) -> str:
     """Draw the figure's main numbers as a table with a line per method."""
     rows = told.records()
-    with Plot(f"{key}-worth", (6.8, 0.24 * (len(rows) + 1) + 0.1), bare=True) as plot:
+    with Plot(f"{key}-worth", (7.8, 0.24 * (len(rows) + 1) + 0.1), bare=True) as plot:
         plot.axes.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -1.5))
         for place, heading in _HEADINGS:
             plot.axes.text(place, -1.0, heading, fontsize=7.5, color=MUTED, va="center")
@@ -347,16 +365,16 @@ _NEVER = "never worth its time here"
 def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[str, ...]]:
     """Return a line of that table, as one text and as the text of each column."""
     name, scenes = looks[row["method"]].name, row["scenes"]
-    cost = "no step buys it: the error stays"
+    cost = "no step buys it: the error stays" if row["error stays"] == scenes else "too few runs for a fit"
     if row["scenes fitted"]:
         ends = f" ({times(row['least cost'])} to {times(row['largest cost'])})" if row["scenes fitted"] > 1 else ""
-        cost = f"{times(row['tenfold accuracy costs'])} the time{ends}"
-    best = f"nowhere yet; {row['cut short']} of {scenes} scenes cut short" if row["cut short"] else _NEVER
+        cost = f"{times(row['tenfold accuracy costs'])} the time{ends}, {row['scenes fitted']} of {scenes}"
+    best = f"undecided: {row['cut short']} of {scenes} cut short" if row["cut short"] else _NEVER
     if row["best for its time"]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
-        best = f"on {row['best for its time']} of {scenes} scenes, errors {' to '.join(errors)}"
+        best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
     made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > NO_GAIN else "none"
-    cells = (name, cost, power_of_error(row["least error"]), best, made)
+    cells = (name, row["called"], cost, power_of_error(row["least error"]), best, made)
     return f"{name}: ten times the accuracy: {cost}; best for its time: {best}; energy made: {made}", cells
 
 
@@ -367,18 +385,21 @@ def _motions(key: str, here: Sequence[Curve], lost: Table, looks: Mapping[str, L
         _draw_front(plot, front)
         for curve in here:
             look = looks[curve.method]
-            bare = replace(look, name="", marker=look.marker or "o", filled=True)
+            bare = replace(look, name="")
             plot.curve(_places(run for run in curve.runs if not by_chance(run)), replace(look, width=0.8), marked=False)
-            plot.marks(_places(curve.fitted), bare, markersize=5)
-            plot.marks(_places(run for run in curve.left_out if not by_chance(run)), replace(bare, filled=False))
-            plot.marks([(run["time"], 1.3 * floor) for run in curve.left_out if by_chance(run)],
-                       replace(bare, filled=False, marker="v"))
+            plot.marks(_places(curve.used), bare, markersize=5.5)
+            plot.marks(_places(run for run in curve.left_out if not by_chance(run)), bare, markersize=3.8, alpha=_PALE)
+            for run in filter(by_chance, curve.left_out):
+                note(plot.axes, (run["time"], 1.3 * floor), "↓", color=look.color)
             _draw_fit(plot, curve, look)
             plot.words[look.name] = f": {curve.words}"
             times_lost = lost.where(method=curve.method).column("time")
             plot.lost([time for time in times_lost if time], look, 0.98)
         plot.log("computing time [ms per simulated second]", "error of position [lengths]", ylim=(floor, 30.0))
     return plot.svg
+
+
+_PALE = 0.45  # strength of marks that are not used
 
 
 def _places(runs: Iterable[Row]) -> list[tuple[float, float]]:
@@ -389,7 +410,7 @@ def _draw_fit(plot: Plot, curve: Curve, look: LineStyle) -> None:
     """Draw the fitted power law over the range of the fitted runs."""
     if curve.cost is None:
         return
-    time, error = (np.log10(column) for column in zip(*_places(curve.fitted), strict=True))
+    time, error = (np.log10(column) for column in zip(*_places(curve.used), strict=True))
     ends = np.array([time.min(), time.max()])
     heights = error.mean() - (ends - time.mean()) / np.log10(curve.cost)
     plot.axes.plot(10.0**ends, 10.0**heights, color=look.color, linewidth=1.8, alpha=0.6)

@@ -52,7 +52,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("pscaled",), LineStyle(SKY, "D", (1.4, 1.4), 1.6)),
     (("pspread", "IAPB LM"), LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6), 1.6)),
     # methods for an impact and solvers; what Python calls is dashed, its marks empty
-    (("IAPB, Python", "IAPB, RK4"), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
+    (("IAPB, Python",), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
     (("factored, no clamp",), LineStyle(SKY, "s", (5, 1.6))),
     (("printed, numpy", "gram_pinv", "gram_pinv, as printed"),
      LineStyle(PURPLE, "s", (4, 2), 1.4)),
@@ -73,9 +73,11 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
     (("Drake",), LineStyle(AMBER, "v", (1.4, 1.4))),
     (("Bullet",), LineStyle(GREEN, "P", (3, 1.2))),
-    # worlds by another integrator
-    (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2, filled=False)),
-    (("PB, RK4",), LineStyle(VERMILION, "s", (4, 1, 1, 1), 1.2, filled=False)),
+    # worlds called from Python, and worlds by another integrator
+    (("ideal, Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
+    (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2)),
+    (("IAPB, RK4",), LineStyle(BLUE, ">", (4, 2), 1.2)),
+    (("PB, RK4",), LineStyle(VERMILION, ">", (4, 1, 1, 1), 1.2)),
     # integrators
     (("semi-implicit Euler",), LineStyle(MUTED, "s")),
     (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),

@@ -36,7 +36,15 @@ from verification.cost.many_bodies import LEAST_BODIES, study_many_bodies
 from verification.cost.resting_scenes import resting_scenes
 from verification.cost.start_up import start_up
 from verification.cost.step_cost import IAPB, KERNEL, Rivals, impact_cost, rivals
-from verification.cost.trajectories import BELOW, WORLDS, times, trajectory_precision, worth
+from verification.cost.trajectories import (
+    BELOW,
+    FIT_FALL,
+    FIT_RUNS,
+    WORLDS,
+    times,
+    trajectory_precision,
+    worth,
+)
 from verification.finding import (
     FAILED_CASES,
     MIXED,
@@ -424,14 +432,16 @@ def _say_motions(tables: Tables) -> Iterator[Part]:
 def _say_worth(tables: Tables) -> Iterator[Part]:
     rows = tables["worth"].records()
     names = {row["method"]: row["method"].split(",")[0].removesuffix(" (QP per step)") for row in rows}
-    costs = [f"{names[row['method']]} {times(row['tenfold accuracy costs'])}" for row in rows if row["scenes fitted"]]
+    costs = [f"{names[row['method']]} {times(row['tenfold accuracy costs'])} ({row['scenes fitted']} of "
+             f"{row['scenes']} scenes)" for row in rows if row["scenes fitted"]]  # fmt: skip
     stays = [names[row["method"]] for row in rows if row["error stays"] == row["scenes"]]
     never = [names[row["method"]] for row in rows if not row["best for its time"] and not row["cut short"]]
     cut = [f"{names[row['method']]} on {row['cut short']} of {row['scenes']} scenes" for row in rows
            if not row["best for its time"] and row["cut short"]]  # fmt: skip
     unknown = f"; not decided, because finer steps would take too long: {', '.join(cut)}" if cut else ""
     level = f"; with {', '.join(stays)} no shorter step reduces the error" if stays else ""
-    yield _part("Ten times the accuracy of a whole motion multiplies the computing time by (medians over the scenes): "
+    yield _part("Ten times the accuracy of a whole motion multiplies the computing time by (median over the scenes "
+                f"where at least {FIT_RUNS} runs span a {FIT_FALL:g}-fold fall of the error): "
                 f"{', '.join(costs)}{level}. Methods that on every scene are slower and less exact than another: "
                 f"{', '.join(never) or 'none'}{unknown}.", True)
 

@@ -1,8 +1,8 @@
 """Error and computing time of whole motions, over methods and steps; the truth is the event-driven solution.
 
 Our compiled worlds are timed in their loop, with the record. The other methods are called from Python with set-up and
-record; their time is the time of the run minus that of a run of one step. Short runs are repeated REPEATS times, and
-the least time counts.
+record; their time is the least time of a run minus the least time of a run of one step. Short runs are repeated
+REPEATS times.
 
 A run that raises an exception or gives values that are not finite is a failure. A run that, judged by the coarser
 steps, would take longer than LONGEST is a time-out and is not made. Both have rows in the table. If an error is below
@@ -10,7 +10,8 @@ the error bound of the truth, the row has this bound instead, and its note says 
 of a step, because there a run would be exact by chance.
 
 `curves` computes the cost of ten times the accuracy for each method and scene, and the figures show the same curves.
-`worth` summarizes the curves of each method.
+A cost is never extrapolated: it is fitted only to runs that themselves span ten times the accuracy. `worth` summarizes
+the curves of each method.
 """
 
 from __future__ import annotations
@@ -106,12 +107,13 @@ STEPS = {
 }  # [s]
 ENGINES = ("mujoco", "bullet", "drake")  # adapters of engines that accept any step
 REPEATS = 5  # number of repetitions of runs below ONCE seconds
-_SET_UPS = 3  # number of timed set-ups; the least time is subtracted, since a disturbed one would be too long
+_SET_UPS = 3  # number of timed set-ups of each repetition
 ONCE = 0.05
 LONGEST = {"quick": 2.0, "full": 20.0}  # [s] largest time of one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 
-Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float]]  # scene, step, duration -> motion, seconds
+# scene, step, duration -> motion, seconds of the run with its set-up, seconds of the set-up
+Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float, float]]
 
 
 COLUMNS = (
@@ -169,7 +171,8 @@ def trajectory_precision(
 
 
 GAINED = 1.5  # a run belongs to a fit if its error is at least this many times smaller than that of the run before it
-_LEAST_FALL = 3.0  # least ratio of the errors over a fit: with less, the cost of ten times the accuracy is a guess
+FIT_RUNS, FIT_FALL = 3, 10.0  # a power is fitted to no fewer runs and no smaller fall of the error: no extrapolation
+_LEAST_FALL = 3.0  # with a smaller fall of the error it is said to stay
 
 
 @dataclass(frozen=True)
@@ -178,17 +181,18 @@ class Curve:
 
     Attributes
     ----------
-    fitted : runs along which the error falls, to which the cost is fitted; () if there is no cost.
+    used : runs along which the error falls, from which `words` are computed; () if the error falls less than threefold.
     left_out : the other runs: before the error falls, after it stops falling, or exact by chance (`by_chance`).
-    cost : factor in computing time for a tenth of the error; None if the error falls less than threefold.
+    cost : factor in computing time for a tenth of the error, fitted to `used`; None if these are too few (FIT_RUNS) or
+        span too little (FIT_FALL).
     front : runs such that no other run of the scene is better in both time and error.
-    too_few : whether there is no cost because finer steps would take too long.
+    too_few : whether there are no runs to use because finer steps would take too long.
     cut_short : whether the error still falls at the finest step that was run, and finer steps would take too long.
     """
 
     scene: str
     method: str
-    fitted: tuple[Record, ...]
+    used: tuple[Record, ...]
     left_out: tuple[Record, ...]
     cost: float | None
     front: tuple[Record, ...]
@@ -198,7 +202,7 @@ class Curve:
     @property
     def runs(self) -> list[Record]:
         """All runs, coarse to fine."""
-        return _by_step((*self.fitted, *self.left_out))
+        return _by_step((*self.used, *self.left_out))
 
     @property
     def least(self) -> float:
@@ -207,16 +211,19 @@ class Curve:
 
     @property
     def level(self) -> bool:
-        """Whether the error no longer falls at steps finer than those of the fit."""
-        return bool(self.fitted) and any(run["step"] < self.fitted[-1]["step"] and not by_chance(run)
-                                         for run in self.left_out)
+        """Whether the error no longer falls at steps finer than those in use."""
+        return bool(self.used) and any(run["step"] < self.used[-1]["step"] and not by_chance(run)
+                                       for run in self.left_out)
 
     @property
     def words(self) -> str:
-        """The cost of ten times the accuracy on this scene, as a label of the curve."""
-        if self.cost is None:
+        """The cost of ten times the accuracy, or what was measured without a fit, as a label of the curve."""
+        if not self.used:
             return "too few runs" if self.too_few else f"stays at {self.least:.2g}"
-        return f"10× costs {times(self.cost)}{', then level' * self.level}"
+        first, last = self.used[0], self.used[-1]
+        told = f"{times(first['position'] / last['position'])} costs {times(last['time'] / first['time'])}"
+        told = f"{told} ({len(self.used)} runs)" if self.cost is None else f"10× costs {times(self.cost)}"
+        return told + ", then level" * self.level
 
 
 def times(factor: float) -> str:
@@ -244,14 +251,13 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
             runs = _by_step(run for run in honest if run["method"] == method)
             if not runs:
                 continue
-            fitted = falling(runs)
-            cost = tenfold_cost(fitted)
-            kept = fitted if cost is not None else []
-            left_out = (run for run in here if run["method"] == method and run not in kept)
+            kept = falling(runs)
+            used = kept if kept[0]["position"] >= _LEAST_FALL * kept[-1]["position"] else []
+            left_out = (run for run in here if run["method"] == method and run not in used)
             late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
-            found.append(Curve(scene, method, tuple(kept), tuple(left_out), cost,
+            found.append(Curve(scene, method, tuple(used), tuple(left_out), tenfold_cost(used),
                                tuple(run for run in runs if on_front(run, honest)),
-                               cost is None and late and len(fitted) == len(runs), late and fitted[-1] is runs[-1]))
+                               not used and late and len(kept) == len(runs), late and kept[-1] is runs[-1]))
     return found
 
 
@@ -270,18 +276,19 @@ def falling(runs: Sequence[Record]) -> list[Record]:
 
 
 def tenfold_cost(runs: Sequence[Record]) -> float | None:
-    """Return the factor in time for a tenth of the error; None if the error falls less than threefold.
+    """Return the factor in time for a tenth of the error; None with fewer than FIT_RUNS runs or a fall below FIT_FALL.
 
     The factor is 10^(−1/slope), with the slope of log(error) over log(time) by least squares.
     """
-    if runs[0]["position"] < _LEAST_FALL * runs[-1]["position"]:
+    if len(runs) < FIT_RUNS or runs[0]["position"] < FIT_FALL * runs[-1]["position"]:
         return None
     time, error = (np.log10([run[key] for run in runs]) for key in ("time", "position"))
     return float(10.0 ** (-1.0 / np.polyfit(time, error, 1)[0]))
 
 
 WORTH_COLUMNS = (
-    Column("method", condition=True), Column("tenfold accuracy costs", timed=True), Column("least cost", timed=True),
+    Column("method", condition=True), Column("called", condition=True),
+    Column("tenfold accuracy costs", timed=True), Column("least cost", timed=True),
     Column("largest cost", timed=True), Column("scenes fitted", timed=True), Column("error stays", timed=True),
     Column("least error", timed=True), Column("best for its time", "scenes", timed=True), Column("scenes", timed=True),
     Column("most exact there", timed=True), Column("least exact there", timed=True), Column("energy made", timed=True),
@@ -292,9 +299,10 @@ WORTH_COLUMNS = (
 def worth(motions: Table, methods: Sequence[str]) -> Table:
     """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
-    The cost is the median over the scenes on which it can be fitted. "Error stays" is the number of scenes on which the
-    error does not fall. "Best for its time" is the number of scenes in which the method is on the front. "Cut short" is
-    the number of scenes in which the method might still reach the front with steps that would take too long.
+    The cost is the median over the scenes on which it can be fitted (see `Curve.cost`). "Error stays" is the number of
+    scenes on which the error does not fall. "Best for its time" is the number of scenes in which the method is on the
+    front. "Cut short" is the number of scenes in which the method might still reach the front with steps that would
+    take too long.
     """
     found = curves(motions, methods)
     records: list[dict[str, Any]] = []
@@ -306,10 +314,11 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
         front = [run["position"] for curve in mine for run in curve.front]
         runs = motions.where(method=method)
         records.append({
-            "method": method, "tenfold accuracy costs": float(np.median(costs)) if costs else None,
+            "method": method, "called": "compiled" if method in INTEGRATORS else "from Python",
+            "tenfold accuracy costs": float(np.median(costs)) if costs else None,
             "least cost": min(costs, default=None), "largest cost": max(costs, default=None),
             "scenes fitted": len(costs), "scenes": len(mine),
-            "error stays": sum(curve.cost is None and not curve.too_few for curve in mine),
+            "error stays": sum(not curve.used and not curve.too_few for curve in mine),
             "least error": float(np.median([curve.least for curve in mine])),
             "best for its time": sum(bool(curve.front) for curve in mine),
             "most exact there": min(front, default=None), "least exact there": max(front, default=None),
@@ -318,7 +327,8 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
             "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
     return table_of(WORTH_COLUMNS, records, digits=2, note=(
         "Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
-        f"falls by a factor of {GAINED:g} or more from one to the next."))
+        f"falls by a factor of {GAINED:g} or more from one to the next, where these are at least {FIT_RUNS} runs and "
+        f"the error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated."))
 
 
 def on_front(row: Record, others: Sequence[Record]) -> bool:
@@ -380,14 +390,18 @@ def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[flo
 
 
 def _tried(way: Motion, scene: FixedScene, step: float) -> tuple[Trajectory, float] | Exception:
-    """Return the motion and the least time of its runs, or the exception of a run."""
+    """Return the motion and its least time without the set-up, or the exception of a run.
+
+    The least set-up is subtracted from the least run. The least of the differences would be too short, because it
+    takes the run before which the set-up was disturbed most.
+    """
     try:
         found = [way(scene, step, scene.duration)]
         while len(found) < REPEATS and found[0][1] < ONCE:
             found.append(way(scene, step, scene.duration))
     except Exception as error:  # engines raise exceptions of any type, and each is a result
         return error
-    return found[-1][0], min(spent for _, spent in found)
+    return found[-1][0], max(min(spent for _, spent, _ in found) - min(set_up for *_, set_up in found), 0.0)
 
 
 class Judge:
@@ -441,7 +455,7 @@ class Judge:
 def _compiled(law_name: str, integrator: str) -> Motion:
     """Return the motion function of one of the engine's laws in the compiled loop."""
 
-    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float]:
+    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
         contact: dict[str, Any] = dict(find_simulator("iapb").settings(scene, step).options)
         law = getattr(laws, law_name)(integrator=integrator)
         loop = RecordedLoop(Simulation(own_scene(scene, step, duration, **contact), law), round(duration / step))
@@ -449,15 +463,15 @@ def _compiled(law_name: str, integrator: str) -> Motion:
         run = loop.recording.run("", "")
         keep = slice(None, None, steps_between_samples(step))
         q, v = run.q[keep], run.v[keep]
-        return Trajectory(run.time[keep], *world_state(q, v), np.full(len(q), -1)), seconds
+        return Trajectory(run.time[keep], *world_state(q, v), np.full(len(q), -1)), seconds, 0.0
 
     return run
 
 
 def _adapter(name: str) -> Motion:
-    """Return the motion function of an engine with an adapter; its time is without the set-up."""
+    """Return the motion function of an engine with an adapter; its set-up is timed as a run of one step."""
 
-    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float]:
+    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
         engine = find_simulator(name)
         settings: Settings = engine.settings(scene, step)
         engine.run(scene, settings, step, 2.0 * step)  # warm
@@ -465,6 +479,6 @@ def _adapter(name: str) -> Motion:
         motion, spent = timed(partial(engine.run, scene, settings, step, duration))
         if len(motion.time) < 2:
             raise IapbError("fewer than two instants were recorded")
-        return motion, max(spent - set_up, 0.0)
+        return motion, spent, set_up
 
     return run

@@ -170,7 +170,8 @@ def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
     motions = trajectory_precision.draw(inputs)
     assert [panel.label for panel in motions.panels] == ["", "ball"]
-    assert [name for name, _ in motions.legend] == ["IAPB", "PB", "MuJoCo", "best for its time"]
+    assert [(name, look.filled) for name, look in motions.legend] == [
+        ("IAPB", True), ("PB", True), ("MuJoCo", False), ("best for its time", True)]  # fmt: skip
     without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
     assert motions.panels[1].svg != trajectory_precision.draw(without).panels[1].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
@@ -251,29 +252,33 @@ def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
     assert part.verdict == REPRODUCED
 
 
-@pytest.mark.parametrize(("errors", "fitted", "words"), [
+@pytest.mark.parametrize(("errors", "used", "words"), [
     ((1e-1, 1e-2, 1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×"),
-    ((1e-1, 1e-2, 0.9e-2, 1.1e-2), (1e-1, 1e-2), "10× costs 100×, then level"),
+    ((1e-1, 1e-2, 1e-3, 0.9e-3, 1.1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×, then level"),
     ((0.9, 1.0, 1e-1, 1e-2), (1.0, 1e-1, 1e-2), "10× costs 100×"),  # the coarse end does not count
-    ((1e-1, 1e-2, 1e-10), (1e-1, 1e-2), "10× costs 100×"),  # exact by chance
+    ((1e-1, 1e-2, 1e-3, 1e-10), (1e-1, 1e-2, 1e-3), "10× costs 100×"),  # exact by chance
     ((0.5, 0.48, 0.5), (), "stays at 0.48"),
+    # no fit to two runs, nor to three whose errors span less than the tenfold: the measured factors instead
+    ((1e-1, 1e-2, 0.9e-2), (1e-1, 1e-2), "10× costs 100× (2 runs), then level"),
+    ((8e-1, 4e-1, 1e-1), (8e-1, 4e-1, 1e-1), "8× costs 10000× (3 runs)"),
 ])
 def test_a_fit_takes_the_runs_on_which_the_error_falls(
-    errors: tuple[float, ...], fitted: tuple[float, ...], words: str
+    errors: tuple[float, ...], used: tuple[float, ...], words: str
 ) -> None:
     [curve] = curves(_table(good=errors), ("good",))
-    assert tuple(run["position"] for run in curve.fitted) == fitted and curve.words == words
+    assert tuple(run["position"] for run in curve.used) == used and curve.words == words
+    assert (curve.cost is None) == (not used or "runs" in words)
     assert sorted(run["position"] for run in curve.runs) == sorted(errors)
 
 
 @pytest.mark.parametrize(("recipe", "methods"), [(trajectory_precision, WORLDS), (integrator_precision, INTEGRATORS)])
-def test_a_fit_uses_exactly_the_filled_marks_that_are_drawn(
+def test_a_number_uses_exactly_the_strong_marks_that_are_drawn(
     recipe: Any, methods: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    filled, hollow = [], []
+    strong, pale = [], []
 
     def noted(self: Plot, points: Any, look: Any, **how: Any) -> None:
-        (filled if look.filled else hollow).append(sorted(points))
+        (pale if "alpha" in how else strong).append((look.filled, sorted(points)))
 
     monkeypatch.setattr(Plot, "marks", noted)
     motions = kept_tables()["haptic-rate/motions"]
@@ -281,9 +286,11 @@ def test_a_fit_uses_exactly_the_filled_marks_that_are_drawn(
     found = curves(motions, methods)
     assert len(found) > 20 and sum(curve.cost is not None for curve in found) > 10
     for curve in found:
-        assert curve.cost is None or curve.cost == tenfold_cost(curve.fitted)
-        assert sorted((run["time"], run["position"]) for run in curve.fitted) in filled
-        assert sorted((run["time"], run["position"]) for run in curve.left_out if not by_chance(run)) in hollow
+        assert curve.cost == tenfold_cost(curve.used)
+        compiled = curve.method in INTEGRATORS  # whether a mark is filled says how the method is called
+        assert (compiled, sorted((run["time"], run["position"]) for run in curve.used)) in strong
+        left = sorted((run["time"], run["position"]) for run in curve.left_out if not by_chance(run))
+        assert (compiled, left) in pale
         [panel] = [panel for panel in drawn.panels if panel.label == curve.scene]
         assert f": {curve.words}</text>" in panel.svg
     assert drawn.numbers.rows == worth(motions, methods).rows  # the table in the picture is that of the same runs
