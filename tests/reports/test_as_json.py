@@ -94,8 +94,10 @@ def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
 
 def test_bench_and_figures(answer, tmp_path, monkeypatch):
     choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
-    monkeypatch.setattr("reports.commands.bench.which_method", lambda *_: (choice,))
-    status, found = answer("bench", "--budget", "50us")
+    asked = []
+    monkeypatch.setattr("reports.commands.bench.which_method", lambda *given: asked.append(given) or (choice,))
+    status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
+    assert asked == [(pytest.approx(5e-5), 7, 3)]
     assert status == 0 and found["choices"][0]["method"] == "factored"
     part, tables = Part("s", REPRODUCED), {"one": Table((Column("x"),), ((1,),))}
     finding = Finding("cost", "t", "q", "a", REPRODUCED, (part,), tables)

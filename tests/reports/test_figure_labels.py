@@ -12,7 +12,7 @@ from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from reports.figures.labels import label_marks, name_curves, note_beside
+from reports.figures.labels import arrow_of_time, label_marks, name_curves, note_beside
 from reports.figures.style import styled
 
 CROWD = [(0.5 + 0.01 * n, 0.5) for n in range(6)]
@@ -87,6 +87,16 @@ def test_the_name_of_an_arrow_stands_clear_of_bodies_and_arrow() -> None:
         edges = [axes.transData.transform_path(Path(ends)) for ends in
                  ([(2.0, 1.5), (2.0, 2.5)], [(1.9, 0.5), (2.4, 0.5), (2.4, 1.7), (1.9, 1.7), (1.9, 0.5)])]  # fmt: skip
         assert not any(path.intersects_bbox(box, False) for path in edges)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_arrow_of_time_points_along_the_path(way: float) -> None:
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0)).add_subplot()
+        axes.plot(way * np.linspace(0.0, 1.0, 50), way * np.linspace(0.0, 2.0, 50))
+        arrow_of_time(axes)
+        tip, tail = (np.asarray(end) for end in (axes.texts[0].xy, axes.texts[0].xyann))
+        assert axes.texts[0].arrowprops["arrowstyle"] == "-|>" and (way * (tip - tail) > 0.0).all()
 
 
 def test_no_name_is_struck_through_by_a_line() -> None:

@@ -90,7 +90,7 @@ def test_the_value_is_marked_whatever_the_words(pages: dict[str, str]) -> None:
     with pytest.raises(ArgumentError, match="stands in"):
         Part("Bodies: 1.29.", MIXED, quantities=((BODIES, "1.24"),))
     with pytest.raises(ArgumentError, match="stands in"):
-        finding_of("k", "k", "", "Bodies: 11.24 and 1.245.", [], quantities=((BODIES, "1.24"),))
+        finding_of("k", "k", "", "Bodies: 11.24, 1.245 and 1324.", [], quantities=((BODIES, "1.24"),))
     with pytest.raises(ArgumentError, match="exponent of bodies"):
         Part("1", MIXED, quantities=(("exponent of bodys", "1"),))
 

@@ -21,10 +21,11 @@ from reports.figures.cost import (
 from reports.figures.plot import Plot
 from tests.reports.figure_inputs import tables as kept_tables
 from verification.claims.c22_cost import CLEAR, holds
+from verification.clock import Times
 from verification.cost.against_mujoco import PART_COLUMNS, RACE_COLUMNS
 from verification.cost.calls import PRINTED
 from verification.cost.effects import COLUMNS as EFFECT_COLUMNS
-from verification.cost.effects import steps, summary
+from verification.cost.effects import saved, steps, summary
 from verification.cost.growth import FACTORED, RATE_COLUMNS, SCALING_COLUMNS, fitted, steepest
 from verification.cost.impacts import BUDGET_COLUMNS, METHOD_COLUMNS
 from verification.cost.many_bodies import COLUMNS as BODY_COLUMNS
@@ -187,6 +188,13 @@ def test_the_front_of_effects_is_pareto() -> None:
     assert len(effect_costs.draw({"effect_costs": table}).panels) == 1
 
 
+def test_a_time_saved_is_shown_only_beyond_the_noise() -> None:
+    """All rounds but the fastest and the slowest must agree on the side of 1."""
+    assert saved(Times((0.9, 1.1, 0.9, 0.9, 0.9))) == pytest.approx(10.0)
+    assert saved(Times((1.1, 0.9, 1.1, 1.1, 1.1))) == pytest.approx(-10.0)
+    assert saved(Times((0.9, 1.1, 0.9, 1.1, 0.9))) is saved(Times((1.0, 1.0, 1.0))) is None
+
+
 def test_steps_are_shown_with_the_shares_that_exceed_the_noise() -> None:
     keys = ("effect", "active", "step", "all on", "faster than real time", "time saved")
     rows = [("gravity", True, 2.0, 3.0, 500.0, 10.0), ("wall_contacts", True, 2.0, 3.0, 500.0, 40.0),
@@ -330,4 +338,16 @@ def test_a_report_measures_each_quantity_once_and_quotes_it(
 
 
 def test_where_a_curve_climbs_fastest_is_found() -> None:
-    assert steepest([1, 100, 10], [1.0, 1e4, 10.0]) == (10, 100, pytest.approx(3.0))
+    assert steepest([1, 100, 1000, 10], [1.0, 1e4, 1.0, 10.0]) == (10, 100, pytest.approx(3.0))  # the fall is steeper
+
+
+def test_the_steepest_range_stands_under_its_method_axis_and_heading() -> None:
+    power = {FACTORED: (1.0, 2.0), PRINTED: (0.5, 3.0)}  # over contacts and coordinates, above the smallest size
+    sizes = [(12, c) for c in (30, 60, 120)] + [(d, 60) for d in (6, 24)]
+    table = table_of(SCALING_COLUMNS, (
+        {"method": method, "coordinates": d, "contacts": c, "time": (max(c, 60) / 60) ** a * (d / 12) ** b}
+        for method, (a, b) in power.items() for d, c in sizes))
+    found = {(row["method"], row["axis"]): (row["steepest from"], row["to"], row["there"])
+             for row in fitted(table).records()}
+    assert found == {(method, axis): (*ends, pytest.approx(power[method][k])) for method in power
+                     for k, (axis, ends) in enumerate({"contacts": (60, 120), "coordinates": (6, 12)}.items())}

@@ -17,10 +17,12 @@ from verification.cost.impacts import (
     COMPILED,
     IAPB,
     METHOD_COLUMNS,
+    PYTHON,
     SOLVED,
     SWEEPS,
     TOO_SLOW,
     WAYS,
+    Choice,
     choices,
     choose,
     lost_to_rivals,
@@ -109,6 +111,45 @@ def test_a_cell_names_no_method_that_solves_less_than_half() -> None:
     assert table.column("method") == ["none", *["Lemke"] * 4]
     assert table.column("nearest") == ["Gauss-Seidel, 4 sweeps: 0.1", *[None] * 4]
     assert all(row["share solved"] >= 50.0 and row["error"] <= SOLVED for row in table.records() if row["time"])
+
+
+def rows_on(ways: dict[str, list[tuple[float, float]]], called: str = COMPILED) -> list[dict[str, object]]:
+    """The rows of ways of "method, work": (time [µs], error) on each impact of one size."""
+    return [{"contacts": 4, "coordinates": 3, "problem": str(k), "method": way.split(", ")[0],
+             "work": way.split(", ")[1], "called": called, "time": time, "relative error": error,
+             "relative energy gain": 0.0, "outcome": "ok" if time < 1e4 else TOO_SLOW}
+            for way, found in ways.items() for k, (time, error) in enumerate(found)]
+
+
+def chosen_from(ways: dict[str, list[tuple[float, float]]]) -> Choice:
+    found = choose(table_of(METHOD_COLUMNS, rows_on(ways)), 1e-5, 4, 3)
+    assert found is not None
+    return found
+
+
+def test_impacts_without_an_answer_in_time_are_not_solved() -> None:
+    good, bad, late = (2.0, 1e-6), (2.0, 0.5), (1e5, 0.0)
+    for found, share, solved in (([good, late], 0.5, 0.5), ([good, good, bad, bad], 1.0, 0.5),
+                                 ([good, late, late], 1 / 3, 1 / 3), ([good, bad, late, late], 0.5, 0.25)):
+        choice = chosen_from({"Lemke, all pivots": found})
+        assert (choice.share, choice.solved, choice.enough) == (share, solved, solved >= 0.5)
+        assert choice.time == pytest.approx(2e-6) and ": 2 µs an impact" in str(choice)
+    nearest = chosen_from({"few, all": [good, late, late, late], "many, all": [bad, bad, bad, bad]})
+    assert nearest.method == "many" and not nearest.enough
+
+
+def test_a_method_from_python_that_solves_less_than_half_is_not_named() -> None:
+    half = {"QP, all": [(2.0, 1e-6), (2.0, 0.5)]}
+    for ways, named in ((half, "QP, 2 µs"), ({"QP, all": [(2.0, 0.5), (2.0, 0.5)]}, "none")):
+        assert choices(table_of(METHOD_COLUMNS, rows_on(ways, PYTHON))).column("from Python")[-1] == named
+
+
+def test_a_rival_wins_an_impact_only_where_it_is_faster_and_as_exact() -> None:
+    lost = lost_to_rivals(table_of(METHOD_COLUMNS, rows_on({
+        "IAPB, all rows": [(3.0, 1e-15), (9.0, 1e-3)], "IAPB, 1 row": [(1.0, 1e-15), (1.0, 1e-15)],
+        "Lemke, all pivots": [(4.0, 1e-15), (6.0, 1e-3)], "Gauss-Seidel, 4 sweeps": [(2.0, 1e-5), (3.0, 5e-4)]})))
+    assert lost.select(("problem", "solver", "time", "IAPB", "ratio")).rows == (
+        ("1", "Lemke", 6.0, 9.0, 1.5), ("1", "Gauss-Seidel", 3.0, 9.0, 3.0))
 
 
 def test_where_a_rival_is_faster_is_said() -> None:
