@@ -146,14 +146,19 @@ def dispatched() -> str:
         return UNKNOWN
 
 
-def machine_of(facts: Mapping[str, str]) -> str:
+def machine_parts(facts: Mapping[str, str]) -> dict[str, str]:
     """Return the provenance facts besides the code that can change last bits: processor, BLAS, numpy's CPU features.
 
     The number of threads is left out, because it can change within a process.
     """
     kernels = sorted(set(re.findall(r"(\S+) x\d+", facts.get("blas", ""))))
     simd = f"numpy {facts['simd']}" if "simd" in facts else ""
-    return ", ".join(text for text in (facts.get("cpu", ""), " and ".join(kernels), simd) if text)
+    return {"cpu": facts.get("cpu", ""), "BLAS kernel": " and ".join(kernels), "CPU features of numpy": simd}
+
+
+def machine_of(facts: Mapping[str, str]) -> str:
+    """Return `machine_parts` as one text."""
+    return ", ".join(text for text in machine_parts(facts).values() if text)
 
 
 @cache

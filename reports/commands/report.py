@@ -43,7 +43,8 @@ def report(
                     "tables_of_old_alone": found.tables_old, "tables_of_new_alone": found.tables_new,
                     "runs_same": found.runs_same, "runs_other": found.runs_other, "runs_single": found.runs_single})
         raise typer.Exit(1 if found.count(DIFFERS) else 0)
-    print(f"The reports differ in {', '.join(reasons)}." if reasons else "Same code, packages and processor.")
+    print(f"The new report was made with another {', '.join(reasons)}." if reasons
+          else "Same code, packages, processor and BLAS kernel.")  # fmt: skip
     if first.depth != second.depth:
         print(f"The old report is {first.depth}, the new one {second.depth}: many numbers are of one only.")
     print_difference(found, tolerance)

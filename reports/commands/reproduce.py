@@ -126,8 +126,8 @@ def _timed(progress: Callable[[str, int, int], None], took: dict[str, float]) ->
 def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     """Compute everything again, at the report's depth, into `out` or a temporary folder, and compare.
 
-    With the same code, packages and processor, runs must agree to the last bit; otherwise numbers must agree within
-    the tolerance. Ends with 1 if they do not, or if numbers of the report were not computed again.
+    With the same code, packages, processor and BLAS kernel, runs must agree to the last bit; otherwise numbers must
+    agree within the tolerance. Ends with 1 if they do not, or if numbers of the report were not computed again.
     """
     given = read_numbers(report)
     if out is not None and out.exists() and any(out.iterdir()):
@@ -139,7 +139,8 @@ def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     reasons = unlike(given.provenance, made.provenance)
     print()
     print(f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
-          if reasons else "Same code, packages and processor: runs must agree to the last bit.")  # fmt: skip
+          if reasons else "Same code, packages, processor and BLAS kernel: runs must agree to the last bit."
+          )  # fmt: skip
     print_difference(found, TOLERANCE)
     lost = found.count(ONLY_OLD) + len(found.tables_old)
     failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))

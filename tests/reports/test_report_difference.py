@@ -165,6 +165,10 @@ def test_what_keeps_runs_from_repeating_is_named():
     assert unlike(REPORT.provenance, REPORT.provenance) == ()
     assert unlike({"cpu": "a", "sources": "x", "commit": "1"}, {"cpu": "b", "sources": "y", "mujoco": "1"}) == (
         "cpu", "sources", "mujoco")  # fmt: skip
+    other = {"cpu": "a", "blas": "openblas 0.3 Haswell x2", "simd": "AVX2"}
+    assert unlike({"cpu": "a", "blas": "openblas 0.3 Haswell x1", "simd": "AVX2"}, other) == ()  # threads alone
+    assert unlike({"cpu": "a", "blas": "openblas 0.3 SkylakeX x2", "simd": "AVX2 X86_V4"}, other) == (
+        "BLAS kernel", "CPU features of numpy")
 
 
 def test_the_command_ends_with_1_only_where_results_differ(tmp_path, capsys):
