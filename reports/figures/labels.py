@@ -13,32 +13,64 @@ from reports.figures.style import INK, MUTED
 
 SIZE = 7.0  # points
 _LETTER = 0.56  # mean width of a letter, in sizes
-_GAP = 5.0  # points between a mark and its name
+_GAP = 6.0  # points between a mark and its name
 _MARK = 3.0  # points around a mark that stay free
+_COLUMN, _LINE = 3, 1.3 * SIZE  # least number of marks above each other whose names form a list; its line height
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top
 Points = NDArray[np.float64]
 
 
-def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]]) -> list[Box]:
+def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, float]],
+                colors: Sequence[str] = ()) -> list[Box]:  # fmt: skip
     """Write each name beside its mark, at the nearest position where it covers no mark, no other name and no line.
 
+    A name further away has a line to its mark. Marks above each other have their names in the same order to the left.
     Call it last, after the limits of the axes are set. Returns the boxes of the names [points].
     """
     axes.figure.draw_without_rendering()  # the positions of marks are known after the layout
-    marks = [tuple(place) for place in _on_paper(axes, places)]
+    marks = [(float(x), float(y)) for x, y in _on_paper(axes, places)]
     frame = _frame(axes)
-    taken: list[Box] = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in marks]
+    drawn = [place for line in axes.lines if line.get_marker() not in ("None", "") for place in line.get_xydata()]
+    around = [*marks, *map(tuple, _inside(_on_paper(axes, [*places, *drawn]), frame))]
+    taken: list[Box] = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in around]
     lines = _lines(axes, frame)
+    columns = _columns(names, marks, frame)
+    taken += columns.values()
     boxes = []
-    for name, place, (x, y) in zip(names, places, marks, strict=True):
-        box = _free(x, y, _LETTER * SIZE * len(name), taken, lines, frame)
+    for number, (name, place, (x, y)) in enumerate(zip(names, places, marks, strict=True)):
+        box = columns.get(number) or _free(x, y, _LETTER * SIZE * len(name) + 2.0, taken, lines, frame)
         taken.append(box)
         boxes.append(box)
-        near = abs(0.5 * (box[1] + box[3]) - y) < 1.5 * SIZE
-        axes.annotate(name, place, (box[0] - x, box[1] - y), textcoords="offset points", fontsize=SIZE, color=INK,
-                      va="bottom", arrowprops=None if near else {"arrowstyle": "-", "color": MUTED, "lw": 0.4})
+        color = colors[number] if colors else INK
+        far = len(_leader((x, y), box)) > 0
+        before = box[2] < x
+        # in a list from the end of the name, so that no leader crosses another
+        start = {"relpos": (1.0, 0.5)} if number in columns else {}
+        leader = {"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 2.0, **start}
+        axes.annotate(name, place, (box[2 if before else 0] - x, box[1] - y), textcoords="offset points", fontsize=SIZE,
+                      color=color, va="bottom", ha="right" if before else "left", arrowprops=leader if far else None)
     return boxes
+
+
+def _columns(names: Sequence[str], marks: Sequence[tuple[float, float]], frame: Box) -> dict[int, Box]:
+    """Return boxes to the left of marks that are above each other and too close for names beside them."""
+    found: dict[int, Box] = {}
+    for column in {round(x) for x, _ in marks}:
+        rising = sorted((k for k, (x, _) in enumerate(marks) if round(x) == column), key=lambda k: marks[k][1])
+        heights = [marks[k][1] for k in rising]
+        right = column - 3.0 * _GAP
+        width = _LETTER * SIZE * max(len(names[k]) for k in rising)
+        if len(rising) < _COLUMN or right - width < frame[0]:
+            continue
+        for k in range(1, len(heights)):  # apart upwards, and from the top down again
+            heights[k] = max(heights[k], heights[k - 1] + _LINE)
+        heights[-1] = min(heights[-1], frame[3] - _LINE)
+        for k in reversed(range(len(heights) - 1)):
+            heights[k] = min(heights[k], heights[k + 1] - _LINE)
+        for k, height in zip(rising, heights, strict=True):
+            found[k] = (right - _LETTER * SIZE * len(names[k]), height - 0.6 * SIZE, right, height + 0.6 * SIZE)
+    return found
 
 
 def _lines(axes: Any, frame: Box) -> Points:
@@ -63,16 +95,18 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
     frame = _frame(axes)
     places = {line: _places_of(line, frame) for line in axes.lines}
     taken: list[Box] = [_box_of(text) for text in axes.texts]
+    leaders = np.zeros((0, 2))
     for name, line in lines.items():
         own = places[line]
         if any(text.startswith(name) for text in named) or not len(own):
             continue
-        others = np.vstack([np.zeros((0, 2)), *(found for other, found in places.items() if other is not line)])
+        others = np.vstack([leaders, *(found for other, found in places.items() if other is not line)])
         written = name + words.get(name, "")
         box, at = _least(own[:: max(len(own) // _PLACES, 1)], written, NAME_SIZE, frame, taken, own, others)
         taken.append(box)
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
-        far = np.hypot(*(np.clip(at, box[:2], box[2:]) - at)) > _GAP + 2.0
+        far = len(_leader((float(at[0]), float(at[1])), box)) > 0
+        leaders = np.vstack([leaders, _leader((float(at[0]), float(at[1])), box)])
         place = axes.transData.inverted().transform(at * axes.figure.dpi / 72.0)
         note = axes.annotate(written, place, (middle[0] - at[0], middle[1] - at[1]), textcoords="offset points",
                              ha="center", va="center", fontsize=NAME_SIZE, color=line.get_color(), zorder=9,
@@ -136,7 +170,10 @@ def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[B
             if box[0] < left or box[1] < bottom or box[2] > right or box[3] > top:
                 continue
             cost = (2.0 * _covered(box, others) + 2.0 * _covered(box, own) + away / 4.0 + shared * _near(at, others)
-                    + 40.0 * any(_overlap(box, other) for other in taken))
+                    + 400.0 * any(_overlap(box, other) for other in taken))
+            if cost < best[0]:
+                leader = _leader((float(at[0]), float(at[1])), box)
+                cost += 40.0 * any(_covered(other, leader) for other in taken)
             if cost < best[0]:
                 best = (cost, box, at)
     return best[1:]
@@ -206,16 +243,39 @@ def _near(place: Points, others: Points) -> bool:
 def _free(x: float, y: float, width: float, taken: Sequence[Box], lines: Points, frame: Sequence[float]) -> Box:
     """Return the first box for a name inside of the axes that covers nothing, else the box that covers least."""
     best: tuple[float, Box] = (np.inf, (0.0, 0.0, 0.0, 0.0))
-    for step in range(24):
+    for step, away in _TRIED:
         lift = (step + 1) // 2 * SIZE * (1 if step % 2 else -1)  # 0, up, down, further up, ...
-        for left in (x + _GAP, x - _GAP - width):
+        for left in (x + away, x - away - width):
             box = (left, y + lift - 0.6 * SIZE, left + width, y + lift + 0.6 * SIZE)
             inside = box[0] >= frame[0] and box[2] <= frame[2] and box[1] >= frame[1] and box[3] <= frame[3]
-            covered = _covered(box, lines) + 1e3 * sum(_overlap(box, other) for other in taken) + 1e6 * (not inside)
+            leader = _leader((x, y), box)
+            covered = (_covered(box, lines) + 1e3 * sum(_overlap(box, other) for other in taken) + 1e6 * (not inside)
+                       + _crossed(leader, lines) + 10.0 * sum(_covered(other, leader) for other in taken))
             if covered == 0.0:
                 return box
             best = min(best, (covered + 0.1 * step, box))
     return best[1]
+
+
+# steps up and down, and distances to the side [points], from the nearest
+_TRIED = sorted(((step, away) for step in range(24) for away in (_GAP, 4.0 * _GAP, 10.0 * _GAP)),
+                key=lambda tried: 0.5 * SIZE * tried[0] + tried[1])  # fmt: skip
+
+
+def _leader(mark: tuple[float, float], box: Box) -> Points:
+    """Return points along the line from a mark to its name, without those at the mark; none if the name is near."""
+    end = np.clip(mark, box[:2], box[2:])
+    length = float(np.hypot(*(end - mark)))
+    if length <= _GAP + 2.0:
+        return np.zeros((0, 2))
+    return np.asarray(mark + np.arange(_GAP, length, 0.5 * _STEP)[:, None] / length * (end - mark))
+
+
+def _crossed(leader: Points, lines: Points) -> float:
+    """Return how many points of a leader are at a line."""
+    if not len(leader) or not len(lines):
+        return 0.0
+    return float(np.sum(np.hypot(*(leader[:, None] - lines).transpose(2, 0, 1)).min(axis=1) < _STEP))
 
 
 def _overlap(a: Box, b: Box) -> bool:

@@ -36,6 +36,20 @@ def test_no_name_lies_on_another_or_on_a_mark_or_outside(places):
         assert left <= box[0] and box[2] <= right and bottom <= box[1] and box[3] <= top
 
 
+def test_names_of_marks_above_each_other_are_a_list_in_their_order_and_colour() -> None:
+    """As five effects were that save no time: one name after another floated around the crowd."""
+    names, heights = ["low", "middle", "high", "highest"], [0.5, 0.5, 0.51, 0.52]
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0), layout="constrained").add_subplot()
+        axes.plot([0.5] * 4, heights, "o", color="red")
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        boxes = label_marks(axes, names, [(0.5, height) for height in heights], ["red"] * 4)
+        assert [text.get_color() for text in axes.texts] == ["red"] * 4
+        assert all(text.arrow_patch is not None for text in axes.texts)  # each has a line to its mark
+    assert [box[2] for box in boxes] == [boxes[0][2]] * 4  # one margin
+    assert all(low[3] <= high[1] + 1e-9 for low, high in zip(boxes, boxes[1:], strict=False))
+
+
 def crossed(axes: Axes) -> list[tuple[str, str]]:
     """Return (name at a curve, what runs through it: a line's gid) of axes that are drawn."""
     found = []

@@ -207,7 +207,8 @@ def steps(effects: Mapping[str, Table]) -> Table:
         on = [row for row in table.records() if row["active"]]
         shares = sorted(((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
                         reverse=True)
-        told = ", ".join(f"{effect.replace('_', ' ')} {share:.0f} %" for share, effect in shares)
+        told = ", ".join(f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * on[0]['step']:.2g} µs)"
+                         for share, effect in shares)  # fmt: skip
         times = (on[0][key] for key in ("step", "all on", "faster than real time"))
         rows.append((scene, len(on), *times, told or f"each {_BELOW}"))
     return Table(columns, tuple(sorted(rows, key=lambda row: row[2])), digits=3,

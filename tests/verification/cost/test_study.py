@@ -178,6 +178,16 @@ def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
 
 
+def test_what_is_lost_when_time_runs_out_is_said_at_the_curves(tables: Tables) -> None:
+    """Half of four rows leave the residual of 0.1 of 0.1 at the start, and half of the energy."""
+    drawn = anytime.draw({"haptic-rate/budgets": tables["budgets"]})
+    assert len(drawn.panels) == 2 and "4 for 24 contacts" in drawn.caption
+    assert "100 to 100 % of the normal velocity" in drawn.caption and "50 to 50 % less energy" in drawn.caption
+    assert "None of the 5 budgets of rows created energy" in drawn.caption
+    gained = table_of(BUDGET_COLUMNS, [_budget(2, gain=1e-16), *map(_budget, (0, 4))])
+    assert "1 of the 3 budgets of rows created energy" in anytime.draw({"haptic-rate/budgets": gained}).caption
+
+
 def test_the_front_of_effects_is_pareto() -> None:
     rows = [("cheap", True, 10.0, 0.0), ("dear", True, 40.0, 1.0), ("bad", True, 10.0, 2.0), ("off", False, None, None)]
     keys = ("effect", "active", "time saved", "position")
@@ -203,9 +213,10 @@ def test_steps_are_shown_with_the_shares_that_exceed_the_noise() -> None:
     table = steps({name: table_of(EFFECT_COLUMNS, [dict(zip(keys, row, strict=True)) for row in each])
                    for name, each in (("slow", rows), ("quick", noisy))})  # fmt: skip
     assert table.rows == (("quick", 1, 1.0, 1.5, 900.0, "each below the noise"),
-                          ("slow", 3, 2.0, 3.0, 500.0, "wall contacts 40 %, gravity 10 %"))
+                          ("slow", 3, 2.0, 3.0, 500.0, "wall contacts 40 % (0.8 µs), gravity 10 % (0.2 µs)"))
     drawn = effect_steps.draw({"effect_steps": table, "machine": "a processor, report of a day"})
     assert "a processor, report of a day" in drawn.caption and "slow 2 µs, with all on 3 µs" in drawn.panels[0].alt
+    assert "wall contacts 40 % (0.8 µs), gravity 10 % (0.2 µs)</text>" in drawn.panels[0].svg
 
 
 def test_bench_ends_with_1_where_a_row_failed(
