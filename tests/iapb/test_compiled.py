@@ -18,7 +18,7 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
-from iapb.compiled import Block, _stamped_files, address_of, block, copy_into, kernel
+from iapb.compiled import _STAMP, Block, _source_stamp, _stamped_files, address_of, block, copy_into, kernel
 
 ENGINE = Path(iapb.run.__file__).parent
 
@@ -225,24 +225,40 @@ def test_copy_into_copies(values):
 
 def test_the_stamp_of_kernels_covers_every_file_whose_constants_they_read():
     """Else a changed constant would leave the machine code made with the old one in use."""
-    engine, stamped = Path(iapb.run.__file__).parent, {str(path) for path in _stamped_files()}
-    stale = [f"{path.relative_to(engine)} reads {name} of {module}"
-             for path in engine.rglob("*.py") for name, module in _read_by_kernels(ast.parse(path.read_text()))
-             if not stamped & {str(engine.parent / f"{module.replace('.', '/')}{end}")
-                               for end in (".py", "/__init__.py")}]
-    assert stamped >= {str(engine / "contact" / "geometry.py"), str(engine / "run.py")}
-    assert not stale
+    stamped = set(_stamped_files())
+    assert stamped >= {ENGINE / name for name in ("contact/geometry.py", "run.py", "compiled.py", "inlining.py")}
+    assert _read_by_kernels() - stamped == set()
 
 
-def _read_by_kernels(tree: ast.Module) -> list[tuple[str, str]]:
-    """Names imported from the engine that the kernels of a file read, themselves or in its constants; their modules."""
-    read = {name for node in tree.body if isinstance(node, ast.FunctionDef)
-            and any(ast.unparse(each) == "kernel" for each in node.decorator_list) for name in _names(node)}
-    for node in reversed(tree.body):  # constants stand behind what they are made of
-        if isinstance(node, ast.Assign | ast.AnnAssign) and read & _names(node):
-            read |= _names(node)
-    return [(name.name, node.module) for node in tree.body if isinstance(node, ast.ImportFrom)
-            and str(node.module).startswith("iapb") for name in node.names if (name.asname or name.name) in read]
+def _read_by_kernels() -> set[Path]:
+    """Files of the engine with a kernel, or with what a kernel reads: constants, and what these are made of."""
+    trees = {path: ast.parse(path.read_text()) for path in ENGINE.rglob("*.py")}
+    open_ = [(path, node.name) for path, tree in trees.items() for node in tree.body
+             if isinstance(node, ast.FunctionDef) and "kernel" in map(ast.unparse, node.decorator_list)]
+    seen = set()
+    while open_:
+        path, name = open_.pop()
+        if (path, name) in seen:
+            continue
+        seen.add((path, name))
+        for node in trees[path].body:
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("iapb"):
+                module = ENGINE.parent.joinpath(*str(node.module).split("."))
+                home = module.with_suffix(".py") if module.with_suffix(".py") in trees else module / "__init__.py"
+                open_ += [(home, each.name) for each in node.names if (each.asname or each.name) == name]
+            elif (isinstance(node, ast.Assign | ast.AnnAssign) and name in _names(node)) or (
+                    isinstance(node, ast.FunctionDef) and node.name == name):
+                open_ += [(path, each) for each in _names(node)]
+    return {path for path, _ in seen}
+
+
+def test_a_change_of_any_stamped_file_changes_the_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
+    before, read, files = _source_stamp(), Path.read_bytes, _stamped_files()
+    for changed in files:
+        monkeypatch.setattr(Path, "read_bytes", lambda path, changed=changed: read(path) + b"#" * (path == changed))
+        assert _source_stamp() != before, changed
+    monkeypatch.undo()
+    assert len(files) > 20 and _source_stamp() == before == _STAMP
 
 
 def _names(node: ast.AST) -> set[str]:

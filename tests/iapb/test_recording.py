@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.contact.laws import ImpulseAugmented
-from iapb.recording import Recorder, chunk_steps
+from iapb.recording import Recorder, Room, _filled, chunk_steps
 from iapb.run import quantities
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
@@ -75,6 +75,22 @@ def test_a_run_that_fits_into_a_room_is_neither_joined_nor_holds_what_is_empty()
     assert np.shares_memory(recorder.joined("steps")["impulse"], room.lines["steps"].impulse)
     recorder.keep(recorder.blank(2000)[0], 0, 0.0)  # a chunk from elsewhere: all are joined again
     assert recorder._room is None and len(recorder.joined("steps")["impulse"]) == recorder.steps == STEPS + 512
+
+
+@pytest.mark.parametrize("used", [0, 4, 5, 6, 10])
+def test_what_is_filled_is_all_of_it_and_keeps_no_large_array_alive(used):
+    array = np.arange(10)
+    found = _filled(array, used)
+    assert found.tolist() == list(range(used)) and np.shares_memory(found, array) == (used >= 5)
+
+
+def test_a_room_takes_a_chunk_after_the_last_one_and_as_long_as_it_fits():
+    room = Room(10, (3, 3, 0, 0), 2, 1)
+    assert room.fits(10) and not room.fits(11)
+    record = room.record(4)
+    assert not room.fits(1)  # a chunk is open
+    assert room.keep(record, 4) and room.fits(6) and not room.fits(7)
+    assert not room.keep(record, 4) and room.used == [4, 0, 0]
 
 
 def values_of(run):

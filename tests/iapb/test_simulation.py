@@ -367,6 +367,21 @@ def test_what_follows_from_a_run_is_computed_when_it_is_asked_for(monkeypatch) -
         run.poses  # noqa: B018
 
 
+def test_what_follows_from_a_run_is_its_own_whatever_ran_after_it() -> None:
+    """All runs have the same sizes; one is asked in between, one only after the last was made."""
+    heavy = PEG.with_values({"gravity": [0.0, 9.81]})  # sinks into the floor, so this run is not to be trusted
+
+    def followed(run: Run) -> list[object]:
+        return [run.pose.tobytes(), {name: each.tobytes() for name, each in run.energy.items()}, run.distrust]
+
+    alone = [followed(simulate(scene, steps=STEPS)) for scene in (PEG, heavy)]
+    assert all(ours != theirs for ours, theirs in zip(*alone, strict=True))
+    early, late = simulate(PEG, steps=STEPS), simulate(PEG, steps=STEPS)
+    assert early.pose.tobytes() == alone[0][0]
+    last = simulate(heavy, steps=STEPS)
+    assert [followed(early), followed(late), followed(last)] == [alone[0], *alone]
+
+
 @pytest.mark.parametrize("name", ["peg_corner", "arm_pushing"])
 def test_simulations_share_nothing_that_changes(name: str) -> None:
     """Of one scene, and of two that differ in a value: what one writes no other sees, and what both read stays."""
