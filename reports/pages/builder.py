@@ -23,6 +23,7 @@ from reports.pages.matrix import matrices, worst_first
 from reports.pages.quantities import judged, marks
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
+from reports.pages.terms import explained
 from reports.pages.uses import anchor, runs_by_user
 from verification.claims.c10_trajectory import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
@@ -73,7 +74,7 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
     maps = {claim.key: map_of(claim) for claim in evidence.claims}
     layout = environment.get_template("section.html.j2")
     pages = {section.page: layout.render(shared, section=section, maps=maps) for section in SECTIONS}
-    return link_across({FIRST_PAGE: first} | pages)
+    return {name: explained(page) for name, page in link_across({FIRST_PAGE: first} | pages).items()}
 
 
 def link_across(pages: Mapping[str, str]) -> dict[str, str]:

@@ -61,7 +61,7 @@ def test_a_long_table_is_cut_and_says_where_the_rest_is():
     for shown, told in ((rows, True), (rows[:-1], False)):
         topic = finding_of("mechanics", "t", "l", "", (), {"trees": titled(("x",), shown)})
         page = joined(Evidence(topics=(topic,)), ())
-        assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} rows" in page) == told
+        assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} lines" in page) == told
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
 

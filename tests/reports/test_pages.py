@@ -21,6 +21,7 @@ from reports.pages.builder import FIRST_PAGE, OUTCOME_MARKS, build_report, link_
 from reports.pages.formulas import formula, prose
 from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
+from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
 from tests.reports.joined import joined
 from verification.claims import CLAIMS
@@ -304,3 +305,31 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     assert "where more than 14 contacts collide at once" in page and f"with complementarity to {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
+
+
+def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages: dict[str, str]) -> None:
+    """The wanted terms are those of the text without the list, and those of the meanings that this adds."""
+    for name, page in pages.items():
+        lists = re.findall(r'<details class="numbers terms">.*?</details>', page, flags=re.S)
+        listed = [readable(term) for found in lists for term in re.findall(r"<dt>(.*?)</dt>", found)]
+        wanted = terms_of(readable(re.sub(r'<details class="numbers terms">.*?</details>', " ", page, flags=re.S)))
+        assert wanted == terms_of(readable(page)), name
+        assert listed == [TERMS[form][0] for form in wanted], name
+        assert len(lists) == bool(wanted) and "<!-- terms -->" not in page
+    assert "worlds" in pages["report/couplings.html"] and "<dt>CBuc</dt>" in pages["report/couplings.html"]
+
+
+def test_a_term_counts_where_a_reader_sees_it_and_brings_the_terms_of_its_meaning() -> None:
+    hidden = '<head>CBuc</head><nav>patch</nav><script>"PB"</script><style>IAPB</style><p title="rank">impact</p>'
+    assert terms_of(readable(hidden)) == () and explained(hidden + "<!-- terms -->") == hidden
+    said = [TERMS[form][0] for form in terms_of("redundant contacts, IAPB-like, XPB")]
+    assert said == ["row", "redundant"]
+
+
+def test_every_term_of_the_list_is_used_in_the_report() -> None:
+    """Its words occur in the sources from which the pages are made."""
+    root = Path(report.__file__).parents[1]
+    files = [path for folder in ("reports", "verification") for kind in ("*.py", "*.j2") for path in
+             (root / folder).rglob(kind) if path.name != "terms.py"]  # fmt: skip
+    text = " ".join(path.read_text(encoding="utf-8") for path in files)
+    assert [form for form in TERMS if not re.search(rf"(?<![\w-])(?:{form})(?![\w-])", text)] == []

@@ -1,0 +1,115 @@
+"""The terms of the report and what they mean. Every page lists the terms that it uses, under "Terms on this page".
+
+Each term is defined here only. A definition may use other terms; the page then lists these, too.
+"""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+from markupsafe import Markup
+
+from reports.pages.formulas import prose
+
+# A pattern for the words that name the term -> the term as listed, and its meaning.
+TERMS: dict[str, tuple[str, str]] = {
+    r"worlds?": ("world", "one choice of contact law and of coupling between device and tool; the same scene is "
+                 "simulated in several worlds, listed here by name"),
+    r"IAPB": ("IAPB", "impulse-augmented penalties, the paper's method: an impulse at each new contact, then a spring "
+              "and damper while the contact lasts. It is also the name of the world with this contact law and the "
+              "four-channel coupling"),
+    r"ideal|rigid world": ("ideal", "the world with rigid contacts, computed from a complementarity problem in every "
+                           "step, and the four-channel coupling; the reference for a wall that feels rigid"),
+    r"PB": ("PB", "penalty-based: the world with springs and dampers as contacts, no impulses, and the four-channel "
+            "coupling"),
+    r"CBuc": ("CBuc", "constraint-based, with unilateral coupler: the world with rigid contacts in which a spring and "
+              "damper join device and tool, active only in contact"),
+    r"(?:IAPB|ideal)[- ](?:with )?friction": ("IAPB-friction, ideal-friction",
+                                              "the same worlds with Coulomb friction in their impacts or constraints"),
+    r"IAPB-push": ("IAPB-push", "the world IAPB with impulses that only push, found from two complementarity "
+                   "problems"),
+    r"IAPB LM": ("IAPB LM", "IAPB with each impulse spread over several steps, to stay within the device's limits"),
+    r"four[- ]channels?": ("four-channel coupling", "device and tool exchange both positions and both forces, so that "
+                           "the hand feels the contact force directly"),
+    r"unilateral coupler": ("unilateral coupler", "a spring and damper between device and tool, active only while the "
+                            "tool is in contact; the hand feels the wall through it"),
+    r"penalt(?:y|ies)": ("penalty", "the force of a spring and damper at a contact, which grows with the overlap of "
+                         "the two bodies"),
+    r"tool": ("tool", "the virtual body that the hand moves through the haptic device"),
+    r"virtual walls?|[0-9]+ walls": ("wall", "a fixed virtual obstacle; a count of walls counts combinations of "
+                                     "stiffness and damping"),
+    r"coordinates": ("coordinates", "the generalized coordinates of a scene; their number d is the size of the mass "
+                     "matrix M"),
+    r"rows?": ("row", "one line of the contact Jacobian J: the velocity at one contact along its normal is this row "
+               "times the generalized velocity v"),
+    r"redundant": ("redundant", "a row (or its contact) that is a linear combination of the other rows of the impact; "
+                   "the impulses are then not unique, the velocity is"),
+    r"rank": ("rank", "the number of linearly independent rows"),
+    r"patch": ("patch", "contacts that all lie on one face of one body, so that at most three are independent"),
+    r"piles?": ("pile", "many bodies that lie on each other, so that most contacts are independent"),
+    r"restitution|e = [0-9.]+": ("restitution e", "the ratio of separating to approaching speed at a contact, "
+                                 "v_n⁺ = −e v_n⁻; this equation is the restitution law, and the restitution residual "
+                                 "is its largest error"),
+    r"kinetic metric": ("kinetic metric", "the length √(vᵀ M v) of a velocity v; half of its square is the kinetic "
+                        "energy"),
+    r"[vu]⁻|[vu]⁺|KE[⁻⁺]|γ[⁻⁺]": ("superscripts − and +", "before and after an impact: v velocity, KE kinetic energy, "
+                                  "γ normal velocities at the contacts"),
+    r"κ": ("κ", "the condition number of a matrix: how much it amplifies relative errors"),
+    r"ε": ("ε", "the unit roundoff 2⁻⁵³ of double precision"),
+    r"passiv\w+": ("passive", "gives no energy to whoever holds it: the stored energy never exceeds what was put in"),
+    r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
+                  "orthonormal basis of the rows"),
+    r"no clamp": ("clamp", "the last operation of an impact, which scales the velocity so that rounding cannot add "
+                  "energy"),
+    r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, evaluated with "
+                                                   "numpy as it is printed"),
+    r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
+                                            "impact: pseudo-inverse of J M⁻¹ Jᵀ, its Cholesky factor, the same with a "
+                                            "small term added to its diagonal, and singular values of J"),
+    r"anytime|stop(?:s|ped) early": ("stopped early", "the impact ends when its budget of rows or time is used up, "
+                                     "with the rows resolved so far"),
+    r"(?:Newton )?LCPs?|complementarity": ("LCP", "linear complementarity problem: impulses p ≥ 0 only push, and each "
+                                           "contact either has an impulse or separates faster than the restitution "
+                                           "law demands"),
+    r"NCP|CCP": ("NCP, CCP", "complementarity problems with Coulomb's friction cone: the law itself, and its convex "
+                 "relaxation"),
+    r"Delassus": ("Delassus matrix", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
+    r"trials?": ("trial", "one tested condition of a claim: it holds, fails, or is undecided"),
+    r"coherence|clustering": ("coherence, clustering", "the paper's filters of contacts: a contact near one of the "
+                              "previous step counts as the same; contacts near each other become one"),
+    r"event[- ]driven|event by event": ("event-driven", "the exact motion between impacts, with each impact located "
+                                        "in time"),
+    r"Colgate(?:'s)? (?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|: a sampled wall of "
+                                            "stiffness K and damping B, read every T seconds, is then passive"),
+    r"planted": ("planted fault", "an error put into the code on purpose, to show that the check finds it"),
+    r"peg": ("peg", "the paper's example: a rectangular body, moved by the hand in a plane, that meets a corner or a "
+             "hole"),
+}  # fmt: skip
+PLACE = "<!-- terms -->"
+_NOT_READ = re.compile(r"<(script|style|nav|head)\b.*?</\1>|<[^>]*>", re.DOTALL)
+_PATTERNS = {form: re.compile(rf"(?<![\w-])(?:{form})(?![\w-])") for form in TERMS}
+
+
+def readable(page: str) -> str:
+    """Return what a reader of an HTML page sees: its text, without tags, script, style and navigation."""
+    return " ".join(unescape(_NOT_READ.sub(" ", page)).split())
+
+
+def terms_of(text: str) -> tuple[str, ...]:
+    """Return the patterns of the terms in a text and in the meanings of these terms, in the order of TERMS."""
+    found: set[str] = set()
+    fresh = text
+    while fresh:
+        new = [form for form, pattern in _PATTERNS.items() if form not in found and pattern.search(fresh)]
+        found.update(new)
+        fresh = " ".join(" ".join(TERMS[form]) for form in new)
+    return tuple(form for form in TERMS if form in found)
+
+
+def explained(page: str) -> str:
+    """Return a page with the list of its terms at PLACE."""
+    listed = [TERMS[form] for form in terms_of(readable(page))]
+    lines = Markup("").join(Markup("<dt>{}</dt><dd>{}</dd>\n").format(term, prose(said)) for term, said in listed)
+    block = f'<details class="numbers terms"><summary>Terms on this page</summary>\n<dl>\n{lines}</dl>\n</details>'
+    return page.replace(PLACE, block if listed else "", 1)
