@@ -523,7 +523,7 @@ def _growth(numbers: Table, powers: Mapping[tuple[str, str], Row], axis: str) ->
 )  # fmt: skip
 def effect_steps(numbers: Table, machine: str) -> Drawn:
     """Draw for each scene a dot, a mark for the time with every effect on, and the largest savings as text."""
-    rows = numbers.records()[::-1]
+    rows = sorted(numbers.records(), key=lambda row: -float(row["step"]))
     places, longest, height = range(len(rows)), max(row["all on"] for row in rows), 0.27 * len(rows) + 0.8
     with Plot("effect-steps", (8.6, height), frame=(0.225, 0.5 / height, 0.19, 1.0 - 0.5 / height)) as plot:
         axes = plot.axes

@@ -211,7 +211,7 @@ def steps(effects: Mapping[str, Table]) -> Table:
                          for share, effect in shares)  # fmt: skip
         times = (on[0][key] for key in ("step", "all on", "faster than real time"))
         rows.append((scene, len(on), *times, told or f"each {_BELOW}"))
-    return Table(columns, tuple(sorted(rows, key=lambda row: row[2])), digits=3,
+    return Table(columns, tuple(rows), digits=3,
                  note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect. Effects "
                       f"that are not named are {_BELOW} or cannot be left out. Shares need not add up.")
 
