@@ -581,7 +581,7 @@ def _effects(scene: str, rows: list[dict[str, Any]]) -> Panel:
         saved = [row["time saved"] for row in rows]
         least, span = min(0.0, *saved), max(saved) - min(0.0, *saved)
         plot.axes.set_xlim(least - 0.62 * span, least + 1.4 * span)
-        plot.axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}" if x >= least else ""))
+        plot.axes.set_xticks([x for x in plot.axes.get_xticks() if least <= x <= least + 1.4 * span])
         plot.axes.margins(y=0.12)
         plot.axes.yaxis.set_major_locator(LogLocator(numticks=8))
         plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power_of_ten(y) if y > _NOTHING else "none"))

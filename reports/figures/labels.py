@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from reports.figures.style import INK, MUTED
 
 SIZE = 7.0  # points
-_LETTER = 0.56  # mean width of a letter, in sizes
 _GAP = 6.0  # points between a mark and its name
 _MARK = 3.0  # points around a mark that stay free
 _COLUMN, _LINE = 3, 1.3 * SIZE  # least number of marks above each other whose names form a list; its line height
@@ -39,7 +39,7 @@ def label_marks(axes: Any, names: Sequence[str], places: Sequence[tuple[float, f
     taken += columns.values()
     boxes = []
     for number, (name, place, (x, y)) in enumerate(zip(names, places, marks, strict=True)):
-        box = columns.get(number) or _free(x, y, _LETTER * SIZE * len(name) + 2.0, taken, lines, frame)
+        box = columns.get(number) or _free(x, y, _width(name, SIZE) + 2.0, taken, lines, frame)
         taken.append(box)
         boxes.append(box)
         color = colors[number] if colors else INK
@@ -60,17 +60,25 @@ def _columns(names: Sequence[str], marks: Sequence[tuple[float, float]], frame: 
         rising = sorted((k for k, (x, _) in enumerate(marks) if round(x) == column), key=lambda k: marks[k][1])
         heights = [marks[k][1] for k in rising]
         right = column - 3.0 * _GAP
-        width = _LETTER * SIZE * max(len(names[k]) for k in rising)
-        if len(rising) < _COLUMN or right - width < frame[0]:
+        widths = [_width(names[k], SIZE) for k in rising]
+        if len(rising) < _COLUMN or right - max(widths) < frame[0]:
             continue
         for k in range(1, len(heights)):  # apart upwards, and from the top down again
             heights[k] = max(heights[k], heights[k - 1] + _LINE)
         heights[-1] = min(heights[-1], frame[3] - _LINE)
         for k in reversed(range(len(heights) - 1)):
             heights[k] = min(heights[k], heights[k + 1] - _LINE)
-        for k, height in zip(rising, heights, strict=True):
-            found[k] = (right - _LETTER * SIZE * len(names[k]), height - 0.6 * SIZE, right, height + 0.6 * SIZE)
+        for k, width, height in zip(rising, widths, heights, strict=True):
+            found[k] = (right - width, height - 0.6 * SIZE, right, height + 0.6 * SIZE)
     return found
+
+
+@cache
+def _width(text: str, size: float) -> float:
+    """Return the width of a text [points]."""
+    from matplotlib.textpath import TextPath
+
+    return float(TextPath((0.0, 0.0), text, size=size).get_extents().width)
 
 
 def _lines(axes: Any, frame: Box) -> Points:
@@ -161,7 +169,7 @@ def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[B
     shared : cost of a start close to other lines, where the name could belong to one of them
     """
     left, bottom, right, top = frame
-    extent = np.array([_LETTER * size * len(name) + 2.0, size + 2.0])
+    extent = np.array([_width(name, size) + 2.0, size + 2.0])
     best: tuple[float, Box, Points] = (np.inf, (0.0, 0.0, 0.0, 0.0), starts[0])
     for at in starts:
         for x, y, away in _AROUND:
@@ -264,11 +272,12 @@ _TRIED = sorted(((step, away) for step in range(24) for away in (_GAP, 4.0 * _GA
 
 def _leader(mark: tuple[float, float], box: Box) -> Points:
     """Return points along the line from a mark to its name, without those at the mark; none if the name is near."""
-    end = np.clip(mark, box[:2], box[2:])
-    length = float(np.hypot(*(end - mark)))
-    if length <= _GAP + 2.0:
+    if np.hypot(*(np.clip(mark, box[:2], box[2:]) - mark)) <= _GAP + 2.0:
         return np.zeros((0, 2))
-    return np.asarray(mark + np.arange(_GAP, length, 0.5 * _STEP)[:, None] / length * (end - mark))
+    way = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) - mark
+    length = float(np.hypot(*way))
+    points = np.asarray(mark + np.arange(_GAP, length, 0.5 * _STEP)[:, None] / length * way)
+    return points[((points < box[:2]) | (points > box[2:])).any(axis=1)]
 
 
 def _crossed(leader: Points, lines: Points) -> float:
