@@ -69,12 +69,13 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
 @recipe(
     "which-method", "Which method for my budget?", "work_precision", section="accuracy",
     caption="Find the row of your impact and the column of your time budget. A cell names the compiled method that "
-    "solves all or most of nine hard impacts of that size in time and without a gain of energy; below the name is its "
-    "largest error relative to |v⁻|. The colour is that of the method in the pictures below: strong for an error below "
-    "1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” is then "
-    "the largest error of the best method that ends in time without creating energy. The table under Numbers names "
-    "that method, and the best methods called from Python. The nine impacts: condition number of M 1, 1e3 and 1e6; "
-    "relative distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and 1. d is the number of coordinates.",
+    "solves all or most of nine hard impacts of that size in time and without a gain of energy; below the name is "
+    "its largest error relative to |v⁻|. The colour is that of the method in the pictures below: strong for an error "
+    "below 1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” "
+    "is then the largest error of the best method that ends in time without creating energy; if it is missing, there "
+    "is no such method. The table under Numbers names that method, and the best methods called from Python. The nine "
+    "impacts: condition number of M 1, 1e3 and 1e6; relative distance of the rows 1, 1e-3 and 1e-6; e = 0, 1/2 and "
+    "1. d is the number of coordinates.",
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
     """Draw a cell per size and budget."""
