@@ -12,7 +12,7 @@ from reports.figures.cost import which_method as drawn_choices
 from verification import which_method
 from verification.claims.c22_cost import COLUMNS as C22_COLUMNS
 from verification.cost import calls, impacts
-from verification.cost.calls import KernelCall, LemkeCall, SweepsCall, engine_call
+from verification.cost.calls import DaqpCall, KernelCall, LemkeCall, SweepsCall, engine_call
 from verification.cost.impacts import (
     COMPILED,
     IAPB,
@@ -29,8 +29,9 @@ from verification.cost.impacts import (
     order_bias,
     work_precision,
 )
+from verification.cost.step_cost import patch, pile
 from verification.finding import Table, table_of
-from verification.impacts import timed_problems
+from verification.impacts import ImpactCase, timed_problems
 
 PROBLEMS = [problem for size in ((1, 3), (4, 3), (20, 6), (60, 12)) for problem in timed_problems(*size)]
 
@@ -48,6 +49,25 @@ def test_equalities_and_complementarity_have_the_same_answer(problem: object) ->
     known = 2.0**-52 * np.sqrt(problem.mass_condition) / problem.closeness
     assert left <= (1e-9 + 100.0 * known) * np.linalg.norm(momentum)
     assert np.abs(J @ truth + e * (J @ v)).max() <= 1e-12 * np.abs(J).max() * np.abs(v).max()
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.label)
+def test_daqp_solves_every_hard_impact(problem: ImpactCase) -> None:
+    """No rival fails because of the tolerance that we give it."""
+    truth = np.array([float(x) for x in problem.truth])
+    upper = np.linalg.cholesky(problem.mass_matrix).T
+    for _ in range(2):
+        off = upper @ (DaqpCall(problem)() - truth)
+        assert np.linalg.norm(off) <= 1e-5 * np.linalg.norm(upper @ problem.velocity)
+
+
+@pytest.mark.parametrize("seed", [0, 22, 20050601])
+def test_iapb_and_complementarity_agree_on_the_patches_and_piles_that_they_are_timed_on(seed: int) -> None:
+    for make in (patch, pile):
+        for contacts in (1, 2, 3, 4, 6, 20):
+            case = make(contacts, np.random.default_rng([seed, contacts]))
+            off = KernelCall(case)() - DaqpCall(case)()
+            assert np.linalg.norm(off) <= 1e-9 * np.linalg.norm(case.velocity), (case.family, contacts)
 
 
 @pytest.fixture(scope="module")
@@ -150,6 +170,15 @@ def test_a_rival_wins_an_impact_only_where_it_is_faster_and_as_exact() -> None:
         "Lemke, all pivots": [(4.0, 1e-15), (6.0, 1e-3)], "Gauss-Seidel, 4 sweeps": [(2.0, 1e-5), (3.0, 5e-4)]})))
     assert lost.select(("problem", "solver", "time", "IAPB", "ratio")).rows == (
         ("1", "Lemke", 6.0, 9.0, 1.5), ("1", "Gauss-Seidel", 3.0, 9.0, 3.0))
+
+
+def test_a_rival_from_python_is_compared_with_iapb_from_python() -> None:
+    rows = rows_on({"IAPB, all rows": [(1.0, 1e-15)]}) + rows_on(
+        {"IAPB from Python, all rows": [(9.0, 1e-15)], "QP, all": [(3.0, 1e-7)],
+         "printed formula (numpy), all": [(3.0, 1e-15)]}, PYTHON)  # fmt: skip
+    table = table_of(METHOD_COLUMNS, rows)
+    assert lost_to_rivals(table, PYTHON).select(("solver", "ratio")).rows == (("QP", 3.0),)
+    assert not lost_to_rivals(table).rows
 
 
 def test_where_a_rival_is_faster_is_said() -> None:
