@@ -8,6 +8,7 @@ energies are not used, so impacts of other engines are judged in the same way.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -295,7 +296,7 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
     masses = masses if masses.ndim == 3 else masses[None]
     gains = np.flatnonzero(judged.gained)
     first = int(gains[0]) if len(gains) else -1
-    largest = max((_relative_gain(masses[k % len(masses)], before[k], after[k]) for k in gains), default=0.0)
+    largest = max((relative_gain(masses[k % len(masses)], before[k], after[k]) for k in gains), default=0.0)
     momentum = np.nan
     if impulse is not None and len(before):
         recorded = np.atleast_2d(np.asarray(impulse, np.float64))
@@ -320,9 +321,15 @@ def _largest_share(error: Floats, size: Floats) -> float:
     return float(np.where(np.isnan(share), np.inf, share).max(initial=0.0))
 
 
-def _relative_gain(mass: Floats, before: Floats, after: Floats) -> float:
-    energy = -exact_gain(mass, before, np.zeros_like(before))
-    return float(exact_gain(mass, before, after) / energy) if energy else np.inf
+def relative_gain(mass: ArrayLike, before: ArrayLike, after: ArrayLike) -> float:
+    """Return (KE⁺ − KE⁻)/KE⁻, rounded with its sign kept: never to 0; infinite beyond 1.8e308, and from rest."""
+    gain, energy = exact_gain(mass, before, after), -exact_gain(mass, before, np.zeros_like(before))
+    if not gain or not energy:
+        return np.inf if gain else 0.0
+    try:
+        return float(gain / energy) or math.copysign(5e-324, gain)
+    except OverflowError:
+        return np.inf
 
 
 def _shown(mass: Floats, before: Floats, after: Floats) -> str:

@@ -104,7 +104,7 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
 
 
 def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
-    """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded once; > 0 is a gain.
+    """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded, but no gain to 0; > 0 is a gain.
 
     If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
     """
@@ -115,7 +115,10 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     )
     if before == 0:
         return 0.0 if after == 0 else np.inf
-    return float((after - before) / before)
+    try:
+        return float((after - before) / before) or 5e-324 * (after > before)
+    except OverflowError:  # the gain is above 1.8e308; a loss is never below -1
+        return np.inf
 
 
 def ball_impact(

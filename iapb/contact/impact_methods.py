@@ -139,12 +139,12 @@ def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: 
     e = _real_numbers(restitution)
     if e is None or e.shape not in ((), (n,)):
         raise ArgumentError("restitution", restitution, f"a real number or shape ({n},), one per impact")
-    values = np.ascontiguousarray(np.broadcast_to(e.astype(np.float64), n))
+    values = np.atleast_1d(e.astype(np.float64))
     wrong = np.flatnonzero(~((values >= -1.0) & (values <= 1.0)))
     if len(wrong):
         raise ArgumentError(f"restitution[{wrong[0]}]" if e.ndim else "restitution", float(values[wrong[0]]),
                             "a number in [-1, 1]")
-    return M, J, v, values
+    return M, J, v, np.ascontiguousarray(np.broadcast_to(values, n))
 
 
 def refusal(wrong: tuple[int, int, int], given: Given, which: tuple[int, ...] = (),

@@ -9,7 +9,7 @@ import bisect
 import copy
 import itertools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
@@ -329,10 +329,12 @@ class Scene(Part):
         Raises
         ------
         ArgumentError
-            a path does not exist.
+            a path does not exist, or `values` or one of them is of a type that no scene file can hold.
         SceneError
             values are invalid; the error lists all of them with their paths.
         """
+        if not isinstance(values, Mapping):
+            raise ArgumentError("values", values, "a mapping of dotted paths to values")
         plain = self.resolved()
         for path, value in values.items():
             set_value(plain, path, value)
@@ -418,6 +420,8 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
 
 def _plain(value: Any) -> Any:
     """Return a copy of a value, with numpy arrays and numbers as plain lists and numbers."""
+    if isinstance(value, Set | Iterator):  # has no order, or can be read once only
+        raise ArgumentError("values", value, "numbers, texts, lists or mappings")
     return value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
 
 

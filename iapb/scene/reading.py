@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import isfile
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -49,11 +50,14 @@ def find_scene(name: str | Path) -> Path:
     ArgumentError
         There is neither such a file nor such a scene; the message lists the scenes of the project.
     """
-    path = Path(name)
-    if path.is_file():
+    try:
+        path = Path(name)
+    except TypeError:
+        raise ArgumentError("scene", name, "a path, or the name of a scene") from None
+    if isfile(path):  # a path that is too long is no file; Path.is_file raises OSError
         return path
     ours = scene_folder() / f"{path.stem}.yaml"
-    if str(name) in (path.stem, path.name) and ours.is_file():
+    if str(name) in (path.stem, path.name) and isfile(ours):
         return ours
     said, near = one_of(path.stem, scene_names(), "a file, or one of: "), ""
     if path.suffix:  # a file was meant

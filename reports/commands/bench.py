@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from datetime import date
 from typing import Annotated, Any
@@ -80,9 +81,12 @@ def seconds_of(text: str) -> float:
     """Return a time given with its unit, such as 50us or 0.5ms, in seconds."""
     found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(ns|us|µs|ms|s)\s*", text)
     try:
-        return float(found[1]) * UNITS[found[2]]  # type: ignore[index]
+        seconds = float(found[1]) * UNITS[found[2]]  # type: ignore[index]
     except (TypeError, ValueError):
-        raise ArgumentError("budget", text, "a time with its unit, e.g. 50us") from None
+        seconds = math.inf
+    if not math.isfinite(seconds):
+        raise ArgumentError("budget", text, "a time with its unit, e.g. 50us")
+    return seconds
 
 
 def _answer(budget: float, contacts: int, coordinates: int, facts: dict[str, Any]) -> None:

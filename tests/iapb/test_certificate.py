@@ -274,3 +274,12 @@ def test_restitution_is_judged_under_the_plain_law(cradle: Run) -> None:
 def test_a_share_that_overflows_does_not_pass() -> None:
     found = certify_impacts(np.diag([1e300, 1.0]), [[1e200, 1.0]], [[-1e200, 1.0]], [[-1e308, 0.0]])
     assert found.momentum == np.inf and not found.passed
+
+
+@pytest.mark.parametrize(("before", "after", "largest"), [
+    ([1e-10, 0.0], [1e300, 0.0], np.inf), ([1.0, 0.0], [1.0, 1e-200], 5e-324), ([0.0, 0.0], [0.0, 1e-200], np.inf),
+    ([1.0, 0.0], [1.0, 0.0], 0.0), ([0.0, 0.0], [0.0, 0.0], 0.0)])  # fmt: skip
+def test_a_gain_that_no_double_can_hold_is_a_gain(before: list[float], after: list[float], largest: float) -> None:
+    """The first raised, the second had 0 as its largest gain."""
+    found = certify_impacts(np.eye(2), [before], [after])
+    assert found.gains == (largest > 0.0) and found.largest_gain == largest

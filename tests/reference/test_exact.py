@@ -116,5 +116,11 @@ def test_border() -> None:
         exact_impact([[1.0]], [[1.0, 2.0]], [1.0], 1.0)
     with pytest.raises(ArgumentError, match="magnitudes"):
         bulk_energy_gain([[1.0]], [1e200], [1.0])
+
+
+def test_a_gain_beyond_the_range_of_doubles_is_a_gain() -> None:
+    assert relative_energy_gain([[1.0]], [1e-10], [1e300]) == np.inf
+    assert relative_energy_gain(np.eye(2), [1.0, 0.0], [1.0, 1e-200]) == 5e-324
+    assert relative_energy_gain(np.eye(2), [1.0, 1e-200], [1.0, 0.0]) == 0.0
     assert relative_energy_gain([[1.0]], [0.0], [0.0]) == 0.0
     assert relative_energy_gain([[1.0]], [0.0], [1.0]) == np.inf

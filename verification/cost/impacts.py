@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts,
 ROUNDS = 5
 LONGEST = 1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts
 _ENOUGH = 0.02  # [s] spent on one method of one impact; slow methods get fewer rounds
+LARGEST = 10_000  # contacts or coordinates of one impact: more would take hours or the whole memory
 NO_GAIN = 1e-12  # a relative gain of energy below this is rounding
 
 METHOD_COLUMNS = (
@@ -293,11 +295,13 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     Raises
     ------
     ArgumentError
-        A budget or size that is not positive.
+        A budget or size that is not positive, or a size above LARGEST.
     """
-    for name, value in (("budget", budget), ("contacts", contacts), ("coordinates", coordinates)):
-        if not value > 0:
-            raise ArgumentError(name, value, "a number above 0")
+    if isinstance(budget, bool) or not isinstance(budget, Real) or not 0.0 < budget < math.inf:
+        raise ArgumentError("budget", budget, "a finite number of seconds above 0")
+    for name, value in (("contacts", contacts), ("coordinates", coordinates), ("rounds", rounds)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= LARGEST:
+            raise ArgumentError(name, value, f"a whole number from 1 to {LARGEST:,}")
     measured = work_precision([(contacts, coordinates)], rounds)
     found = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
     return tuple(choice for choice in found if choice is not None)

@@ -359,6 +359,8 @@ def check_passivity(
     chosen = choose_laws(contract, laws, unequal_restitution)
     if isinstance(impacts, bool) or not isinstance(impacts, int | np.integer) or impacts < 1:
         raise ArgumentError("impacts", impacts, "a whole number, 1 or more")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ArgumentError("seed", seed, "a whole number, 0 or more")
     _refuse_signature(resolver, contract)
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
@@ -410,6 +412,8 @@ def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: 
     known = terms.laws | (UNEQUAL_LAWS if unequal_restitution else {})
     if laws is None:
         return {name: law for name, law in known.items() if name not in terms.optional}
+    if not isinstance(laws, Iterable):
+        raise ArgumentError("laws", laws, "names of laws")
     names = [laws] if isinstance(laws, str) else list(laws)
     for name in names:
         if name not in known:

@@ -83,12 +83,15 @@ def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> F
         answer = resolver(*given)
     except Exception as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
         raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
-    velocity = np.asarray(getattr(answer, "velocity", answer))
+    try:
+        velocity = np.asarray(getattr(answer, "velocity", answer))
+    except Exception as error:  # as foreign as the resolver
+        return ResolverFault(f"returned {type(answer).__name__}, which is no array: {error}")
     if velocity.dtype.kind not in "fiu" or velocity.shape != case.velocity.shape:
         return ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
+    velocity = velocity.astype(np.float64)
     if not np.all(np.isfinite(velocity)):
         return ResolverFault("returned a velocity that is not finite")
-    velocity = velocity.astype(np.float64)
     if isinstance(resolver, Watched):
         resolver.look_at(case, velocity)
     return velocity

@@ -352,3 +352,9 @@ def test_every_method_solves_two_rows_across_each_other(method: str, scale: floa
     assert impact.energy_change == pytest.approx(-0.375 * (v @ mass @ v), rel=tolerance)
     assert (impact.rank, impact.status, impact.method, impact.rows_used) == (2, "complete", method, None)
     assert impact.clamp == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [np.nan, 2.0, -1.5])
+def test_a_wrong_restitution_of_no_impacts_is_refused(restitution: float) -> None:
+    with pytest.raises(ArgumentError, match="^restitution = "):
+        resolve_impacts(np.zeros((0, 3, 3)), np.zeros((0, 2, 3)), np.zeros((0, 3)), restitution)

@@ -324,3 +324,10 @@ def test_no_value_whatever_ends_in_another_error(values: dict[str, Any]) -> None
     except (SceneError, ArgumentError):
         return
     assert scene_from_text(changed.source_text).resolved() == changed.resolved()
+
+
+@pytest.mark.parametrize("values", [None, [("duration", 1)], "duration", {"hand.force": (x for x in (1, 2, 3))},
+                                    {"gravity": {0.0, 9.0}}], ids=["none", "pairs", "text", "generator", "set"])
+def test_new_values_of_a_wrong_kind_are_named(values):
+    with pytest.raises(ArgumentError, match="^values = "):
+        PEG.with_values(values)

@@ -241,3 +241,10 @@ def check(text: str) -> None:
             assert mistake.column >= 1
             assert mistake.path
             assert mistake.expected
+
+
+@pytest.mark.parametrize("name", [None, 3, b"peg_corner", {}, "a\0b", "a" * 5000, "a/" + "b" * 5000,
+                                  "a" * 5000 + ".yaml"], ids=lambda name: repr(name)[:9])
+def test_what_cannot_be_a_scene_is_named(name):
+    with pytest.raises(ArgumentError, match="^scene = "):
+        find_scene(name)

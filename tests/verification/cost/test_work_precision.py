@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -228,8 +230,17 @@ def test_order_bias_has_a_row_per_method() -> None:
 def test_a_size_is_measured_when_asked_for() -> None:
     compiled, python = which_method(1.0, 2, 3, rounds=3)
     assert (compiled.called, compiled.share) == (COMPILED, 1.0) and compiled.largest < 1e-9 and python.time > 0.0
-    with pytest.raises(ArgumentError, match="budget"):
-        which_method(0.0, 2, 3)
+
+
+@pytest.mark.parametrize(("named", "given"), [
+    ("budget", (0.0, 2, 3)), ("budget", (np.inf, 2, 3)), ("budget", ("1", 2, 3)), ("budget", (None, 2, 3)),
+    ("contacts", (1.0, 0, 3)), ("contacts", (1.0, 2.5, 3)), ("contacts", (1.0, True, 3)),
+    ("coordinates", (1.0, 2, 3.0)), ("coordinates", (1.0, 2, "3")), ("contacts", (1.0, 10**30, 3)),
+    ("rounds", (1.0, 2, 3, 0)), ("rounds", (1.0, 2, 3, "x"))])  # fmt: skip
+def test_a_wrong_budget_or_size_is_named(named: str, given: tuple[Any, ...]) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        which_method(*given)
+    assert caught.value.argument == named
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("50us", 5e-5), ("0.5 ms", 5e-4), ("1e-4s", 1e-4), ("3µs", 3e-6)])
@@ -237,7 +248,7 @@ def test_budgets_are_read(text: str, seconds: float) -> None:
     assert seconds_of(text) == pytest.approx(seconds)
 
 
-@pytest.mark.parametrize("text", ["fast", "50 miles", "", "e", "1e", "50"])
+@pytest.mark.parametrize("text", ["fast", "50 miles", "", "e", "1e", "50", "1e999s"])
 def test_what_is_no_budget_is_refused(text: str) -> None:
     with pytest.raises(ArgumentError, match="budget"):
         seconds_of(text)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
-from iapb import resolve_impact
+from iapb import ArgumentError, resolve_impact
 from reference.exact import exact_impact, relative_energy_gain
 from verification import check_passivity
 from verification.impacts import Floats, ImpactCase, adverse_cases
 from verification.laws import PLANTED_BUGS, sound_resolver
 from verification.laws.bounds import FACTORED, KIT
+from verification.laws.contracts import no_gain_in_real_arithmetic
 from verification.laws.counterexample import as_test, shrink
 from verification.laws.planted import (
     TOO_MUCH,
@@ -217,3 +220,42 @@ def test_a_failed_assertion_shows_the_whole_report() -> None:
     """What pytest prints for `assert report.passed, report` is the report's repr."""
     report = check_passivity(lambda mass, jacobian, velocity, restitution: 2.0 * velocity, impacts=20)
     assert repr(report) == str(report) and "counterexample to" in repr(report)
+
+
+@pytest.mark.parametrize(("answer", "said"), [
+    (lambda v: [[1.0], [1.0, 2.0]], "returned list, which is no array"),
+    (lambda v: np.full(len(v), np.longdouble("1e400")), "not finite"),
+])  # fmt: skip
+def test_an_answer_that_is_no_velocity_is_a_fault_of_the_resolver(answer: Callable[[Any], Any], said: str) -> None:
+    report = check_passivity(lambda M, J, v, e: answer(v), impacts=3, search=0)
+    assert not report.passed and said in report
+
+
+def test_gains_beyond_sixty_decades_are_judged() -> None:
+    """The kit itself raised on them, and called a right answer with an entry of 1e-70 wrong."""
+    for power in (100, 300):
+        report = check_passivity(lambda M, J, v, e, power=power: v * 10.0**power, impacts=3, search=20)
+        assert not report.passed and "the law itself raised" not in report
+
+    def tiny(M: Any, J: Any, v: Any, e: Any) -> Any:
+        found = resolve_impact(M, J, v, e).velocity
+        return np.where((found == 0.0) & v.any(), 1e-70, found)
+
+    assert check_passivity(tiny, impacts=60, laws=["kinetic_energy"]).passed
+
+
+def test_the_exact_law_sees_gains_that_no_double_can_hold() -> None:
+    """Relative to KE⁻ they are above 1.8e308, which raised, or below 5e-324, which passed."""
+    report = check_passivity(lambda M, J, v, e: 1e300 * v, impacts=3, laws=["exact_energy"], search=20)
+    assert not report.passed and "the law itself raised" not in report
+    case = ImpactCase(np.eye(2), np.zeros((0, 2)), np.array([1.0, 0.0]), 0.5, "x")
+    for gain in (1e-200, 1e200):
+        assert not no_gain_in_real_arithmetic(case, lambda M, J, v, e, gain=gain: v + [0.0, gain], KIT).passed
+    assert no_gain_in_real_arithmetic(case, lambda M, J, v, e: v - [0.5**53, 0.0], KIT).passed
+
+
+@pytest.mark.parametrize("given", [{"seed": -1}, {"seed": 1.5}, {"seed": None}, {"seed": "3"}, {"laws": 1}])
+def test_a_wrong_seed_or_list_of_laws_is_named(given: dict[str, Any]) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        check_passivity(lambda M, J, v, e: v, impacts=1, **given)
+    assert caught.value.argument == ("seed" if "seed" in given else "laws")
