@@ -168,7 +168,7 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
     checked = np.flatnonzero(signs != 0)[::_CHECKED]
     for k in checked:
         if gained[k] != (exact_gain(masses[k % len(masses)], before[k], after[k]) > 0):
-            raise IapbError(f"impact {k}: integers and the bound in double-double disagree on its energy")
+            raise IapbError(f"impact {k}: an error of iapb: the exact energy is outside its double-double bounds")
     return Judged(gained, len(unsure), len(checked))
 
 
@@ -217,8 +217,8 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
-            raise IapbError(f"impact {start + other[0]}: M, made again from the recorded q, is not as recorded; "
-                            "the record was changed, or the engine that wrote it computes M otherwise")
+            raise IapbError(f"impact {start + other[0]}: M computed again from q differs from the recorded M; "
+                            "the record was changed, or another version of iapb wrote it")
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
 
 

@@ -128,7 +128,7 @@ def _text(path: Path) -> str:
             file.seek(0)
             raw = (gzip.GzipFile(fileobj=file) if packed else file).read(_LARGEST_TEXT + 1)
         if len(raw) > _LARGEST_TEXT:
-            raise DatasetError(path, f"holds more than {_LARGEST_TEXT >> 20} MB of text: more than is read here")
+            raise DatasetError(path, f"larger than {_LARGEST_TEXT >> 20} MB: expected a smaller text file")
         return raw.decode("utf-8")
     except (OSError, EOFError, zlib.error) as error:
         raise DatasetError(path, f"cannot be read: {error}") from error

@@ -70,7 +70,7 @@ def _checked_stiffness(stiffness: ArrayLike, d: int) -> Floats:
         raise ArgumentError("stiffness", K.shape, f"a symmetric matrix ({d}, {d})")
     values = np.linalg.eigvalsh(K)
     if values.min(initial=0.0) < -_NO_SPRING * np.abs(values).max(initial=0.0):
-        raise ArgumentError("stiffness", values.min(), "no negative eigenvalue: springs only hold")
+        raise ArgumentError("stiffness", values.min(), "a matrix without negative eigenvalues: a spring pulls back")
     return K
 
 

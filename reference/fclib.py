@@ -72,7 +72,7 @@ def read_fclib(path: Path | str) -> StoredProblem:
     try:
         with h5py.File(path, "r") as file:
             if outside := leads_out(file):
-                raise DatasetError(path, f"{outside}: a problem file holds everything itself")
+                raise DatasetError(path, f"{outside}: expected a file without links to other files")
             kinds = [name for name in ("fclib_local", "fclib_global") if name in file]
             if not kinds:
                 raise DatasetError(path, "is HDF5 but holds neither fclib_local nor fclib_global")
@@ -163,7 +163,7 @@ def _numbers(path: Path, group: Any, name: str, kinds: str) -> NDArray[Any]:
     if not hasattr(dataset, "dtype") or dataset.dtype.kind not in kinds or dataset.shape is None:
         raise DatasetError(path, f"{name} is no dataset of {'whole ' if kinds == 'iu' else ''}numbers")
     if dataset.size > LARGEST_SIZE**2:
-        raise DatasetError(path, f"{name} is said to hold {dataset.size} numbers: more than is read here")
+        raise DatasetError(path, f"{name} holds {dataset.size} numbers: more than this reader accepts")
     values = np.asarray(dataset[()]).ravel()
     if not np.isfinite(values).all():
         raise DatasetError(path, f"{name} holds a number that is not finite")

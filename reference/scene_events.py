@@ -153,7 +153,7 @@ class _Motion:
         mechanism = self.system.mechanism
         self.mechanics = mechanics_of(self.system)
         if self.coupled and mechanism.nq != mechanism.nv:
-            raise ArgumentError("scene", self.scene.name, "with a coupling, a scene whose coordinates may be added")
+            raise ArgumentError("scene", self.scene.name, "a scene without quaternions, or no coupling")
         self.d, self.nq = mechanism.nv, mechanism.nq
         self.restitution = one_restitution(self.scene, self.system.pairs)
         self.tool = slice(*self.system.tool_dofs)
@@ -244,7 +244,7 @@ class _Motion:
         while (rows @ v < -self.tolerances.at_rest).any():
             impacts += 1
             if impacts > _AT_ONCE:
-                raise SolverError(f"{self.scene.name}: no truth: more than {_AT_ONCE} impacts at one instant")
+                raise SolverError(f"{self.scene.name}: no reference: more than {_AT_ONCE} impacts at one instant")
             outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.restitution))
             v = outcome.velocity
             if self.device is not None:
@@ -266,7 +266,7 @@ class _Motion:
         found = self.rows(q, v)
         deepest = min((gap for gap, _ in found.values()), default=0.0)
         if deepest < -3.0 * self.tolerances.closed:
-            raise SolverError(f"{self.scene.name}: no truth: rigid contacts overlap by {-deepest:.1e} m")
+            raise SolverError(f"{self.scene.name}: no reference: rigid contacts overlap by {-deepest:.1e} m")
         return found
 
     def _lasting(self, state: Floats, names: list[Contact]) -> NDArray[np.bool_]:
@@ -355,7 +355,7 @@ def scene_truth(
     for other in others:
         if len(other.events) != len(first.events):
             raise SolverError(
-                f"{scene.name}: no truth: {len(first.events)} events or {len(other.events)}, by the tolerances"
+                f"{scene.name}: no reference: {len(first.events)} or {len(other.events)} events, by tolerance"
             )
     q, v = first.state(np.linspace(0.0, duration, 10 * _COMPARED))
     sizes = (max(1.0, float(np.abs(q).max())), max(1.0, float(np.abs(v).max())), duration)
@@ -393,7 +393,7 @@ def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | N
                 for time in np.linspace(begin, stop, _COMPARED):
                     motion.require_no_overlap(*motion.split(solution(float(time)))[:2])
             return SceneTruth(motion.nq, motion.d, tuple(segments), tuple(events))
-    raise SolverError(f"{motion.scene.name}: no truth: impacts accumulate, {most_events} of them before {now:.4g} s")
+    raise SolverError(f"{motion.scene.name}: no reference: impacts accumulate, {most_events} before {now:.4g} s")
 
 
 def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
@@ -420,7 +420,7 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
         dense_output=True, max_step=longest,
     )  # fmt: skip
     if solution.status < 0:
-        raise SolverError(f"{motion.scene.name}: no truth beyond {solution.t[-1]:.4g} s: {solution.message}")
+        raise SolverError(f"{motion.scene.name}: no reference after {solution.t[-1]:.4g} s: {solution.message}")
     return solution
 
 

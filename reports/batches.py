@@ -103,8 +103,8 @@ def cluster(address: str) -> Scheduler:
         try:
             yield from _on_cluster(client, compute, parts)
         except (CommClosedError, CancelledError) as error:
-            raise IapbError(f"the scheduler at {address} is gone; what was done is kept, and the same command goes on "
-                            "from there, with a scheduler that lives") from error
+            raise IapbError(f"the scheduler at {address} no longer answers; finished points are kept. Start one "
+                            "and run the same command again: it continues there") from error
         finally:
             client.close()
 
@@ -194,8 +194,8 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BrokenProcessPool as error:
-        raise IapbError("a worker process was killed, as happens where memory runs out; what was done is kept, and "
-                        "the same command goes on from there, with fewer --workers for less memory") from error
+        raise IapbError("a worker process was killed, probably because memory ran out; finished work is kept. Run "
+                        "the same command again with fewer --workers: it continues there") from error
     except BaseException:
         for worker in set(active_children()) - others:
             worker.terminate()

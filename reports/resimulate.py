@@ -91,7 +91,8 @@ def law_of(run: Run) -> Any:
         return kind(**_known(kind, run.law_settings))
     law = _law_of_world(run.world)
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
-        raise ArgumentError("law", run.law, one_of(run.law, LAWS) + ", or a world's (any other law is not in the file)")
+        raise ArgumentError("law", run.law,
+                            one_of(run.law, LAWS) + ", or the law of a world; other laws are not stored in the file")
     return law
 
 

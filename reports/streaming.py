@@ -148,7 +148,7 @@ class _Stream:
             return 0
         head, blocks = read_log(path)
         if head.get("key") != self.place.key:
-            raise RunFileError(f"{path}: the log of another run")
+            raise RunFileError(f"{path}: the log belongs to another run")
         last = None
         for block in blocks:
             last = block if block.line["kind"] == STATE else last
@@ -202,7 +202,7 @@ def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int
                 yield joiner.take(world)
                 held = 0
     if joiner.steps < max(steps, 1):
-        raise RunFileError(f"{path}: damaged: {joiner.steps} steps of {max(steps, 1)} are whole")
+        raise RunFileError(f"{path}: damaged: only {joiner.steps} of {max(steps, 1)} steps can be read")
     if held:
         yield joiner.take(world)
 

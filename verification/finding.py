@@ -325,7 +325,7 @@ def check_quantities(quantities: Quantities, sentence: str) -> None:
         if name not in QUANTITIES:
             raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
         if not said_as(value).search(sentence):
-            raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that stands in: {sentence}")
+            raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that is part of: {sentence}")
 
 
 def said_as(value: str) -> re.Pattern[str]:

@@ -272,7 +272,7 @@ def _check_options(method: str, budget: Any, tolerance: Any, equal: bool) -> Non
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 0:
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
         if method != "factored" or not equal:
-            raise ArgumentError("budget", budget, "None: only method 'factored' with equal restitution is anytime")
+            raise ArgumentError("budget", budget, "None: only 'factored', with one restitution for all, can stop early")
     number = isinstance(tolerance, float | int | np.floating)
     if tolerance is not None and not (number and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")

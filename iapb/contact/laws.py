@@ -99,7 +99,7 @@ class _EngineLaw:
         """Advance one step by the compiled kernel (see `ContactLaw`)."""
         world = system.world_under(self)
         if dt != world.dt:
-            raise ArgumentError("dt", dt, f"the scene's step {world.dt!r} s: the engine's laws keep a fixed step")
+            raise ArgumentError("dt", dt, f"the step of the scene, {world.dt!r} s; to change it, set the scene's rate")
         status = system.advance_under(self)(world, state, np.ascontiguousarray(applied_force, np.float64))
         if status:
             raise IapbError(STATUS_TEXT[status])
@@ -141,7 +141,7 @@ class ImpulseAugmented(_EngineLaw):
             if not isinstance(getattr(self, name), bool):
                 raise ArgumentError(name, getattr(self, name), "True or False")
         if self.friction_in_impacts and self.pushing:
-            raise ArgumentError("pushing", True, "False with friction_in_impacts, whose split is that of the equality")
+            raise ArgumentError("pushing", True, "False: friction_in_impacts needs impulses that may pull")
 
     @property
     def name(self) -> str:

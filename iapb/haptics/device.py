@@ -160,7 +160,7 @@ class DeviceLink:
 
     def __init__(self, device: Device, world: Any, state: Any, port: Any) -> None:
         if port.coupling == NO_COUPLING:
-            raise ArgumentError("device", device, "none without a coupling to it: the hand holds the tool itself")
+            raise ArgumentError("device", device, "None, or a coupling: without one the hand holds the tool")
         if not callable(getattr(device, "read", None)) or not callable(getattr(device, "apply", None)):
             raise ArgumentError("device", device, "an object with read() and apply(force), see iapb.haptics.device")
         self.device, self._world, self._state, self._port = device, world, state, port

@@ -148,7 +148,7 @@ def parent_indices(bodies: Sequence[Body]) -> list[int]:
     trees = tree_indices(parents)
     for i in range(1, len(trees)):
         if trees[i] < trees[i - 1]:
-            raise ArgumentError(f"bodies[{i}]", bodies[i].name, "bodies of one tree to follow one another")
+            raise ArgumentError(f"bodies[{i}]", bodies[i].name, "the bodies of each tree in sequence")
     return parents
 
 

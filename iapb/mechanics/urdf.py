@@ -84,7 +84,7 @@ def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
     if len(bodies) < len(links):
         lost = sorted(set(links) - {body.name for body in bodies})
         raise ArgumentError(
-            "links", lost, f"links connected to the root {root!r}, not to one another in a ring"
+            "links", lost, f"joints that connect each link to the root {root!r}; the joints of these links form a loop"
         )
     return bodies
 
@@ -139,7 +139,7 @@ def _root(connections: list[_Connection], links: dict[str, _Inertial]) -> str:
             if link not in links:
                 raise ArgumentError(f"{where} {tag}", link, "the name of a <link>")
         if connection.child in parent_of:
-            raise ArgumentError(f"{where} child", connection.child, "a link that no other joint carries")
+            raise ArgumentError(f"{where} child", connection.child, "a link that is the child of no other joint")
         parent_of[connection.child] = connection.parent
     roots = [name for name in links if name not in parent_of]
     if len(roots) != 1:
@@ -230,7 +230,7 @@ MAX_DEPTH = 32
 
 
 def _refuse_doctype(*_: object) -> NoReturn:
-    raise ArgumentError("URDF file", "<!DOCTYPE", "no document type: it could declare entities without end")
+    raise ArgumentError("URDF file", "<!DOCTYPE", "no <!DOCTYPE>: its entities can expand without limit")
 
 
 class _Depth:
@@ -373,7 +373,7 @@ def _check(element: ElementTree.Element, where: str) -> None:
             raise ArgumentError(f"{where} <{tag}>", "given twice", "one of them")
         near = difflib.get_close_matches(tag, read, n=1, cutoff=_NEAR)
         if tag not in read and tag not in others and near:
-            raise ArgumentError(f"{where} <{tag}>", tag, f"<{near[0]}>, or a name less like it")
+            raise ArgumentError(f"{where} <{tag}>", tag, f"<{near[0]}>; is it misspelt? Rename it if not")
         if tag not in read:
             continue
         seen.add(tag)

@@ -369,7 +369,7 @@ class Scene(Part):
         for k in range(self.steps):
             force = _plain(function(k * self.step))
             if not isinstance(force, list | tuple):
-                raise ArgumentError("function", force, f"{len(self.hand.force)} numbers, not one thing, at each time")
+                raise ArgumentError("function", force, f"a list of {len(self.hand.force)} numbers as its value")
             rows.append([k * self.step, *force])
         none = [0.0] * len(self.hand.force)
         return self.with_values({"hand.force": none, "hand.force_table": rows, "hand.force_function": []})
@@ -430,7 +430,7 @@ def _key(place: Any, step: str, path: str) -> str | int:
     if isinstance(place, dict):
         return step
     if not isinstance(place, list):
-        raise ArgumentError("values", path, f"a path into the scene: {step!r} lies below a value")
+        raise ArgumentError("values", path, f"a path to a field; before {step!r} stands a value without fields")
     names = [item.get("name") if isinstance(item, dict) else None for item in place]
     if step in names:
         return names.index(step)

@@ -75,7 +75,7 @@ def spring_restitution(damping_ratio: float) -> float:
 def damping_for(restitution: float, stiffness: float) -> float:
     """Return b [1/s] for e in [LOWEST, 1] and k [1/s2] per unit of mass, by bisection."""
     if restitution < LOWEST:
-        raise ArgumentError("restitution", restitution, f"at least {LOWEST}: a spring that swings")
+        raise ArgumentError("restitution", restitution, f"at least {LOWEST}: else the damped spring does not bounce")
     if restitution >= 1.0:
         return 0.0
     low, high = 0.0, 0.999

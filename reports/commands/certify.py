@@ -46,7 +46,7 @@ def certify(
 def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
     """Certify the files and write their impacts to `export`; if a file cannot be read, `export` is not changed."""
     if export.exists() and (not export.is_file() or any(path.exists() and path.samefile(export) for path in paths)):
-        raise ArgumentError("--export", str(export), "a file of its own, none of those that are certified")
+        raise ArgumentError("--export", str(export), "a new file, not one of the certified files")
     with written_aside(export.resolve(), replace=True) as aside, aside.open("w", encoding="utf-8") as target:
         target.write(f"{EXPORT_HEAD}\n")
         found = {path: certificate_of(path, target) for path in paths}

@@ -39,7 +39,7 @@ FOLDER = Path("out/compare")
 _SHOWN = {
     "map": ("impacts", "e", "redundant rows", "cases", "share that agrees", "largest distance",
             "largest extra loss of KE⁻"),
-    "friction": ("e", "μ", "cases", "all contacts push", "of these as the NCP", "unsolved", "NCP gains",
+    "friction": ("e", "μ", "cases", "all contacts push", "share equal to the NCP", "unsolved", "NCP gains",
                  "largest change of KE, IAPB"),
     "convergence": ("scene", "events", "step", "error of positions", "order, positions", "order, velocities"),
 }  # fmt: skip

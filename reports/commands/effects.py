@@ -58,7 +58,7 @@ def effects(
 def _measure(source: Any, world: str, json_: bool) -> None:
     """Print the cost and the influence of each effect, and for which no other saves more time at no larger error."""
     if world not in ("IAPB", "PB"):
-        raise ArgumentError("world", world, "IAPB or PB with --measure: the worlds of the compiled engine")
+        raise ArgumentError("world", world, "IAPB or PB: --measure needs a world of the compiled engine")
     with stage_progress() as progress:
         found = effects_of(source, world, lambda done, total: progress("with and without each effect", done, total))
     if json_:

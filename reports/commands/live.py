@@ -46,7 +46,7 @@ def live(
     if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:
-        raise ArgumentError("--seconds", seconds, f"one step of {1.0 / rate:g} s at least, fewer than {LONGEST:g}")
+        raise ArgumentError("--seconds", seconds, f"at least one step ({1.0 / rate:g} s), less than {LONGEST:g} s")
     source = scene_given(scene, set_)
     out.mkdir(parents=True, exist_ok=True)  # an unusable folder is reported before the run, not after it
     with compiling_told(to_stderr):

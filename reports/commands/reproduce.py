@@ -131,7 +131,7 @@ def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     """
     given = read_numbers(report)
     if out is not None and out.exists() and any(out.iterdir()):
-        raise ArgumentError("--out", str(out), "an empty folder: what is there would be read, not computed again")
+        raise ArgumentError("--out", str(out), "an empty folder: results in it would be reused, not computed again")
     with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as folder:
         make_report(Path(folder), given.depth, facts)
         made = read_numbers(folder)

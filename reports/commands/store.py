@@ -65,7 +65,7 @@ def store(
     if where.is_file() and action in (Action.repair, Action.gc, Action.mark):
         raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")
     if delete and action is not Action.gc:
-        raise typer.BadParameter("is for gc", param_hint="--delete")
+        raise typer.BadParameter("only with the action gc", param_hint="--delete")
     if action is Action.gc:
         _gc(where, delete, json_)
     else:

@@ -150,7 +150,7 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run],
     if names in (LIMITED, STRATEGIES):
         panels += [_separation_panel(key, runs), _penetration_panel(key, runs)]
     reference = "ideal" if "ideal" in runs else None
-    apart = ("from ideal x [mm]", "y [mm]", "θ [°]") if reference else ()
+    apart = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
     columns = ("world", *apart, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
     note = _FROM_IDEAL + _SETTLED if reference else _SETTLED
     return tuple(panels), titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)

@@ -138,7 +138,7 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
     panels = (
         Panel(_in_time(times, "false collisions so far", "false collisions so far"), words,
               f"False collisions, {_DAMPING:g} N s/m"),
-        Panel(_in_time(times, "lost so far, of the fall", "lost in them, share of the fall"),
+        Panel(_in_time(times, "energy lost so far, share of the fall", "lost in them, share of the fall"),
               "Energy lost in false collisions, cumulative.", "Energy that they take"),
         Panel(_bars(counts), words, "By damping of the contact"),
     )  # fmt: skip

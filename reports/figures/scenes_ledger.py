@@ -114,7 +114,7 @@ def _row(drawing: Any, bottom: float, height: float, strip: Strip, facts: Mappin
 
 def _facts_in_words(fact: Mapping[str, Any]) -> str:
     space = "in space, " if fact["dimensions"] == 3 else ""
-    return f"{format_number(fact['energy turned over'], 2)} J, {space}{fact['how it ends']}"
+    return f"{format_number(fact['energy exchanged'], 2)} J, {space}{fact['how it ends']}"
 
 
 def _energy(axes: Any, strip: Strip) -> None:

@@ -104,7 +104,7 @@ def _guarded(token: str) -> Iterator[None]:
     finally:
         server.serve = serve  # type: ignore[misc]
     if not guarded:
-        raise RuntimeError("viser started its server unguarded")
+        raise RuntimeError("viser started its server unguarded: requests would be accepted without the key")
 
 
 def allowed(path: str, headers: Any, port: int, token: str) -> bool:

@@ -123,7 +123,7 @@ class Viewer:
         except EOFError:
             pass
         self.stop()
-        raise IapbError("the viewer did not start; without --view the loop needs none")
+        raise IapbError("the viewer did not start; run without --view")
 
     def publish(self, q: Floats) -> None:
         """Write the poses at q to the shared memory."""

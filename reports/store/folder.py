@@ -183,7 +183,7 @@ class RunStore:
     def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
         """Store a finished run and return its file; an existing file is not changed."""
         if not run.complete:
-            raise ArgumentError("run.complete", run.complete, "True: unfinished runs are kept by Checkpoint")
+            raise ArgumentError("run.complete", run.complete, "True: use Checkpoint to store an unfinished run")
         place = self.place_of(inputs, label)
         mark_store(self.folder)
         self._keep(place, run)

@@ -214,7 +214,7 @@ def check_seal(path: Path) -> None:
         file.seek(max(size, 0))
         mark = file.read()
     if size < 0 or not mark.startswith(_MARK):
-        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or is not of iapb")
+        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb")
     if mark != _MARK + _checksum(path, size).encode() + b"\n":
         raise RunFileError(f"{path}: differs from its checksum, the file is damaged")
 
@@ -252,7 +252,7 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
             aside.write_bytes(sealed(image))
     except OSError as error:
         why = error.strerror or error
-        raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
+        raise RunFileError(f"{path}: cannot be written: {why}; the previous file is unchanged") from error
 
 
 @contextmanager
@@ -274,7 +274,7 @@ def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
     except (OSError, RuntimeError) as error:
         number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library includes the number in its message
         why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
-        raise RunFileError(f"{path}: cannot be written: {why}; what was there is as it was") from error
+        raise RunFileError(f"{path}: cannot be written: {why}; the previous file is unchanged") from error
 
 
 @contextmanager
@@ -296,7 +296,7 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
     try:
         with h5py.File(path, "r") as file:
             if outside := leads_out(file):
-                raise RunFileError(f"{path}: {outside}: a file of results holds everything itself")
+                raise RunFileError(f"{path}: {outside}: expected a file without links to other files")
             if expected_format is not None:
                 _check_format(file, path, expected_format)
             yield file

@@ -178,9 +178,9 @@ def read_log(path: Path) -> tuple[dict[str, Any], Iterator[Block]]:
         head = _parsed(file.readline(_LONGEST_LINE))
         first = file.tell()
     if head is not None and head.get("format_version") != _VERSION:
-        raise RunFileError(f"{path}: a log of another version: this one reads {_VERSION}")
+        raise RunFileError(f"{path}: format version is not {_VERSION}; run without --resume")
     if head is None or head.get(_SEAL) != _seal_of("", head, b""):
-        raise RunFileError(f"{path}: its first line is damaged, and with it the log; run without --resume")
+        raise RunFileError(f"{path}: its first line is damaged, so the log cannot be read; run without --resume")
     return {name: value for name, value in head.items() if name not in _OWN}, _blocks_from(path, first, head[_SEAL])
 
 
@@ -252,9 +252,9 @@ def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 
                                  impacts=columns(IMPACTS), used=(contacts, impacts))  # fmt: skip
         own = column((steps, more), np.float64)
     except ValueError as error:
-        raise RunFileError(f"{path}: a chunk of another scene at byte {block.start}") from error
+        raise RunFileError(f"{path}: the chunk at byte {block.start} belongs to another scene") from error
     if place != len(numbers):
-        raise RunFileError(f"{path}: a chunk of another scene at byte {block.start}")
+        raise RunFileError(f"{path}: the chunk at byte {block.start} belongs to another scene")
     return record, own
 
 
@@ -268,7 +268,7 @@ def put_back(path: Path, block: Block, arrays: Sequence[NDArray[Any]]) -> None:
     """
     numbers, place = block.numbers, 0
     if len(numbers) != sum(array.nbytes for array in arrays):
-        raise RunFileError(f"{path}: a state of another scene at byte {block.start}")
+        raise RunFileError(f"{path}: the state at byte {block.start} belongs to another scene")
     for array in arrays:
         array[...] = np.frombuffer(numbers, array.dtype, array.size, place).reshape(array.shape)
         place += array.nbytes

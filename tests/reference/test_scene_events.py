@@ -93,12 +93,12 @@ def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
 
 
 def test_impacts_that_accumulate_too_slowly_are_named() -> None:
-    with pytest.raises(SolverError, match="bouncing: no truth: impacts accumulate, 20 of them before"):
+    with pytest.raises(SolverError, match="bouncing: no reference: impacts accumulate, 20 before"):
         scene_truth(scene_from_text(BOUNCING % 0.97), 6.0, most_events=20)
 
 
 def test_a_scene_that_starts_overlapping_has_no_truth_and_says_so() -> None:
-    with pytest.raises(SolverError, match="box_stack: no truth: rigid contacts overlap by"):
+    with pytest.raises(SolverError, match="box_stack: no reference: rigid contacts overlap by"):
         scene_truth(load_scene(find_scene("box_stack")), 0.1)
 
 
@@ -130,5 +130,5 @@ def test_the_rate_of_a_quaternion_is_half_its_product_with_the_turning() -> None
 
 def test_a_coupling_in_space_is_refused() -> None:
     text = DROP + "hand: {body: ball}\n"
-    with pytest.raises(ArgumentError, match="coordinates may be added"):
+    with pytest.raises(ArgumentError, match="a scene without quaternions"):
         scene_truth(scene_from_text(text), 0.1, coupled=True)

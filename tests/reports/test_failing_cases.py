@@ -133,8 +133,8 @@ def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _races(scene: Any, *_: Any) -> list[dict[str, Any]]:
-    return [{"scene": scene.name, "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "our contacts": 4,
-             "its contacts": 4, "its step": 100.0, "ratio": 0.01, "asked for": 0.1}]  # fmt: skip
+    return [{"scene": scene.name, "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "iapb's contacts": 4,
+             "MuJoCo's contacts": 4, "MuJoCo's step": 100.0, "ratio": 0.01, "target": 0.1}]  # fmt: skip
 
 
 def _step_of(n: int) -> dict[str, Any]:

@@ -79,7 +79,7 @@ class Outline(HTMLParser):
             self.wrong.append(tag)
 
 
-SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "problems of others"})
+SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "published problems"})
 
 
 def _hard_case(*rows: tuple[Any, ...], title: str = "bar") -> Finding:

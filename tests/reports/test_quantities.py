@@ -87,9 +87,9 @@ def test_the_value_is_marked_whatever_the_words(pages: dict[str, str]) -> None:
     for said in ("Bodies: 1.24.", "It grows with the power 1.24; of 11.24 and 1.245 nothing is said."):
         part = Part(said, MIXED, quantities=((BODIES, "1.24"),))
         assert prose(part.sentence, marks(part)).count(f'<data value="{BODIES}" data-verdict="mixed">1.24</data>') == 1
-    with pytest.raises(ArgumentError, match="stands in"):
+    with pytest.raises(ArgumentError, match="is part of"):
         Part("Bodies: 1.29.", MIXED, quantities=((BODIES, "1.24"),))
-    with pytest.raises(ArgumentError, match="stands in"):
+    with pytest.raises(ArgumentError, match="is part of"):
         finding_of("k", "k", "", "Bodies: 11.24, 1.245 and 1324.", [], quantities=((BODIES, "1.24"),))
     with pytest.raises(ArgumentError, match="exponent of bodies"):
         Part("1", MIXED, quantities=(("exponent of bodys", "1"),))

@@ -64,8 +64,8 @@ def test_strips_show_every_joule(topic: Finding, measures: list[dict[str, Any]])
     strips = scenes_ledger.strips(topic.tables["books over time"])
     for strip, found in zip(strips, measures, strict=True):
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
-        left_open = found["open: motion"] + found["open: springs"]
-        assert gap == pytest.approx(left_open, abs=1e-9 * found["energy turned over"])
+        left_open = found["residual: motion"] + found["residual: springs"]
+        assert gap == pytest.approx(left_open, abs=1e-9 * found["energy exchanged"])
         assert strip.struck.any() == (found["impacts"] > 0)
         assert not strip.at_rest
 

@@ -22,7 +22,7 @@ LEAD = (
 )
 # Optional folder of contact problems by others, next to the project. A clone does not need it.
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
-FOLDER_NAME = "problems of others"
+FOLDER_NAME = "published problems"
 
 
 def complementarity(run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:

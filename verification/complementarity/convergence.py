@@ -154,7 +154,8 @@ def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float)
     worth = bound.position, bound.velocity * case.duration + jumps
     for error, measured in zip(worth, (position, velocity), strict=True):
         if error > max(WORTH * measured, _ROUNDING) * last:
-            raise SolverError(f"{case.scene}: no truth: known to {error:.1e}, the steps err by {measured * last:.1e}")
+            raise SolverError(f"{case.scene}: no reference: its error is {error:.1e}, "
+                              f"that of the steps {measured * last:.1e}")
     return worth
 
 

@@ -174,4 +174,4 @@ def _check(case: ImpactCase, run: Run, blow: _GroupImpact) -> None:
     scale = float(np.abs(case.velocity).max()) or 1.0
     if np.abs(impact.velocity - blow.v_plus).max() > _REBUILT * scale:
         where = f"the impact in step {blow.step} of {run.scene_name}"
-        raise IapbError(f"{where} cannot be rebuilt from its run: velocities differ")
+        raise IapbError(f"{where}, rebuilt from its run, has other velocities than recorded; simulate the run again")

@@ -115,7 +115,7 @@ def friction(study: ComparisonStudy) -> Table:
         for c in study.friction
     )  # fmt: skip
     return titled(
-        ("e", "μ", "cases", "all contacts push", "of these as the NCP", "friction reduced", "unsolved", "NCP gains",
+        ("e", "μ", "cases", "all contacts push", "share equal to the NCP", "friction reduced", "unsolved", "NCP gains",
          "CCP gains", "largest change of KE, IAPB", "NCP", "CCP", "median distance from the NCP"), rows, 2,
         "Changes of energy relative to KE⁻; positive values are gains.")  # fmt: skip
 

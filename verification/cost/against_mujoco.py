@@ -36,14 +36,14 @@ RACE_COLUMNS = (
     Column("scene", condition=True),
     Column("MuJoCo's form", condition=True),
     Column("MuJoCo's solver", condition=True),
-    Column("our contacts"),
-    Column("its contacts"),
-    Column("its step", "µs", timed=True),
+    Column("iapb's contacts"),
+    Column("MuJoCo's contacts"),
+    Column("MuJoCo's step", "µs", timed=True),
     Column("ratio", timed=True),
     Column("quartiles", timed=True),
-    Column("asked for"),
-    Column("we moved", timed=True),
-    Column("it moved", timed=True),
+    Column("target"),
+    Column("iapb's drift", timed=True),
+    Column("MuJoCo's drift", timed=True),
 )
 RACE_NOTE = (
     "Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. The "
@@ -76,7 +76,7 @@ def race_mujoco(
 def fastest_of_theirs(races: Table) -> list[Row]:
     """Return the row with MuJoCo's fastest solver for each scene and form."""
     by: dict[tuple[str, str], Row] = {}
-    for race in sorted(races.records(), key=lambda race: float(race["its step"])):
+    for race in sorted(races.records(), key=lambda race: float(race["MuJoCo's step"])):
         by.setdefault((race["scene"], race["MuJoCo's form"]), race)
     return list(by.values())
 
@@ -89,10 +89,11 @@ def _race(scene: RestingScene, rounds: int, steps: int) -> list[Row]:
     for (form, solver), other in theirs.items():
         ratio = times["ours"].over(times[form, solver])
         found.append({
-            "scene": scene.name, "MuJoCo's form": form, "MuJoCo's solver": solver, "our contacts": ours.contacts,
-            "its contacts": other.contacts, "its step": 1e6 * times[form, solver].median, "ratio": ratio.median,
-            "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
-            "asked for": TARGETS.get(scene.name, SPATIAL_TARGET), "we moved": ours.moved, "it moved": other.moved,
+            "scene": scene.name, "MuJoCo's form": form, "MuJoCo's solver": solver, "iapb's contacts": ours.contacts,
+            "MuJoCo's contacts": other.contacts, "MuJoCo's step": 1e6 * times[form, solver].median,
+            "ratio": ratio.median, "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
+            "target": TARGETS.get(scene.name, SPATIAL_TARGET), "iapb's drift": ours.moved,
+            "MuJoCo's drift": other.moved,
         })  # fmt: skip
     return found
 

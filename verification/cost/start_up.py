@@ -31,7 +31,7 @@ COLUMNS = (
     Column("on the wall", "s", timed=True),
     Column("computing", "s", timed=True),
     Column("processes"),
-    Column("asked for", "s"),
+    Column("target", "s"),
 )
 
 

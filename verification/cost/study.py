@@ -209,12 +209,12 @@ def _say_races(tables: Tables) -> Iterator[Part]:
     for scene in dict.fromkeys(races.column("scene")):
         forms = [race for race in chosen if race["scene"] == scene]
         texts = [
-            "{ratio:.2g} times MuJoCo's time with {MuJoCo's form} ({its contacts:.0f} contacts, solver "
+            "{ratio:.2g} times MuJoCo's time with {MuJoCo's form} ({MuJoCo's contacts:.0f} contacts, solver "
             "{MuJoCo's solver}, quartiles {quartiles})".format_map(race) for race in forms
         ]  # fmt: skip
-        met = all(race["ratio"] <= race["asked for"] for race in forms)
+        met = all(race["ratio"] <= race["target"] for race in forms)
         missed = "" if met else f" Largest parts of the step: {_largest_parts(tables['parts of a step'], scene)}."
-        ours, target = (forms[0][key] for key in ("our contacts", "asked for"))
+        ours, target = (forms[0][key] for key in ("iapb's contacts", "target"))
         yield _part(
             f"{scene.capitalize()}, at rest: a recorded step of the engine, with {ours:.0f} contacts, takes "
             f"{'; '.join(texts)}. Target: at most {target:g}.{missed}", met,
@@ -387,8 +387,8 @@ def _say_start(tables: Tables) -> Iterator[Part]:
     for row in tables["start"].records():
         yield _part(
             f"{row['what']} takes {row['on the wall']:.2f} s of wall time and {row['computing']:.2f} s of CPU time. "
-            f"Target: less than {row['asked for']:g} s of CPU time.", row["computing"] < row["asked for"],
-            miss=f"{row['what']} takes {row['computing']:.2f} s of CPU time (target {row['asked for']:g} s)",
+            f"Target: less than {row['target']:g} s of CPU time.", row["computing"] < row["target"],
+            miss=f"{row['what']} takes {row['computing']:.2f} s of CPU time (target {row['target']:g} s)",
         )  # fmt: skip
 
 

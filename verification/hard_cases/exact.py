@@ -140,7 +140,7 @@ def _coulomb(slip: Fraction, inertia: Fraction, p_n: Fraction, across: Fraction,
         p_t = -sign * mu * p_n / (1 - sign * mu * across)
         if (slip + inertia * p_t) * sign > 0 and p_n - across * p_t > 0:
             return p_t
-    raise ArithmeticError("neither stick nor slip: not a case of this law")
+    raise ArithmeticError("the contact neither sticks nor slips: this exact law has no solution here")
 
 
 def _certified_root(square: Fraction) -> Fraction:
@@ -152,7 +152,7 @@ def _certified_root(square: Fraction) -> Fraction:
         flint.ctx.prec = _ROOT_BITS
         ball: Any = flint.arb(flint.fmpq(square.numerator, square.denominator)).sqrt()
         if not ball.rel_accuracy_bits() > _ROOT_BITS - 20:
-            raise ArithmeticError("the root's ball is wide")
+            raise ArithmeticError(f"the interval of the square root is too wide at {_ROOT_BITS} bits")
         mantissa, exponent = ball.mid().man_exp()
     finally:
         flint.ctx.prec = before

@@ -88,7 +88,7 @@ def _judged(name: str, simulate: Simulate, failures: list[Failure]) -> Finding:
         case = HARD_CASES[name]()
     except CaseAbsent as absent:
         return Finding(name, name.replace("_", " "), "", str(absent), NOT_COMPUTED,
-                       details={"source": "problems of others"})  # fmt: skip
+                       details={"source": "published problems"})  # fmt: skip
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
     rows = [_row(found) for found in judge_hard_cases(cases=[name], simulate=simulate, failures=failures)]
     table = table_of(COLUMNS, rows, digits=2, note=_NOTES[kind])

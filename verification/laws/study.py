@@ -191,7 +191,7 @@ def printed_formula() -> Finding:
     report = check_passivity(resolver, impacts=COUNTER_IMPACTS, search=SEARCH)
     verdict, case = report.verdict("kinetic_energy"), report.counterexample
     if case is None or report.counterexample_law != "kinetic_energy":
-        raise IapbError(f"the kit found no gain of the printed formula in {COUNTER_IMPACTS} impacts and adverse ones")
+        raise IapbError(f"in {COUNTER_IMPACTS} random impacts and the adverse ones the printed formula gains no energy")
     answer = resolver(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).velocity
     gain = relative_energy_gain(case.mass_matrix, case.velocity, answer)
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
@@ -211,7 +211,7 @@ def restitution_per_contact() -> Finding:
     report = check_passivity(resolver, impacts=COUNTER_IMPACTS // 2, search=SEARCH, unequal_restitution=True)
     verdict, case = report.verdict("unequal_kinetic_energy"), report.counterexample
     if case is None:
-        raise IapbError("the kit found no gain of one restitution per contact, which exact arithmetic says is there")
+        raise IapbError("the kit found no impact in which restitution per contact gains energy")
     answer = resolver(case.mass_matrix, case.contact_jacobian, case.velocity, case.given_restitution())
     sentence = (
         f"Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "

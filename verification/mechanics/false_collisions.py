@@ -119,7 +119,7 @@ def count_false(scene: Scene, simulate: Simulate = simulate) -> FalseCollisions:
 def filters_table(found: Sequence[FalseCollisions]) -> Table:
     """Return a table with one row per run of the socket."""
     columns = ("filters", "damping [N s/m]", "false collisions", "contacts taken as new", "doubled contacts",
-               "steps off the facets", "energy lost [J]", "lost, of the fall")  # fmt: skip
+               "steps off the facets", "energy lost [J]", "energy lost, share of the fall")  # fmt: skip
     rows = [(f.setting, f.damping, f.collisions, f.new_contacts, f.doubled, f.lifted, f.energy_lost,
              f.energy_lost / f.potential_drop) for f in found]  # fmt: skip
     return titled(columns, rows, digits=3, note="The ball rolls for two seconds. In the round socket it has one "
@@ -132,7 +132,8 @@ def times_table(found: Sequence[FalseCollisions]) -> Table:
         (f.setting, f.damping, time, count, sum(f.losses[:count]) / f.potential_drop)
         for f in found for count, time in enumerate(f.times, start=1)
     ]  # fmt: skip
-    columns = ("filters", "damping [N s/m]", "time [s]", "false collisions so far", "lost so far, of the fall")
+    columns = ("filters", "damping [N s/m]", "time [s]", "false collisions so far",
+               "energy lost so far, share of the fall")
     return titled(columns, rows)
 
 

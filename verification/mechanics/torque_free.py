@@ -38,7 +38,7 @@ class TorqueFreeBody:
         if not 0.0 < i1 < i2 < i3:
             raise ArgumentError("moments", self.moments, "0 < I1 < I2 < I3")
         if self.momentum**2 <= 2.0 * self.energy * i2:
-            raise ArgumentError("third_rate", self.third_rate, "fast enough to tumble about the third axis")
+            raise ArgumentError("third_rate", self.third_rate, "a faster rotation, with 2 E I2 < L²")
 
     @property
     def energy(self) -> float:

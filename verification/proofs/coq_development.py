@@ -178,7 +178,7 @@ def _run(command: list[str], folder: Path) -> str:
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE)
     except subprocess.TimeoutExpired:
-        raise IapbError(f"{' '.join(command)}: no end within {PATIENCE:g} s") from None
+        raise IapbError(f"{' '.join(command)}: did not finish within {PATIENCE:g} s") from None
     if done.returncode:
         raise IapbError(f"{' '.join(command)}: {' '.join(done.stderr.split())}")
     return done.stdout

@@ -228,7 +228,7 @@ class _Script:
                 return proof
             if fact.T == wanted:
                 return f"(f_equal tr {proof})"
-        raise Refused(f"the step leans on '{wanted.name}', which nobody established")
+        raise Refused(f"the step uses '{wanted.name}', which no earlier step proves")
 
 
 def _expressions(statement: Statement) -> Iterable[Expression]:

@@ -125,7 +125,7 @@ class Known:
             if fact == wanted or (isinstance(fact, Equation) and fact.T == wanted):
                 self.used.add(fact.name)
                 return
-        raise Refused(f"the step leans on '{wanted.name}', which nobody established")
+        raise Refused(f"the step uses '{wanted.name}', which no earlier step proves")
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Positivity:
             if any(factor.value.rows != "*" for factor in term.factors):
                 raise Refused(f"'{self.claim.name}': a factor that is not a commuting scalar")
             if isinstance(term.form, Pairing) and not term.form.value.is_scalar:
-                raise Refused(f"'{self.claim.name}': entrywise products only show that a number is not negative")
+                raise Refused(f"'{self.claim.name}': entrywise products only prove that a scalar is not negative")
             for fact in term.facts:
                 known.require(fact)
             remainder = remainder - term.value
@@ -233,7 +233,7 @@ def _require_zero(name: str, value: Expression, cofactors: Iterable[Cofactor]) -
     for cofactor in cofactors:
         value = value - cofactor.value
     if not value.vanishes():
-        raise Refused(f"'{name}': the certificate leaves {len(value.canonical().terms)} terms")
+        raise Refused(f"'{name}': {len(value.canonical().terms)} terms remain after the certificate is expanded")
 
 
 MOST_REPLACEMENTS = 2000  # a proof needs some dozens; beyond this limit the rules run in a circle
@@ -248,7 +248,7 @@ def rewritten(value: Expression, rules: Sequence[Equation]) -> tuple[Expression,
             return value, tuple(cofactors)
         cofactors.append(cofactor)
         value = value - cofactor.value
-    raise Refused("the rewriting rules run in a circle")
+    raise Refused(f"the rewriting rules form a cycle: more than {MOST_REPLACEMENTS} replacements")
 
 
 def identity(
@@ -266,7 +266,7 @@ def identity(
         remainder = remainder - cofactor.value
     rest, cofactors = _reduced(remainder, rules)
     if not rest.vanishes():
-        raise Refused(f"'{name}': rewriting leaves {len(rest.canonical().terms)} terms")
+        raise Refused(f"'{name}': {len(rest.canonical().terms)} terms remain after rewriting")
     return Identity(claim, (*first, *cofactors), because)
 
 
@@ -280,7 +280,7 @@ def positivity(
         remainder = remainder - term.value
     rest, cofactors = _reduced(remainder, rules)
     if not rest.vanishes():
-        raise Refused(f"'{name}': rewriting leaves {len(rest.canonical().terms)} terms")
+        raise Refused(f"'{name}': {len(rest.canonical().terms)} terms remain after rewriting")
     return Positivity(claim, tuple(terms), cofactors, because)
 
 

@@ -32,11 +32,11 @@ ORDER_SLACK = 0.25  # tolerance below the declared order, because collision time
 BOOK = (
     "kinetic, start [J]", "potential, start [J]", "in contact springs, start [J]", "kinetic, end [J]",
     "potential, end [J]", "in contact springs, end [J]", "work of the hand [J]", "work of the coupling [J]",
-    "lost in impacts [J]", "lost in contact damping [J]", "lost in friction [J]", "open: motion [J]",
-    "open: springs [J]", "energy turned over [J]", "open by size, share of the energy turned over [%]",
+    "lost in impacts [J]", "lost in contact damping [J]", "lost in friction [J]", "residual: motion [J]",
+    "residual: springs [J]", "energy exchanged [J]", "residual by size, share of the energy exchanged [%]",
     "most energy beyond what was put in [%]",
 )  # fmt: skip
-OPEN_SHARE, GAIN_SHARE = "open by size, share of the energy turned over", "most energy beyond what was put in"
+OPEN_SHARE, GAIN_SHARE = "residual by size, share of the energy exchanged", "most energy beyond what was put in"
 _HELD = ("kinetic", "potential", "in contact springs")
 
 
@@ -89,9 +89,9 @@ def energy_book(run: Run) -> dict[str, float]:
         "lost in impacts": float(series.lost_impacts[-1]) + 0.0,  # + 0.0 turns −0.0 into 0.0
         "lost in contact damping": float(series.lost_damping[-1]) + 0.0,
         "lost in friction": float(series.lost_friction[-1]) + 0.0,
-        "open: motion": float(ledger["integration_residual"][-1]),
-        "open: springs": work_of_springs + float(series.springs[-1] - series.springs[0]),
-        "energy turned over": turned,
+        "residual: motion": float(ledger["integration_residual"][-1]),
+        "residual: springs": work_of_springs + float(series.springs[-1] - series.springs[0]),
+        "energy exchanged": turned,
     }  # fmt: skip
     gain = float((held - held[0] - series.given).max())
     return book | {OPEN_SHARE: 100 * share(left_open(book), turned), GAIN_SHARE: 100 * share(gain, turned)}
@@ -113,7 +113,7 @@ def share(part: float, whole: float) -> float:
 
 def left_open(book: Book) -> float:
     """Return the energy residual [J]: the sum of the absolute residuals of motion and springs."""
-    return abs(book["open: motion"]) + abs(book["open: springs"])
+    return abs(book["residual: motion"]) + abs(book["residual: springs"])
 
 
 def total(book: Book, when: str) -> float:
@@ -123,7 +123,7 @@ def total(book: Book, when: str) -> float:
 
 def is_rounding(book: Book) -> bool:
     """Whether the energy residual is at most the rounding of the energies."""
-    scale = max(abs(total(book, "start")), abs(total(book, "end")), book["energy turned over"])
+    scale = max(abs(total(book, "start")), abs(total(book, "end")), book["energy exchanged"])
     return left_open(book) <= ROUNDING * scale
 
 

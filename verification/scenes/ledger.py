@@ -63,11 +63,11 @@ WIDE = 2.0  # [%] of the energy exchanged, above which the sentence gives both c
 
 CONTACTS = titled((
     "scene", "dimensions", "steps", "step [ms]", "most penetration [mm]", "thinnest moving shape [mm]", "impacts",
-    "most rows in one impact", "most energy added by an impact, share of the energy turned over",
-    "most contacts in one step", "how it ends", "energy turned over [J]",
+    "most rows in one impact", "most energy added by an impact, share of the energy exchanged",
+    "most contacts in one step", "how it ends", "energy exchanged [J]",
 )).columns
 LEDGER = titled(("scene", *BOOK)).columns
-_ADDED = "most energy added by an impact, share of the energy turned over"
+_ADDED = "most energy added by an impact, share of the energy exchanged"
 _SERIES = ("kinetic", "potential", "springs", "given", "lost_impacts", "lost_damping", "lost_friction")
 
 
@@ -121,7 +121,7 @@ def finding(
 def measure(run: Run) -> dict[str, Any]:
     """Return one row of both tables."""
     book = energy_book(run)
-    turned = book["energy turned over"]
+    turned = book["energy exchanged"]
     return {
         "scene": run.scene_name, "dimensions": getattr(scene_of(run), "dimensions", 2), "steps": run.steps,
         "step": 1e3 * run.dt, "most penetration": 1e3 * float(np.maximum(-run.contacts.gap, 0.0).max(initial=0.0)),
@@ -164,11 +164,11 @@ def contacts(measures: Sequence[Measure]) -> Table:
 def ledger(measures: Sequence[Measure]) -> Table:
     """Return the table with the energy balance of each run."""
     note = (
-        "End − start = work of hand and coupling − losses + open. Open is the residual: energy that time stepping "
+        "End − start = work of hand and coupling − losses + residual. The residual is energy that time stepping "
         "created (> 0) or lost (< 0). Its part in the motion comes from forces held constant over a step, its part in "
         "the springs from evaluating them once a step; the share adds both absolute values. A loss is also a force "
         "times a path with the force held over each step, so it can come out slightly negative. Shares are of the "
-        "energy exchanged (turned over): the largest of kinetic energy, range of the potential energy, work of the "
+        "energy exchanged: the largest of kinetic energy, range of the potential energy, work of the "
         "hand and work of the coupling."
     )
     return table_of(LEDGER, measures, digits=3, note=note)
@@ -177,18 +177,18 @@ def ledger(measures: Sequence[Measure]) -> Table:
 def left_open_table(books: Sequence[OpenBooks]) -> Table:
     """Return the energy residuals at decreasing steps, their order, and the step at which they fall to WORTH_NAMING."""
     refinements: tuple[int, ...] = max((each.refinements for each in books), key=len, default=())
-    headings = ["open at the scene's step [%]" if k == 1 else f"at 1/{k} of it [%]" for k in refinements]
+    headings = ["residual at the scene's step [%]" if k == 1 else f"at 1/{k} of this step [%]" for k in refinements]
     rows = [
         (each.scene, *(100 * value for value in each.open_shares),
          *(None,) * (len(refinements) - len(each.open_shares)), each.declared_order, each.order, 1e3 * each.step,
          _milliseconds(each))
         for each in books
     ]  # fmt: skip
-    note = ("Open: residual of the energy balance, absolute values of motion and springs added. No order: the residual "
-            f"is rounding, and no shorter step was tried. The step that leaves {WORTH_NAMING:g} % open is the longest "
-            "one tried that does, or is extrapolated with the measured order.")
+    note = ("Residuals of the energy balance, absolute values of motion and springs added. No order: the residual "
+            f"is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is the longest "
+            "one tried that reaches it, or is extrapolated with the measured order.")
     columns = ("scene", *headings, "order declared", "order measured", "the scene's step [ms]",
-               f"step that leaves {WORTH_NAMING:g} % open [ms]")  # fmt: skip
+               f"step for a residual of {WORTH_NAMING:g} % [ms]")  # fmt: skip
     return titled(columns, rows, digits=3, note=note)
 
 
@@ -263,7 +263,7 @@ def _open(measures: Sequence[Measure], books: Sequence[OpenBooks]) -> Part:
                     REPRODUCED)  # fmt: skip
     of = {each.scene: each for each in books}
     said = "; ".join(
-        f"{m['scene']} {_open_share(m):.1f} % of {m['energy turned over']:.3g} J "
+        f"{m['scene']} {_open_share(m):.1f} % of {m['energy exchanged']:.3g} J "
         f"({_channels(m)}{_gone(of[m['scene']])})" for m in wide
     )  # fmt: skip
     return Part(
@@ -278,7 +278,7 @@ def _channels(m: Measure) -> str:
     """Return both channels of a large energy residual in words, in joules with their signs; "" for a small one."""
     if _open_share(m) <= WIDE:
         return ""
-    found = ((name, float(m[f"open: {name}"])) for name in ("motion", "springs"))
+    found = ((name, float(m[f"residual: {name}"])) for name in ("motion", "springs"))
     words = (f"{name} {abs(value):.2g} J {'created' if value > 0 else 'lost'}" for name, value in found)
     return f"{', '.join(words)}; "
 
@@ -309,7 +309,7 @@ def _gains(measures: Sequence[Measure]) -> Part:
 def _floor(m: Measure) -> float:
     """Return the rounding error of the total energy as a share of the energy exchanged."""
     held = max(abs(total(m, "start")), abs(total(m, "end")))
-    return ROUNDING * held / m["energy turned over"] if m["energy turned over"] else np.inf
+    return ROUNDING * held / m["energy exchanged"] if m["energy exchanged"] else np.inf
 
 
 def _endings(measures: Sequence[Measure]) -> Part:

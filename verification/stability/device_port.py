@@ -40,7 +40,7 @@ _STEPS = 200
 COLUMNS = titled((
     "world", "stiffness [N/m]", "damping [N s/m]", "sensors", "the hand", "KT/2 + |B| [N s/m]",
     "with the coordination's gains [N s/m]", "damping needed [N s/m]", "needed / bound", "leak at the bound [mJ]",
-    "of what was turned over",
+    "leak / energy exchanged",
 )).columns  # fmt: skip
 
 
@@ -76,7 +76,7 @@ def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...])
         "world": loop.world, "stiffness": loop.stiffness, "damping": loop.damping, "sensors": sensors,
         "the hand": kind, "KT/2 + |B|": loop.bound, "with the coordination's gains": loop.bound_with_coordination,
         "damping needed": needed, "needed / bound": needed / loop.bound, "leak at the bound": 1e3 * leak,
-        "of what was turned over": leak / turned_over if leak else 0.0,
+        "leak / energy exchanged": leak / turned_over if leak else 0.0,
     }  # fmt: skip
 
 

@@ -211,9 +211,9 @@ def _worlds_table(
                      1e6 * found.seconds, found.seconds / fastest))  # fmt: skip
     far_titles = [f"{name}, {which} [{_UNITS[name]}]" for name in DISTANCES for which in ("rms", "most", "end")]
     return titled(
-        ("world", "law", "ignores", "until [s]", *far_titles, "kinetic energy at the end [J]", "work done [J]",
-         "energy lost [J]", "most above start and work [J]", "deepest overlap [mm]", "impacts", "time per step [µs]",
-         "times the fastest"), rows, 3,
+        ("world", "law", "ignores", "simulated until [s]", *far_titles, "kinetic energy at the end [J]",
+         "work done [J]", "energy lost [J]", "most above start and work [J]", "deepest overlap [mm]", "impacts",
+         "time per step [µs]", "times the fastest"), rows, 3,
         f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. Impulse: "
         f"{impulse}. Lost: start and work done, minus the end. The time is the processor's, without set-up.",
         timed=("time per step [µs]", "times the fastest"))  # fmt: skip

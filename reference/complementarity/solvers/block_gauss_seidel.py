@@ -80,4 +80,4 @@ def solve(problem: ImpactProblem) -> Answer:
         np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero, problem.two_sided,
         inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), _SWEEPS, _STILL * velocity_scale(problem),
     )  # fmt: skip
-    return Answer(p, f"still after {done} sweeps" if done >= 0 else f"not still after {_SWEEPS} sweeps")
+    return Answer(p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {_SWEEPS} sweeps")

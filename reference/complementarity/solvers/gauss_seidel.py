@@ -50,7 +50,7 @@ def solve(problem: ImpactProblem) -> Answer:
     if (np.diag(problem.delassus) < 0.0).any():
         raise SolverError("refused: W has a negative diagonal entry")
     p, done = _projected(problem.delassus, problem.offset, problem.two_sided, velocity_scale(problem))
-    return Answer(p, f"still after {done} sweeps" if done >= 0 else "not still after the last sweep")
+    return Answer(p, f"converged after {done} sweeps" if done >= 0 else "not converged after the last sweep")
 
 
 def multipliers(rows: Floats, offset: Floats) -> Floats:

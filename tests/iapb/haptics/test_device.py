@@ -250,7 +250,7 @@ def test_what_it_is_told_is_within_the_scenes_limits():
 
 
 def test_a_device_needs_a_coupling_and_a_tool_of_constant_inertia():
-    with pytest.raises(ArgumentError, match="device = .*none without a coupling"):
+    with pytest.raises(ArgumentError, match="device = .*None, or a coupling"):
         Simulation(PEG, device=Reads(np.zeros(3)))
     with pytest.raises(ArgumentError, match="read.* and apply"):
         Simulation(PEG, LAW, coupling_of(PEG, "four-channel"), device=object())

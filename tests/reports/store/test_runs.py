@@ -189,7 +189,7 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
         read_run(tmp_path / "absent.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
-    with pytest.raises(RunFileError, match="not of iapb"):
+    with pytest.raises(RunFileError, match="not written by iapb"):
         read_run(tmp_path / "other.h5")
     (tmp_path / "other.h5").write_bytes(sealed((tmp_path / "other.h5").read_bytes()))
     with pytest.raises(RunFileError, match="expected 'iapb run'"):

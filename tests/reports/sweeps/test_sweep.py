@@ -115,7 +115,7 @@ def test_a_scheduler_that_dies_is_told_in_one_sentence_and_what_was_done_is_kept
         while not place.is_file():
             time.sleep(0.05)
         address = json.loads(place.read_text())["address"]
-        with pytest.raises(IapbError, match="the scheduler at tcp://127.0.0.1:.* is gone; what was done is kept"):
+        with pytest.raises(IapbError, match="the scheduler at tcp://127.0.0.1:.* no longer answers; finished"):
             do_missing([0.2] * 50, time.sleep, keep, done=lambda part: False, scheduler=cluster(address),
                        progress=lambda done, total: None)  # fmt: skip
     finally:

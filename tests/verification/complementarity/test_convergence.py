@@ -70,7 +70,7 @@ def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.Mo
     found = scene_truth(load_scene(find_scene("two_discs")), 0.2)
     vague = replace(found, bound=found.bound._replace(position=1e-4))
     monkeypatch.setattr(convergence, "scene_truth", lambda *_: vague)
-    with pytest.raises(SolverError, match="known to 1.0e-04"):
+    with pytest.raises(SolverError, match="its error is 1.0e-04"):
         converge(BY_SCENE["two_discs"])
 
 

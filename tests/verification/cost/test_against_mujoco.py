@@ -46,14 +46,14 @@ def test_our_scene_rests_and_carries_the_load(name: str) -> None:
 def test_a_race_states_contacts_of_both_and_keeps_every_solver() -> None:
     pytest.importorskip("mujoco")
     races = race_mujoco([SCENES["peg in the corner"]], rounds=3, steps=32)
-    assert {(race["MuJoCo's form"], race["its contacts"]) for race in races.records()} == {
+    assert {(race["MuJoCo's form"], race["MuJoCo's contacts"]) for race in races.records()} == {
         ("box", 8.0), ("four corner balls", 4.0)}  # fmt: skip
     assert set(races.column("MuJoCo's solver")) == set(against_mujoco.SOLVERS)
-    assert set(races.column("our contacts")) == {4.0} and max(races.column("it moved")) < 1e-6
+    assert set(races.column("iapb's contacts")) == {4.0} and max(races.column("MuJoCo's drift")) < 1e-6
 
 
 def test_the_fastest_solver_counts() -> None:
-    keys = ("scene", "MuJoCo's form", "MuJoCo's solver", "its step")
+    keys = ("scene", "MuJoCo's form", "MuJoCo's solver", "MuJoCo's step")
     races = titled(keys, [("a", "box", "slow", 9.0), ("a", "box", "fast", 3.0), ("a", "box", "middle", 5.0)])
     assert [race["MuJoCo's solver"] for race in fastest_of_theirs(races)] == ["fast"]
 

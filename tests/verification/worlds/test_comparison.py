@@ -93,7 +93,7 @@ def test_a_world_that_stops_early_is_compared_until_then_and_said(monkeypatch):
     monkeypatch.setattr(comparison, "run_world", stops)
     short = SLOPE.with_values({"duration": 0.02})
     found = compare_worlds(short, ["IAPB", "PB", "ideal"], "IAPB", impacts=0)
-    assert row(found, "PB")["until"] == pytest.approx(0.007)
+    assert row(found, "PB")["simulated until"] == pytest.approx(0.007)
     assert len(found.tables["over time"].where(world="PB").rows) == 8
     assert row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]  # nearest, for it stopped
     assert "Closest to IAPB is ideal" in found.answer and "Not ranked: PB stopped after 0.007 s" in found.answer
