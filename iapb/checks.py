@@ -405,9 +405,9 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
 def _degrees(scene: Scene) -> Iterator[Caution]:
     """Warn of angles that look like degrees: whole numbers beyond one turn.
 
-    Such numbers are not plausible in radians: a placement needs no more than one turn, and the end of another run is
-    not a whole number. A joint may turn often, so for its start and its limits only multiples of 45 count (45 rad are
-    seven turns).
+    Such numbers are not plausible in radians: a placement needs at most one turn, and an angle copied from the end of
+    another run is rarely a whole number. A joint may turn several times, so its start and limits raise a warning only
+    if they are multiples of 45 (45 rad are seven turns).
     """
     for path, angle, unit in _angles(scene):
         if abs(angle) > math.tau and angle % unit == 0.0:

@@ -116,7 +116,7 @@ def _sank(run: Run) -> str:
 
 
 def _passed(run: Run) -> str:
-    """Say which circle or ball passes through a flat-faced wall within a step: its centre enters and leaves it."""
+    """Return a sentence on a ball or circle whose centre enters and leaves a flat-faced wall in one step, or ""."""
     scene = run.scene_resolved
     walls = [(wall["name"], *_faces(wall)) for wall in scene.get("walls", ()) if "size" in wall or "vertices" in wall]
     if not walls or not run.steps or len(scene.get("bodies", ())) != len(run.body_names):

@@ -210,8 +210,8 @@ def _restitution(system: Any, found: ContactRows) -> float | Floats:
 def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
     """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to them (W_ij ≠ 0).
 
-    Without the connected contacts, the middle of a cradle would react with a force, and the impact alone could gain
-    energy.
+    Without the connected contacts, the inner contacts of a cradle would act by forces and not by impulses, and the
+    impact considered alone could gain energy.
     """
     from scipy.sparse.csgraph import connected_components
 

@@ -244,7 +244,7 @@ def _covered(box: Box, points: Points) -> float:
 
 
 def _near(place: Points, others: Points) -> bool:
-    """Return whether another curve is so close that a name could belong to either."""
+    """Return whether another curve is so close that a name beside it could be read as the name of either curve."""
     return bool(len(others)) and float(np.min(np.hypot(*(others - place).T))) < _GAP
 
 

@@ -57,7 +57,7 @@ def study_many_bodies(counts: Sequence[int] = COUNTS, failures: list[Failure] | 
 
 
 def _cost(n: int) -> dict[str, Any]:
-    """Repeat the same steps and add the least time of each chunk: other processes can only make a chunk slower."""
+    """Time the same steps several times; each chunk counts with its least time, as other processes only add time."""
     simulation = Simulation(scene_from_text(field_of_discs(n)))
     sizes = (simulation.system.mechanism.nq, simulation.system.mechanism.nv, 0, 0)
     simulation.advance_chunk(make_record(1, sizes, simulation.system.capacity, n), 1)  # compiles

@@ -320,7 +320,8 @@ def _measure_rod(run: Run) -> Measured:
     """Measure the largest error of the slip speed until it stops, relative to the initial slip speed.
 
     A rigid world must have no slip after the first step, except for the rotation of the rod within a step. With springs
-    a first-order step may be late or early by one step, so the bound is the largest change of the slip in a step.
+    a first-order method may start or stop the slip one step late or early, so the bound is the largest change of the
+    slip speed in one step.
     """
     slip = run.v[:, 0] + 0.5 * np.sin(run.q[:, 2]) * run.v[:, 2]
     end, truth = _slipping()

@@ -1,4 +1,4 @@
-"""The Coq side of `second_tool`: the spelling of words in Coq, and the ring with transposition that contains them."""
+"""The Coq side of `second_tool`: how expressions are written in Coq, and the ring with transposition they belong to."""
 
 from __future__ import annotations
 

@@ -110,8 +110,8 @@ def compare_worlds(
             if (found := attempt(f"world {name}", partial(_run, scene, name, say), failures)) is not None}  # fmt: skip
     if against not in runs:
         reason = next((one.reason for one in failures if one.case == f"world {against}"), "")
-        raise IapbError(f"{scene.name} cannot be simulated in the world {against}, which others were to be compared "
-                        f"with: {reason}; name another with against")
+        raise IapbError(f"{scene.name} cannot be simulated in the reference world {against}: {reason}; "
+                        "choose another with `against`")
     mechanism = mechanism_of(scene)
     impulse = RESULTANT if mechanism.has_constant_mass_matrix else GENERALIZED
     unfit = {name: why for name, found in runs.items() if (why := _unfit(scene, found.run))}

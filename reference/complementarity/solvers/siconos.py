@@ -88,7 +88,7 @@ class _Worker:
             raise SolverError(f"Siconos ended without an answer: {error}") from error
 
     def line(self) -> bytes:
-        """The next line, or ValueError where none comes in time."""
+        """Return the next line; raise ValueError if none arrives in time."""
         ready, _, _ = select.select([self.of], [], [], _LONGEST)
         line = self.of.readline() if ready else b""
         if not line:

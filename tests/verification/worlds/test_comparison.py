@@ -82,7 +82,7 @@ def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
     assert found.tables["worlds"].column("world") == ["IAPB", "ideal"]
     assert found.verdict == NOT_COMPUTED
     assert [(one.case, one.reason) for one in found.failures] == [("world PB", "no solution")]
-    with pytest.raises(IapbError, match="cannot be simulated in the world PB.*no solution"):
+    with pytest.raises(IapbError, match="cannot be simulated in the reference world PB.*no solution"):
         compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0)
 
 
