@@ -29,7 +29,9 @@ _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _RUNS = (Column("run"), Column("law"), Column("impacts"), Column("gains"), Column("largest gain"),
          Column("M Δv − impulse"), Column("Jᵀp − impulse"), Column("restitution"), Column(HOLDS))  # fmt: skip
 _FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("moved"), Column("cancelled"),
-             Column("median price"), Column("largest price"), Column(HOLDS))  # fmt: skip
+             Column("median energy cost"), Column("largest energy cost"), Column(HOLDS))  # fmt: skip
+_NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts without any passive step, so v⁺ = v⁻. Energy "
+         "cost: the loss at e = 1 beyond that of the same impact without clamp, in units of 10 d ε √κ(M).")
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
@@ -49,8 +51,8 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         progress(len(files) + done, len(files) + len(FAMILIES))
         one = exact_energy(family, _DRAWN[depth])
         drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
-                      "cancelled": one.cancelled, "median price": _known(one.price[0]),
-                      "largest price": _known(one.price[2]), HOLDS: one.holds})
+                      "cancelled": one.cancelled, "median energy cost": _known(one.price[0]),
+                      "largest energy cost": _known(one.price[2]), HOLDS: one.holds})
     certified = ("impacts certified", f"{_sum(rows, 'impacts'):,}")
     provoked = ("adverse impacts certified", f"{_sum(drawn, 'impacts'):,}")
     recorded = (f"{_sum(rows, 'gains')} of {certified[1]} impacts in {len(rows):,} runs of the engine "
@@ -62,7 +64,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows), quantities=(certified,)),
              Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn]),
                   quantities=(provoked,)))  # fmt: skip
-    tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn)}
+    tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn, note=_NOTE)}
     question = "Does any impact gain energy, even in the last bit?"
     return finding_of("exact-energy", "Exact energy", question, f"{recorded}; {adverse}.", parts, tables, failures,
                       (certified, provoked))
