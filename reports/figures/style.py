@@ -78,6 +78,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2)),
     (("IAPB, RK4",), LineStyle(BLUE, ">", (4, 2), 1.2)),
     (("PB, RK4",), LineStyle(VERMILION, ">", (4, 1, 1, 1), 1.2)),
+    (("PB, stiffened",), LineStyle(VERMILION, "d", (), 1.4)),
     # integrators
     (("semi-implicit Euler",), LineStyle(MUTED, "s")),
     (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),

@@ -40,6 +40,7 @@ from verification.cost.trajectories import (
     BELOW,
     FIT_FALL,
     FIT_RUNS,
+    USEFUL,
     WORLDS,
     times,
     trajectory_precision,
@@ -443,8 +444,8 @@ def _say_worth(tables: Tables) -> Iterator[Part]:
     level = f"; with {', '.join(stays)} no shorter step reduces the error" if stays else ""
     yield _part("Ten times the accuracy of a whole motion multiplies the computing time by (median over the scenes "
                 f"where at least {FIT_RUNS} runs span a {FIT_FALL:g}-fold fall of the error): "
-                f"{', '.join(costs)}{level}. Methods that on every scene are slower and less exact than another: "
-                f"{', '.join(never) or 'none'}{unknown}.", True)
+                f"{', '.join(costs)}{level}. Methods that on every scene are slower and less exact than another, or "
+                f"miss an error of {USEFUL:g} lengths: {', '.join(never) or 'none'}{unknown}.", True)
 
 
 def _say_order(tables: Tables) -> Iterator[Part]:

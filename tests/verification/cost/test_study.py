@@ -46,6 +46,7 @@ from verification.cost.trajectories import (
     BELOW,
     IDEAL,
     INTEGRATORS,
+    STIFFENED,
     TIMED_OUT,
     WORLDS,
     by_chance,
@@ -87,9 +88,8 @@ def _bodies(*counts: int, step: Callable[[int], float], tested: Callable[[int], 
 
 
 def _run(method: str, step: float, error: float | None, time: float, outcome: str = "ok", note: str = "") -> Any:
-    return {"scene": "ball", "method": method, "step": step, "time": time, "position": error, "velocity": error,
-            "energy": error, "signed energy": error, "energy made": error, "outcome": outcome,
-            "note": note}  # fmt: skip
+    return {"scene": "ball", "method": method, "step": step, "time": time, "position": error, "energy": error,
+            "signed energy": error, "energy made": error, "outcome": outcome, "note": note}  # fmt: skip
 
 
 def _budget(budget: int, gain: float = 0.0) -> Any:
@@ -104,7 +104,7 @@ def tables() -> Tables:
     robots = titled(("robot", "quantity", "form", "ratio"), [("arm", "bias", form, 0.9) for form in (ONE, MANY)])
     late = [{"method": "factored", "coordinates": 3, "contacts": 600, "late calls": 0},
             {"method": "the printed formula", "coordinates": 3, "contacts": 60, "late calls": 0}]  # fmt: skip
-    motions = [_run("IAPB, semi-implicit Euler", 1.0, 1e-3, 1.0), _run("PB, semi-implicit Euler", 1.0, 1.0, 1.0),
+    motions = [_run("IAPB, semi-implicit Euler", 1.0, 1e-3, 1.0), _run(STIFFENED, 1.0, 1.0, 1.0),
                _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")]  # fmt: skip
     return {
         "steps against MuJoCo": _races(0.05),
@@ -172,7 +172,7 @@ def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
     motions = trajectory_precision.draw(inputs)
     assert [panel.label for panel in motions.panels] == ["", "ball"]
     assert [(name, look.filled) for name, look in motions.legend] == [
-        ("IAPB", True), ("PB", True), ("MuJoCo", False), ("best for its time", True)]  # fmt: skip
+        ("IAPB", True), ("PB, stiffened", True), ("MuJoCo", False), ("best for its time", True)]  # fmt: skip
     without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
     assert motions.panels[1].svg != trajectory_precision.draw(without).panels[1].svg
     assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
@@ -248,6 +248,9 @@ def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
     assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["best for its time"] == 1
     assert late["tenfold accuracy costs"] is None and late["least error"] == 2e-1
     assert late["best for its time"] == 0 and late["error stays"] == 1
+    # a fast run is not worth its time if its error is useless
+    coarse, fine = worth(_table(coarse=(0.9,), fine=(1.0, 0.95, 0.01)), ("coarse", "fine")).records()
+    assert coarse["best for its time"] == 0 and fine["best for its time"] == 1
 
 
 @pytest.mark.parametrize(("errors", "undecided"), [((9e-1, 3e-1), 1), ((9e-1, 8.9e-1), 0)])
@@ -261,7 +264,7 @@ def test_a_method_that_our_limit_of_time_cuts_short_is_not_called_worthless(
     good, slow = worth(motions, ("good", "slow")).records()
     assert (good["cut short"], slow["cut short"], slow["best for its time"]) == (0, undecided, 0)
     [part] = _say_worth({"worth": worth(motions, ("good", "slow"))})
-    assert ("another: slow." in part.sentence) == (not undecided)
+    assert ("lengths: slow." in part.sentence) == (not undecided)
     assert ("not decided, because finer steps would take too long: slow on 1 of 1 scenes" in part.sentence) == undecided
 
 

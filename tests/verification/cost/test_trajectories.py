@@ -14,10 +14,12 @@ from verification.cost.trajectories import (
     FAILED,
     OK,
     STEPS,
+    STIFFENED,
     TIMED_OUT,
     TRAJECTORY_SCENES,
     Judge,
     bouncing_ball,
+    methods,
     over_steps,
 )
 
@@ -36,7 +38,7 @@ def _true_motion(judge: Judge) -> Trajectory:
 def test_the_truth_ends_as_the_parabolas_do(judge: Judge) -> None:
     np.testing.assert_allclose(_true_motion(judge).velocity[-1], SCENE.final_velocities, atol=1e-9)
     errors, note = judge.errors(_true_motion(judge))
-    assert note == f"position, velocity, energy {BELOW}"
+    assert note == f"position, energy {BELOW}"
     assert {name: errors[name] for name in judge.bounds} == judge.bounds  # what the truth is worth, and no better
     assert 0.0 < max(judge.bounds.values()) < 1e-6
 
@@ -45,10 +47,17 @@ def test_a_motion_that_is_off_is_off_by_as_much(judge: Judge) -> None:
     true = _true_motion(judge)
     shifted = replace(true, position=true.position + [0.0, 0.03, 0.0])
     errors, note = judge.errors(shifted)
-    assert errors["position"] == pytest.approx(0.03 / SCENE.length) and note == f"velocity, energy {BELOW}"
+    assert errors["position"] == pytest.approx(0.03 / SCENE.length) and note == f"energy {BELOW}"
     slow = replace(true, velocity=0.9 * true.velocity)
     errors, _ = judge.errors(slow)
-    assert 0.0 < errors["velocity"] < 0.1 and errors["signed energy"] == -errors["energy"] < 0.0
+    assert errors["signed energy"] == -errors["energy"] < 0.0
+
+
+def test_stiffened_walls_bounce_with_the_restitution_of_the_scene() -> None:
+    """An impact of eight steps resolves the bounce to 4 %: at a fixed stiffness without damping, e would be 1."""
+    motion, *_ = methods()[STIFFENED](SCENE, 1e-4, 0.2)
+    rise, fall = motion.velocity[:, 0, 2].max(), -motion.velocity[:, 0, 2].min()
+    assert rise / fall == pytest.approx(SCENE.restitution, rel=0.04)
 
 
 def test_failures_and_time_outs_are_records(judge: Judge) -> None:
