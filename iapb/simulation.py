@@ -16,6 +16,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
+from numbers import Real
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -24,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Entry, copy_into, kernel
 from iapb.compiling import compiling_told, to_stderr
+from iapb.contact.impact_methods import real_numbers
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError
@@ -222,9 +224,12 @@ class Simulation:
         self.steps_done += 1
 
     def _grip(self, hand_force: ArrayLike) -> None:
-        force = np.asarray(hand_force, dtype=np.float64)
         if self.system.tool_tree < 0:
             raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
+        given = real_numbers(hand_force)
+        force = np.zeros(0)
+        with suppress(OverflowError):  # a whole number that no double reaches is not finite here
+            force = force if given is None else given.astype(np.float64)
         if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
         self._planned, self.port.wrench[:] = False, 0.0
@@ -343,12 +348,19 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     """
     if not isinstance(scene, Scene):
         scene = _scene_at(find_scene(scene))
+    if not isinstance(world, str):
+        raise ArgumentError("world", world, "the name of a world, as text")
+    if progress is not None and not callable(progress):
+        raise ArgumentError("progress", progress, "a function of the steps done and the total steps")
+    if checkpoint is not None and not (callable(checkpoint) and hasattr(checkpoint, "due")):
+        raise ArgumentError("checkpoint", checkpoint, "a function of the run, with an attribute `due`")
+    most = _half_of_memory() if max_memory is None else _byte_count(max_memory)
     if world and law is None:
         chosen = find_world(world)
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(system_of(scene), law, coupling)
     total = simulation.scene.steps if steps is None else _step_count(steps)
-    _fits(simulation, total, _half_of_memory() if max_memory is None else max_memory)
+    _fits(simulation, total, most)
     with compiling_told(to_stderr):
         return _simulated(simulation, world, total, progress, checkpoint)
 
@@ -411,6 +423,12 @@ def _step_count(steps: Any) -> int:
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
         raise ArgumentError("steps", steps, "a whole number >= 1")
     return int(steps)
+
+
+def _byte_count(most: Any) -> float:
+    if isinstance(most, bool) or not isinstance(most, Real) or not most > 0:
+        raise ArgumentError("max_memory", most, "a number of bytes > 0; math.inf for no limit")
+    return float(most)
 
 
 def _fits(simulation: Simulation, steps: int, most: float) -> None:

@@ -136,7 +136,7 @@ def stacked(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: 
     J = np.zeros((n, 0, d)) if _is_empty(contact_jacobians) else _array("contact_jacobians", contact_jacobians, 3)
     if J.shape[0] != n or J.shape[2] != d:
         raise ArgumentError("contact_jacobians", J.shape, f"shape ({n}, contacts, {d})")
-    e = _real_numbers(restitution)
+    e = real_numbers(restitution)
     if e is None or e.shape not in ((), (n,)):
         raise ArgumentError("restitution", restitution, f"a real number or shape ({n},), one per impact")
     values = np.atleast_1d(e.astype(np.float64))
@@ -185,11 +185,11 @@ def _is_empty(rows: ArrayLike) -> bool:
     """Return whether there are no rows: [] and zeros(0) have no second dimension to check."""
     if type(rows) is np.ndarray and rows.ndim >= 2:
         return False
-    given = _real_numbers(rows)
+    given = real_numbers(rows)
     return given is not None and given.shape == (0,)
 
 
-def _real_numbers(value: Any) -> NDArray[Any] | None:
+def real_numbers(value: Any) -> NDArray[Any] | None:
     """Return the value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
     try:
         given = np.asarray(value)
@@ -206,7 +206,7 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
     """Return a contiguous array of doubles, without a check that they are finite."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions and value.flags.carray:
         return value
-    given = _real_numbers(value)
+    given = real_numbers(value)
     if given is None:
         raise ArgumentError(name, value, "an array of real numbers")
     try:
@@ -221,7 +221,7 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
 def _checked_restitution(restitution: ArrayLike, contacts: int) -> tuple[float, Floats | None]:
     if isinstance(restitution, float) and -1.0 <= restitution <= 1.0:
         return float(restitution), None
-    e = _real_numbers(restitution)
+    e = real_numbers(restitution)
     if e is None:
         raise ArgumentError("restitution", restitution, "a real number or one per contact")
     if e.ndim == 0:

@@ -145,7 +145,10 @@ def test_the_hand_force_stays_until_the_next_one():
     assert spatial == pytest.approx(again - dt * np.array([0, 0, 0.01]) / mass, rel=1e-12)
 
 
-@pytest.mark.parametrize("force", [[1.0], [1.0, 2.0, float("nan")], np.zeros((3, 1)), [np.inf] * 6])
+@pytest.mark.parametrize("force", [
+    [1.0], [1.0, 2.0, float("nan")], np.zeros((3, 1)), [np.inf] * 6, "abc", ["1", "2", "3"], [True, False, True],
+    [1j, 0, 0], [10**400, 0, 0], {"x": 1.0}, (x for x in (1.0, 2.0, 3.0)), np.ma.masked_array(np.zeros(3)),
+    [[1], [2, 3]], np.zeros(3, "m8[s]")])
 def test_a_wrong_hand_force_is_named(force):
     with pytest.raises(ArgumentError, match="hand_force = .*expected 3 .plane. or 6 .space. finite numbers"):
         Simulation(PEG).step(force)
@@ -201,6 +204,14 @@ def test_a_record_that_would_not_fit_is_refused_with_its_size_before_it_is_alloc
     assert simulate("peg_corner", steps=10, max_memory=10 * each).steps == 10
     with pytest.raises(ArgumentError, match="at most 9:"):
         simulate("peg_corner", steps=10, max_memory=10 * each - 1)
+
+
+@pytest.mark.parametrize(("name", "value"), [
+    ("max_memory", float("nan")), ("max_memory", "1GB"), ("max_memory", -1), ("max_memory", True), ("progress", 1),
+    ("checkpoint", 1), ("checkpoint", print), ("world", ["IAPB"]), ("world", None)])
+def test_a_wrong_argument_of_simulate_is_named(name, value):
+    with pytest.raises(ArgumentError, match=f"^{name} = "):
+        simulate("peg_corner", steps=2, **{name: value})
 
 
 def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
