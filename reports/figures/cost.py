@@ -193,8 +193,8 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
                         f"with {_contacts(best)} ({best['solver']} by up to {best['ratio']:.2g} times)")
         said += (f"Hard impacts on which another solver, {how}, is faster than IAPB with an error of at most 1e-6: "
                  f"{'; '.join(told) or 'none'}. ")
-    return said + ("From Python, IAPB also checks its arguments, bounds the change of energy and computes the impulses of "
-                   "least norm, which takes most of the time at hundreds of contacts; DAQP does none of this. ")
+    return said + ("From Python, IAPB also checks its arguments, bounds the change of energy and computes the impulses "
+                   "of least norm, which takes most of the time at hundreds of contacts; DAQP does none of this. ")
 
 
 @recipe(
