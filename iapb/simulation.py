@@ -426,7 +426,7 @@ def _step_count(steps: Any) -> int:
 
 
 def _byte_count(most: Any) -> float:
-    if isinstance(most, bool) or not isinstance(most, Real) or not most > 0:
+    if isinstance(most, bool) or not isinstance(most, Real) or not float(most) > 0.0:
         raise ArgumentError("max_memory", most, "a number of bytes > 0; math.inf for no limit")
     return float(most)
 
