@@ -162,11 +162,11 @@ def note_beside(axes: Any, tail: Any, tip: Any, text: str, size: float, **how: A
 
 
 def _least(starts: Points, name: str, size: float, frame: Box, taken: Sequence[Box], own: Points, others: Points,
-           shared: float = 10.0) -> tuple[Box, Points]:  # fmt: skip
+           shared: float = 30.0) -> tuple[Box, Points]:  # fmt: skip
     """Return the box in which a name covers least, and the start that it belongs to.
 
     starts : points beside which the name may be placed; own : points of the named line; others : points of other lines
-    shared : cost of a start close to other lines, where the name could belong to one of them
+    shared : cost of a start on another line, where the name could belong to either; less beside it, none _GAP away
     """
     left, bottom, right, top = frame
     extent = np.array([_width(name, size) + 2.0, size + 2.0])
@@ -243,9 +243,11 @@ def _covered(box: Box, points: Points) -> float:
                         & (points[:, 1] < box[3])))  # fmt: skip
 
 
-def _near(place: Points, others: Points) -> bool:
-    """Return whether another curve is so close that a name beside it could be read as the name of either curve."""
-    return bool(len(others)) and float(np.min(np.hypot(*(others - place).T))) < _GAP
+def _near(place: Points, others: Points) -> float:
+    """Return how easily a name beside this place could be read as that of another curve: 1 if the curves coincide."""
+    if not len(others):
+        return 0.0
+    return max(0.0, 1.0 - float(np.min(np.hypot(*(others - place).T))) / _GAP)
 
 
 def _free(x: float, y: float, width: float, taken: Sequence[Box], lines: Points, frame: Sequence[float]) -> Box:

@@ -89,6 +89,18 @@ def test_no_line_runs_through_the_name_of_a_curve() -> None:
         assert {name for name, _ in crossed(axes)} == {"third", "fourth"}  # a planted name is noticed
 
 
+def test_a_curve_is_named_where_it_is_alone_rather_than_where_curves_coincide() -> None:
+    """Two paths coincide at first; then they are five points apart, which is closer than a name likes."""
+    x, fork = np.linspace(0.0, 1.0, 200), np.linspace(0.0, 1.0, 200) > 0.5
+    with styled() as new_figure:
+        axes = new_figure(figsize=(4.0, 3.0), layout="constrained").add_subplot()
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        axes.plot(x, 0.5 + np.zeros(200), gid="curve=above")
+        axes.plot(x, np.where(fork, 0.475, 0.5), gid="curve=below")
+        name_curves(axes)
+        assert [text.xy[0] > 0.45 for text in axes.texts] == [True, True]  # type: ignore[attr-defined]
+
+
 def test_the_name_of_an_arrow_stands_clear_of_bodies_and_arrow() -> None:
     with styled() as new_figure:
         axes = new_figure(figsize=(4.0, 3.0)).add_axes((0.0, 0.0, 1.0, 1.0))
