@@ -131,7 +131,7 @@ def test_functions_of_python_become_a_table_that_the_run_records() -> None:
 
 @pytest.mark.parametrize("nothing", [None, 1.0, "no"])
 def test_a_function_of_python_without_numbers_is_refused_by_name(nothing: Any) -> None:
-    with pytest.raises(ArgumentError, match=r"function = .*: expected 3 numbers"):
+    with pytest.raises(ArgumentError, match=r"function = .*: expected a list of 3 numbers"):
         pushed(duration=0.1).with_hand_force(lambda t: nothing)
 
 

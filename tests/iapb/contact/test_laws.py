@@ -213,7 +213,7 @@ def test_settings_that_do_not_exist_are_named():
 
 def test_a_step_other_than_the_scenes_is_refused():
     system = System(PEG)
-    with pytest.raises(ArgumentError, match="dt = 0.1: expected the scene's step"):
+    with pytest.raises(ArgumentError, match="dt = 0.1: expected the step of the scene"):
         Penalty().advance(system, system.make_state(), np.zeros(3), 0.1)
 
 
