@@ -73,7 +73,8 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
     "which-method", "Which method for my budget?", "work_precision", section="accuracy",
     caption="Find the row of your impact and the column of your time budget. A cell names the compiled method that "
     "solves all or most of nine hard impacts of that size in time and without a gain of energy; below the name is "
-    "its largest error relative to |v⁻|. The colour is that of the method in the pictures below: strong for an error "
+    "its largest error relative to |v⁻|, and the share solved if it is not all. The colour is that of the method in "
+    "the pictures below: strong for an error "
     "below 1e-9, pale for one up to 1e-3. “none”: no method solves half of the nine to 1e-3 in this time; “nearest” "
     "is then the largest error of the best method that ends in time without creating energy; if it is missing, there "
     "is no such method. The table under Numbers names that method, and the best methods called from Python. The nine "
@@ -191,8 +192,8 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
             best = max(here, key=lambda row: float(row["ratio"]))
             told.append(f"{len({row['problem'] for row in here})} of {len({case for case in cases if case[0] == c})} "
                         f"with {_contacts(best)} ({best['solver']} by up to {best['ratio']:.2g} times)")
-        said += (f"Hard impacts on which another solver, {how}, is faster than IAPB with an error of at most 1e-6: "
-                 f"{'; '.join(told) or 'none'}. ")
+        said += (f"Hard impacts on which another solver is faster than IAPB, both {how}, with an error of at most "
+                 f"1e-6: {'; '.join(told) or 'none'}. ")
     return said + ("From Python, IAPB also checks its arguments, bounds the change of energy and computes the impulses "
                    "of least norm, which takes most of the time at hundreds of contacts; DAQP does none of this. ")
 
@@ -302,9 +303,11 @@ _READ = (
     f"the error falls at least {FIT_FALL:g}-fold. “7× costs 2× (2 runs)”: fewer runs or a smaller fall; this is only "
     "the measured factor from the first to the last of them. The error depends on where an impact falls within a "
     "step, so curves are uneven. The table gives the median of the fits, in brackets their range, then the number of "
-    "scenes with a fit. “Then level”, “stays at”: no shorter step reduces this error, which comes from the contact "
+    "scenes with a fit. Smallest error: the median over the scenes. “Then level”, “stays at”: no shorter step reduces "
+    "this error, which comes from the contact "
     "model. “Too few runs”, “cut short”: finer steps would take longer than allowed, though the error still falls. "
     f"The grey steps join the runs that no other run beats in both time and error, among errors up to {USEFUL:g}. "
+    "“Never worth its time”: no run of the method is on the grey steps of any scene. "
     "Crosses at the upper rim: the run failed or took too long. An arrow at the lower rim: the error is below the "
     "accuracy of the exact motion (about 1e-10), because a step happens to end at the instant of impact; it is not "
     "used either. "

@@ -190,9 +190,9 @@ def test_where_a_rival_is_faster_is_said() -> None:
     kernels = table_of(C22_COLUMNS, [dict(zip(keys, row, strict=True)) for row in rows])
     said = where_iapb_loses.draw({"work_precision": KNOWN, "C22/C22": kernels}).caption
     assert "On pile IAPB is clearly slower at 1 of 3 sizes, from 8 to 8 contacts: at worst, it takes 2 times" in said
-    assert "solver, compiled, is faster than IAPB with an error of at most 1e-6: 2 of" in said
+    assert "solver is faster than IAPB, both compiled, with an error of at most 1e-6: 2 of" in said
     assert "with 4 contacts (Lemke by up to 1.2 times)" in said and "The reason: " in said
-    assert "called from Python, is faster than IAPB with an error of at most 1e-6: none" in said
+    assert "both called from Python, with an error of at most 1e-6: none" in said
 
 
 def test_figures_show_every_size_and_failure() -> None:
