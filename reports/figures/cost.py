@@ -317,9 +317,11 @@ _READ = (
 @recipe(
     "trajectory-precision", "What accuracy of a whole motion costs, by world", "haptic-rate/motions",
     section="accuracy",
-    caption=_READ + "Worlds: IAPB by semi-implicit Euler with the paper's walls (1000 N/m); PB at its best, with "
-    "walls as stiff as the step allows, damping that gives the restitution, and Runge-Kutta 4; ideal: rigid contacts "
-    "by a QP per step, written in Python. Other engines run their own compiled steps; Python calls them and records. "
+    caption=_READ + "Worlds: IAPB by semi-implicit Euler with the paper's walls (1000 N/m); PB with walls "
+    "as stiff as the step allows and Runge-Kutta 4. Its damping gives the restitution at one contact; at the four and "
+    "sixteen of the boxes it is too strong, as for an author who does not know how many will touch; ideal: rigid "
+    "contacts by a QP per step, written in Python. Other engines run their own compiled steps; Python calls them and "
+    "records. "
     "CBuc is not drawn: it differs from ideal only in its coupling to a device, and these scenes have no device. "
     "Energy made: the largest excess of kinetic plus potential energy over its value at the start, relative to the "
     "largest kinetic energy.",

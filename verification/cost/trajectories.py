@@ -336,7 +336,7 @@ def on_front(row: Record, others: Sequence[Record]) -> bool:
 
 
 IMPULSES, PENALTIES = "IAPB, semi-implicit Euler", "PB, semi-implicit Euler"
-STIFFENED = "PB with stiffened walls, Runge-Kutta 4"  # penalties at their best: see `_stiffened`
+STIFFENED = "PB with stiffened walls, Runge-Kutta 4"  # see `_stiffened`
 # Two comparisons of at most six curves each: worlds and engines, and integrators. Each has its own front.
 WORLDS = (IMPULSES, STIFFENED, IDEAL, "MuJoCo", "Drake", "Bullet")
 INTEGRATORS = (IMPULSES, "IAPB, midpoint", "IAPB, Runge-Kutta 4", PENALTIES, "PB, Runge-Kutta 4", STIFFENED)
@@ -456,7 +456,8 @@ def _fixed(scene: FixedScene, step: float) -> dict[str, Any]:
 def _stiffened(scene: FixedScene, step: float) -> dict[str, Any]:
     """Return walls that are as stiff as the step allows, with the damping that gives the scene's restitution e.
 
-    A collision of the lightest body takes 8 steps, as in our settings of MuJoCo; for e = 0 the damping is critical.
+    A collision of the lightest body at one contact takes 8 steps, as in our settings of MuJoCo; for e = 0 the damping
+    is critical. Where n contacts share a collision, stiffness and damping are n times as large, and e is too small.
     """
     mass, stiffness = min(body.mass for body in scene.bodies), (pi / (8.0 * step)) ** 2
     damping = 2.0 * sqrt(stiffness) if scene.restitution < LOWEST else damping_for(scene.restitution, stiffness)
