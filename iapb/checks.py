@@ -647,7 +647,38 @@ def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str,
     said: tuple[str, ...] = ()
     if scene.contact.auto:
         scene, said = _chosen(scene, Start(scene) if start is None else start)
+    elif scene.chosen_fields:
+        choice, sentence = _firm(scene)
+        contact = scene.contact.model_copy(update=choice)
+        scene, said = scene.model_copy(update={"contact": contact}), (sentence,)
     return _at_rest(scene, said) if scene.contact.resting_start else (scene, said)
+
+
+SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
+SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
+RELAXATION = 0.01  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
+STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
+
+
+def _firm(scene: Scene) -> tuple[dict[str, float], str]:
+    """Return stiffness and damping of implicit contact that are not given, and a sentence on them.
+
+    The stiffness holds ten times the weight of all bodies, and the hand's force, at the sag allowed.
+    """
+    shapes = shapes_of(scene)
+    sizes = [_smallest_extent(shapes, i) for i in range(len(shapes.kind))]
+    sag = min(SAG_ALLOWED, SAG_SHARE * min([size for size in sizes if math.isfinite(size)], default=1.0))
+    mass = sum(body.mass for body in scene.bodies)
+    load = mass * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
+    load += scene.hand.largest_force() if scene.hand is not None and not scene.hand.force_function else 0.0
+    choice: dict[str, float] = {}
+    if "stiffness" in scene.chosen_fields:
+        choice["stiffness"] = min(_two_digits(SPARE_LOAD * load / sag, math.ceil), LARGEST_NUMBER)
+    if "damping" in scene.chosen_fields:
+        K = choice.get("stiffness", scene.contact.stiffness)
+        choice["damping"] = min(_two_digits(K * RELAXATION, math.ceil), LARGEST_NUMBER)
+    values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
+    return choice, f"chosen for implicit contact: {values}, so that {load:.3g} N sag by less than {in_metres(sag)}"
 
 
 def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
@@ -658,6 +689,9 @@ def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
         return scene.with_values({"contact.auto": False}), ()
     dt, given = start.dt, scene.contact.model_fields_set
     choice: dict[str, float] = {}
+    if scene.contact.forces == "implicit":
+        choice, _ = _firm(scene)
+        given = given | {"stiffness", "damping"}
     if "stiffness" not in given:
         choice["stiffness"] = _two_digits(AUTO_K / (mobility * dt**2), math.floor)
     if "damping" not in given:

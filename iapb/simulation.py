@@ -160,6 +160,8 @@ class Simulation:
         self.system = scene if isinstance(scene, System) else System(
             scene if isinstance(scene, Scene) else load_scene(find_scene(scene)))
         self.scene = self.system.scene
+        if isinstance(self.law, ImpulseAugmented | Penalty):
+            self.law = self.law.within(self.scene)
         self.state = self.system.make_state()
         self.compiled = isinstance(self.law, ImpulseAugmented | Penalty) and self.law.runs_compiled()
         self.effects = self.system.decide(self.law, self.coupling)

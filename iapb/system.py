@@ -16,6 +16,7 @@ from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.coulomb import make_step_friction
 from iapb.contact.kernels.impact import make_impact_work
 from iapb.contact.kernels.impact_friction import make_friction_work
+from iapb.contact.kernels.implicit import make_rest_work
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
@@ -29,6 +30,7 @@ from iapb.haptics.waveforms import waveform_weights
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.kernels.cholesky import cholesky
+from iapb.mechanics.kernels.free_motion import make_free_motion
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene
@@ -80,7 +82,8 @@ class Parts:
         return {"mechanism": self.mechanism.block, "shapes": block(self.shapes),
                 "tree_of_body": self.mechanism.tree_of_body, "joint_damping": self.joint_damping,
                 "tree_start": np.ascontiguousarray(ranges[:, 0]), "tree_stop": np.ascontiguousarray(ranges[:, 1]),
-                "own_restitution": self.own_restitution, "stops": block(self.stops)}
+                "own_restitution": self.own_restitution, "stops": block(self.stops),
+                "free": block(make_free_motion(self.mechanism.arrays, self.mechanism.tree_of_body))}
 
     def broad_phase(self, pairs: NDArray[np.int32], used: bool) -> Any:
         """Return a new broad phase, because a world writes into it; if unused, a shared empty one."""
@@ -181,6 +184,7 @@ class System:
 
         `effects` is the result of `decide` for the law and any coupling.
         """
+        law = law.within(self.scene)
         key = _key(law)
         if key not in self._worlds:
             self._worlds[key] = make_world(self, law, self.decide(law) if effects is None else effects)
@@ -193,7 +197,7 @@ class System:
         state: State = _blank_state(
             (len(mechanism.bodies), len(mechanism.tree_dofs), mechanism.nq, mechanism.nv, _largest_tree(mechanism)),
             self.capacity, rows, 2 if isinstance(self.scene, SpatialScene) else 1, slides_in_impacts(self.scene),
-            largest_friction(self.scene) > 0.0 and contact.friction_law == "coulomb",
+            largest_friction(self.scene) > 0.0 and contact.friction_law == "coulomb", contact.forces == "implicit",
         ).twin()
         q, v = self.start
         for name, values in (("q", q), ("v", v), *self._mass_at_start.items()):
@@ -210,7 +214,7 @@ class System:
 
     def advance_under(self, law: Any) -> Entry:
         """Return the compiled step of one of the engine's laws, for repeated calls (cached)."""
-        return self._advances.setdefault(_key(law), Entry(advance))
+        return self._advances.setdefault(_key(law.within(self.scene)), Entry(advance))
 
     def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Port:
         """Return hand, coupling and device at the scene's start; an `external` device moves by itself.
@@ -236,6 +240,7 @@ class System:
         """Return the effects under a law and a coupling; the world, the port and the record are made from them."""
         if type(law) not in (ImpulseAugmented, Penalty):  # a law of the user may answer differently each time
             return decide_for(self.scene, self._facts, law, coupling)
+        law = law.within(self.scene)
         key = law, *_gains_of(coupling)
         if key not in self._effects:
             self._effects[key] = decide_for(self.scene, self._facts, law, coupling)
@@ -310,14 +315,15 @@ def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
         dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
         friction_class=system.frictions.class_of_shape, friction=system.frictions.table,
-        coulomb="friction" in on and contact.friction_law == "coulomb",
+        coulomb="friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit"),
+        implicit=contact.forces == "implicit", tangents=2 if isinstance(scene, SpatialScene) else 1,
         friction_velocity=float(contact.friction_velocity),
         restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
         approach_velocity=float(contact.approach_velocity),
         cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
         per_body_rows=contact.self_collision_rows == "per_body", impulse_limit=limit,
         stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
-        semi_implicit=integrator.semi_implicit,
+        semi_implicit=integrator.semi_implicit, conserving=integrator.conserving,
     ))
 
 
@@ -336,7 +342,8 @@ def slides_in_impacts(scene: Scene) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int, sliding: bool, rubbing: bool) -> Any:
+def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int, sliding: bool, rubbing: bool,
+                 implicit: bool) -> Any:
     """Make a state of these sizes, of which twins are used; scenes with equal sizes share it."""
     bodies, trees, nq, d, largest_tree = sizes
     vectors = {name: np.zeros(d) for name in (
@@ -354,7 +361,9 @@ def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int
         row_impulse=np.zeros(rows), row_restitution=np.zeros(rows), work=make_impact_work(d, rows),
         push_work=make_push_work(d, rows),
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
-        step_friction=make_step_friction(d, capacity * rubbing, tangents, largest_tree),
+        step_friction=make_step_friction(d, capacity * (rubbing and not implicit), tangents, largest_tree),
+        rest_work=make_rest_work(d * implicit, capacity * implicit, 1 + tangents, largest_tree, trees),
+        located_q=np.full(nq, np.nan), root_momentum=np.zeros(6 * trees), tree_energy=np.zeros(trees),
         impacts=_make_log(trees, d), **vectors, **squares,
     )).twin()
 

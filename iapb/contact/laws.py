@@ -7,8 +7,8 @@ forces while it lasts. `Penalty` applies penalty forces alone: the same algorith
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
+from iapb.scene.mechanism import largest_friction
 
 Floats = NDArray[np.float64]
 
@@ -87,12 +88,12 @@ class ContactLaw(Protocol):
 
 @dataclass(frozen=True)
 class _EngineLaw:
-    """Base class of the engine's two laws: an integrator and a compiled kernel."""
+    """Base class of the engine's two laws: an integrator, by default the scene's, and a compiled kernel."""
 
-    integrator: str = "semi_implicit_euler"
+    integrator: str | None = None
 
     def __post_init__(self) -> None:
-        if self.integrator not in INTEGRATORS:
+        if self.integrator is not None and self.integrator not in INTEGRATORS:
             raise ArgumentError("integrator", self.integrator, one_of(self.integrator, INTEGRATORS))
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
@@ -104,6 +105,10 @@ class _EngineLaw:
         if status:
             raise IapbError(STATUS_TEXT[status])
         return copied_step(system, state)
+
+    def within(self, scene: Any) -> Self:
+        """Return the law with the scene's choices where it leaves them open."""
+        return self if self.integrator else replace(self, integrator=scene.own_integrator)
 
     @classmethod
     def runs_compiled(cls) -> bool:
@@ -122,14 +127,15 @@ class ImpulseAugmented(_EngineLaw):
         ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool and device alike; ``spread``
         scales it and stays in collision until the rest is rendered. Without limits in the scene all four are the same.
     friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and without energy gain
-        (`iapb.resolve_frictional_impact`). Default: False, as in the paper, which leaves it to future work.
+        (`iapb.resolve_frictional_impact`). Default: the scene decides: False for `forces: paper`, which leaves it to
+        future work, and where contacts only push; else True.
     pushing : whether contacts can only push. Every collision then uses Poisson's law by two LCPs (`method="poisson"`
         of `iapb.resolve_impact`) instead of (21), which takes every row as an equality. Default: False, as in the
         paper.
     """
 
     rendering: str = "full"
-    friction_in_impacts: bool = False
+    friction_in_impacts: bool | None = None
     pushing: bool = False
     impulses = True
 
@@ -138,10 +144,18 @@ class ImpulseAugmented(_EngineLaw):
         if self.rendering not in RENDERINGS:
             raise ArgumentError("rendering", self.rendering, one_of(self.rendering, RENDERINGS))
         for name in ("friction_in_impacts", "pushing"):
-            if not isinstance(getattr(self, name), bool):
+            if not isinstance(getattr(self, name), bool | None if name == "friction_in_impacts" else bool):
                 raise ArgumentError(name, getattr(self, name), "True or False")
         if self.friction_in_impacts and self.pushing:
             raise ArgumentError("pushing", True, "False: friction_in_impacts needs impulses that may pull")
+
+    def within(self, scene: Any) -> Self:
+        """Return the law with the scene's choices where it leaves them open."""
+        law = super().within(scene)
+        if law.friction_in_impacts is not None:
+            return law
+        return replace(law, friction_in_impacts=not law.pushing and scene.contact.forces != "paper"
+                       and largest_friction(scene) > 0.0)
 
     @property
     def name(self) -> str:

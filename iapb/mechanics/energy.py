@@ -71,6 +71,7 @@ def energy_ledger(
     forces: Mapping[str, Floats],
     impulse: Floats,
     before: Mapping[str, float] | None = None,
+    straight: bool = False,
 ) -> dict[str, Floats]:
     """Return the energy balance of n steps.
 
@@ -86,6 +87,7 @@ def energy_ledger(
         Generalized impulse at the beginning of each step.
     before : ledger name -> [J], optional
         Sums at the end of the preceding steps (see `last_of`); the sums of these n steps continue them.
+    straight : whether free bodies moved straight, by the integrator `momentum` (see `Mechanism.displacements`)
 
     Returns
     -------
@@ -100,7 +102,7 @@ def energy_ledger(
     """
     steps = len(q) - 1
     kinetic, potential = mechanism.energies(q, v, gravity)
-    displacement = mechanism.displacements(q)
+    displacement = mechanism.displacements(q, straight)
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in (dict(forces) | {"impulse": impulse}).items():
         if np.shape(force) != (steps, mechanism.nv):
@@ -138,7 +140,8 @@ def energy_of_run(
     energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
     """
     forces = {name: getattr(run, f"{name}_force") for name in FORCES}
-    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before)
+    straight = run.law_settings.get("integrator") == "momentum"
+    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before, straight)
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)

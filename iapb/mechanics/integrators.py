@@ -1,7 +1,12 @@
 """Time integrators as data: each declares its order, and tests measure the order.
 
-All are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate the
-acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start of
+`momentum`, the default of a scene, applies forces at the start of a step and then moves the bodies freely
+(`iapb.mechanics.kernels.free_motion`): linear and angular momentum are kept to rounding in the world's axes. Trees
+without contact get half of gravity before and half after they move, so their motion is of second order; with contact
+the order is 1.
+
+All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate
+the acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start of
 the step with velocity and acceleration of the stage before it, and has the weight `weight[i]`. The compiled step reads
 these numbers; `Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python only;
 it keeps its fourth order where rotations do not commute.
@@ -38,6 +43,7 @@ class Integrator(NamedTuple):
     fraction: tuple[float, ...]  # time of each evaluation, as a fraction of the step
     weight: tuple[float, ...]  # weight of each evaluation, sum 1
     semi_implicit: bool = False  # the new velocity moves the configuration
+    conserving: bool = False  # Coriolis terms belong to the motion, which keeps momentum; `step` leaves them out
 
     def step(
         self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
@@ -83,6 +89,7 @@ _STAGES_4 = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 INTEGRATORS: dict[str, Integrator] = {
     method.name: method
     for method in (
+        Integrator("momentum", 1, 1, (0.0,), (1.0,), semi_implicit=True, conserving=True),
         Integrator("semi_implicit_euler", 1, 1, (0.0,), (1.0,), semi_implicit=True),
         Integrator("midpoint", 2, 2, (0.0, 0.5), (0.0, 1.0)),
         Integrator("runge_kutta_4", 4, 2, *_STAGES_4),

@@ -262,11 +262,15 @@ class Mechanism:
         entries.energies_along(self.block, self._scratch.workspace, places, rates, _field(g), kinetic, potential)
         return kinetic, potential
 
-    def displacements(self, qs: ArrayLike) -> Floats:
-        """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations qs."""
+    def displacements(self, qs: ArrayLike, straight: bool = False) -> Floats:
+        """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations qs.
+
+        A free body turns about a screw axis in a step, or, with `straight`, its centre of mass moves straight, as the
+        integrator `momentum` moves it.
+        """
         places = float_rows("qs", qs, self.nq)
         out = np.zeros((max(len(places) - 1, 0), self.nv))
-        entries.displacements_along(self.block, places, out)
+        entries.displacements_along(self.block, places, bool(straight), out)
         return out
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:

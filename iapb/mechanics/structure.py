@@ -7,6 +7,7 @@ be zero in cases that are not checked, such as a balanced second link on a first
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays
 
 
-def _rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
+def rigid_part(m: MechanismArrays, body: int) -> list[int] | None:
     """Return the bodies fixed to `body`, with `body` itself; None if any body moves relative to it."""
     part = [body]
     for b in range(body + 1, len(m.kind)):
@@ -60,7 +61,7 @@ def _rotation_keeps_mass_matrix(m: MechanismArrays, body: int) -> bool:
     of mass lies on the axis (at the centre of a spherical joint). Free flyers and planar_se2 joints have
     velocities in body axes, so at the root their M is the inertia of the body itself.
     """
-    part = _rigid_part(m, body)
+    part = rigid_part(m, body)
     if part is None:
         return False
     if m.kind[body] in (FREE_FLYER, PLANAR_SE2):
@@ -86,14 +87,15 @@ def _spins_without_bias(m: MechanismArrays, body: int) -> bool:
         return False  # m omega x u: the axes of the velocity turn with the body
     if m.kind[body] != SPHERICAL:
         return True  # v = dq/dt: B follows from dM/dq alone
-    part = _rigid_part(m, body)
+    part = rigid_part(m, body)
     inertia = _mass_properties(m, part)[1] if part is not None else np.diag([1.0, 2.0, 3.0])
     return bool((inertia == inertia[0, 0] * np.eye(3)).all())
 
 
-def has_velocity_terms(m: MechanismArrays) -> bool:
-    """Return False only if B(q, v) is zero everywhere."""
-    return not has_constant_mass_matrix(m) or not all(_spins_without_bias(m, b) for b in _rotating_bodies(m))
+def has_velocity_terms(m: MechanismArrays, bodies: Container[int] | None = None) -> bool:
+    """Return False only if B(q, v) of the given bodies, which are whole trees (default: all), is zero everywhere."""
+    return not all(_rotation_keeps_mass_matrix(m, b) and _spins_without_bias(m, b) for b in _rotating_bodies(m)
+                   if bodies is None or b in bodies)
 
 
 # A mechanism with every fixed body merged into the body that carries it: this is enough for M and B.

@@ -67,8 +67,14 @@ class Contact(Part):
         False,
         description="true: what touches at the start begins where springs and friction hold it; default false",
     )
-    stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default 1000, the paper's walls")
-    damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default 50, the paper's walls")
+    forces: Literal["implicit", "paper"] = Field(
+        "implicit",
+        description="implicit (default): resting forces that no stiffness or step makes unstable, friction in impacts, "
+        "stiffness and damping chosen for a sag below 0.1 mm; paper: explicit (5) and (6), impacts without friction, "
+        "K = 1000, B = 50; contact: paper is short for it",
+    )
+    stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
+    damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
     penalty: Literal["clamped", "printed"] = Field(
         "clamped", description="clamped (default): never pulls; printed: (5) to the letter, may pull"
     )
@@ -241,6 +247,10 @@ class Scene(Part):
         description="simulation rate [Hz]; the step is 1/rate"
     )
     duration: Positive = Field(description="simulated time [s]")
+    integrator: Literal["momentum", "semi_implicit_euler", "midpoint", "runge_kutta_4"] | None = Field(
+        None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
+        "the plane with contact.forces: paper semi_implicit_euler"
+    )
     gravity: Vector2 | None = Field(None, description="acceleration [m/s2], world axes; default: none")
     bodies: Annotated[tuple[Body, ...], Field(min_length=1, max_length=MAX_BODIES)] = Field(
         description="what can move, each after its parent"
@@ -264,7 +274,8 @@ class Scene(Part):
     @field_validator("contact", mode="before")
     @classmethod
     def _spelt_out(cls, contact: Any) -> Any:
-        return {"auto": True} if contact == "auto" else contact
+        return {"auto": {"auto": True}, "paper": {"forces": "paper"}}.get(contact, contact) if isinstance(
+            contact, str) else contact
 
     @field_validator("duration")
     @classmethod
@@ -289,6 +300,18 @@ class Scene(Part):
         return round(self.duration * self.rate)
 
     @property
+    def own_integrator(self) -> str:
+        """Name of the integrator that the scene asks for."""
+        plane_of_paper = self.contact.forces == "paper" and not isinstance(self, SpatialScene)
+        return self.integrator or ("semi_implicit_euler" if plane_of_paper else "momentum")
+
+    @property
+    def chosen_fields(self) -> tuple[str, ...]:
+        """Contact fields that the toolkit chooses, since the scene gives no value for them."""
+        fields = AUTO if self.contact.auto else () if self.contact.forces == "paper" else ("stiffness", "damping")
+        return tuple(name for name in fields if name not in self.contact.model_fields_set)
+
+    @property
     def source_text(self) -> str:
         """The YAML text of this scene."""
         if self._remark:
@@ -309,12 +332,11 @@ class Scene(Part):
     def resolved(self) -> dict[str, Any]:
         """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings.
 
-        Fields that `contact.auto` will choose have no value yet and are left out.
+        Contact fields that the toolkit will choose have no value yet and are left out.
         """
         plain = self.model_dump(mode="json")
-        for name in AUTO if self.contact.auto else ():
-            if name not in self.contact.model_fields_set:
-                del plain["contact"][name]
+        for name in self.chosen_fields:
+            del plain["contact"][name]
         return plain
 
     def with_values(self, values: dict[str, Any]) -> Self:
@@ -456,7 +478,7 @@ def scene_schema() -> dict[str, Any]:
     parts = schema["$defs"]
     for name in ("Scene", "SpatialScene"):
         contact = parts[name]["properties"]["contact"]
-        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, {"const": "auto"}], **contact}
+        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, {"enum": ["auto", "paper"]}], **contact}
     parts["SpatialScene"] = _with_robots(parts["SpatialScene"])
     return {
         "$schema": DIALECT, "title": "Scene file", "type": "object",

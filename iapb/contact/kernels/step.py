@@ -11,13 +11,22 @@ from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
 from iapb.contact.kernels.coulomb import add_step_friction, remember_friction
+from iapb.contact.kernels.implicit import rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities, friction_of
 from iapb.mechanics.kernels.cholesky import cholesky, cholesky_tree_blocks, solve_mass, solve_tree_blocks
-from iapb.mechanics.kernels.configuration import integrate
+from iapb.mechanics.kernels.configuration import integrate, integrate_body
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
+from iapb.mechanics.kernels.free_motion import (
+    LINKAGE,
+    base_momentum,
+    keep_momentum_and_energy,
+    move_simple_trees,
+    parts_of_linkages,
+    to_fixed_axes,
+)
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.run import COLLIDING, FREE, RESTING
 
@@ -75,17 +84,28 @@ def clear(state):
 def locate(world, state):
     """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not definite."""
     forward_kinematics(world.mechanism, state.q, state.body)
-    if not world.switches.varying_inertia:
+    if not world.switches.varying_inertia or (world.conserving and is_located(state)):
         return True
+    if world.conserving:
+        copy_into(state.located_q, state.q)
     mass_matrix(world.mechanism, state.body, state.mass_matrix)
     return cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
+
+
+@kernel
+def is_located(state):
+    """Return whether M and its factor are those of q already."""
+    for i in range(state.q.shape[0]):
+        if state.q[i] != state.located_q[i]:
+            return False
+    return True
 
 
 @kernel
 def find_contacts(world, state):
     """Find the contacts (section III): cluster them, mark new ones, classify groups; return how many, -1: too many."""
     remember(state)
-    if world.coulomb:
+    if world.coulomb and not world.implicit:
         remember_friction(state)
     count = touching(world, state, state.contacts)
     if count < 0:
@@ -129,6 +149,7 @@ def remember(state):
         before.shape_a[i], before.shape_b[i] = now.shape_a[i], now.shape_b[i]
         before.body_a[i], before.body_b[i] = now.body_a[i], now.body_b[i]
         before.feature[i], before.gap[i] = now.feature[i], now.gap[i]
+        before.normal_force[i] = now.normal_force[i]
         for axis in range(3):
             before.point[i, axis] = now.point[i, axis]
             before.normal[i, axis] = now.normal[i, axis]
@@ -155,32 +176,119 @@ def move(world, state, applied):
             state.friction_force[k] += weight * state.stage_friction[k]
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
-    rubs = world.switches.contacts and world.coulomb
-    if (rubs or world.switches.joint_damping) and not implicit_forces(world, state, rubs):
+    touches = world.switches.contacts and (world.coulomb or world.implicit)
+    if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
     finite = True
     for k in range(state.v.shape[0]):
         finite = finite and abs(state.v[k]) < LARGEST_SPEED  # False for NaN too
+    if not finite:
+        return NOT_FINITE
+    if world.conserving:
+        return OK if drift(world, state) else NOT_POSITIVE_DEFINITE
     velocity = state.v if world.semi_implicit else state.mean_v
     integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
-    return OK if finite else NOT_FINITE
+    return OK
 
 
 @kernel
-def implicit_forces(world, state, rubs):
-    """Apply joint damping and Coulomb friction, from the state at the start of the step. False: M not definite."""
+def implicit_forces(world, state, touches):
+    """Apply joint damping and contact, from the state at the start of the step. Return False if M is not definite."""
     if world.stage_weight.shape[0] > 1:
         copy_into(state.q, state.start_q)
         if not locate(world, state):
             return False
     if world.switches.joint_damping and not damp_joints(world, state):
         return False
-    if rubs:
+    if touches and world.implicit:
+        rest_implicitly(world, state, world.coulomb)
+        if world.switches.joint_damping:
+            for k in range(state.v.shape[0]):
+                state.acceleration[k] = -world.joint_damping[k] * state.v[k]
+    elif touches:
         add_step_friction(world, state)
     if world.switches.joint_damping:
         for k in range(state.v.shape[0]):
             state.friction_force[k] += state.acceleration[k]
     return True
+
+
+@kernel
+def drift(world, state):
+    """Move all trees freely for Δt, then apply the second half of gravity to free trees. False: M not definite."""
+    m, free = world.mechanism, world.free
+    if not (free.turning and world.switches.velocity_terms):
+        integrate(m, state.start_q, state.v, world.dt, state.q)
+    else:
+        parts = 1
+        if free.linked:
+            parts = parts_of_linkages(m, free, world.tree_start, world.tree_stop, state.v, world.dt)
+            coriolis(world, state)
+        move_simple_trees(m, free, world.tree_of_body, state.q, state.v, world.dt)
+        if free.linked:
+            for part in range(parts):
+                if part > 0:
+                    coriolis(world, state)
+                if not swing(world, state, world.dt / parts):
+                    return False
+    if world.switches.gravity:
+        pull_free_trees(world, state)
+    return True
+
+
+@kernel
+def coriolis(world, state):
+    """acceleration <- −M⁻¹ B at the present state."""
+    bias(world.mechanism, state.body, state.v, state.bias)
+    for k in range(state.v.shape[0]):
+        state.acceleration[k] = -state.bias[k]
+    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration)
+
+
+@kernel
+def swing(world, state, h):
+    """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are those before."""
+    m, free, a = world.mechanism, world.free, state.acceleration
+    for t in range(free.kind.shape[0]):
+        if free.kind[t] == LINKAGE:
+            start, stop = world.tree_start[t], world.tree_stop[t]
+            state.tree_energy[t] = base_momentum(m, free, state.body, state.q, state.mass_matrix, start, stop, t,
+                                                 state.v, state.root_momentum[6 * t : 6 * t + 6])
+            for k in range(start, stop):
+                state.v[k] += 0.5 * h * a[k]
+    for b in range(m.kind.shape[0]):
+        if free.kind[world.tree_of_body[b]] == LINKAGE:
+            integrate_body(m, b, state.q, state.v, h, state.q)
+    for t in range(free.kind.shape[0]):
+        if free.kind[t] == LINKAGE:
+            for k in range(world.tree_start[t], world.tree_stop[t]):
+                state.v[k] += 0.5 * h * a[k]
+    if not locate(world, state):
+        return False
+    copy_into(state.mean_acceleration, a)
+    coriolis(world, state)
+    for t in range(free.kind.shape[0]):
+        if free.kind[t] == LINKAGE:
+            start, stop = world.tree_start[t], world.tree_stop[t]
+            for k in range(start, stop):
+                state.v[k] += 0.5 * h * (a[k] - state.mean_acceleration[k])
+            p = state.root_momentum[6 * t : 6 * t + 6]
+            to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
+            keep_momentum_and_energy(state.mass_matrix, state.lower, start, stop, free.base[t], p,
+                                     state.tree_energy[t], state.v, state.bias)
+    return True
+
+
+@kernel
+def pull_free_trees(world, state):
+    """Add half a step of gravity to the velocity of trees without contact; the other half acted before they moved."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+    gravity(world.mechanism, state.body, world.gravity, state.bias)
+    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
+    for t in range(world.tree_start.shape[0]):
+        if state.state_of_tree[t] == FREE:
+            for k in range(world.tree_start[t], world.tree_stop[t]):
+                state.v[k] -= 0.5 * world.dt * state.bias[k]
 
 
 @kernel
@@ -233,7 +341,12 @@ def accelerate(world, state, applied, stage):
         gravity(world.mechanism, state.body, world.gravity, state.bias)
         for k in range(a.shape[0]):
             a[k] -= state.bias[k]
-    if world.switches.velocity_terms:
+        if world.conserving:
+            for t in range(world.tree_start.shape[0]):
+                if state.state_of_tree[t] == FREE:
+                    for k in range(world.tree_start[t], world.tree_stop[t]):
+                        a[k] += 0.5 * state.bias[k]
+    if world.switches.velocity_terms and not world.conserving:
         bias(world.mechanism, state.body, state.v, state.bias)
         for k in range(a.shape[0]):
             a[k] -= state.bias[k]
@@ -246,7 +359,7 @@ def rest(world, state, stage):
     for k in range(state.v.shape[0]):
         state.stage_penalty[k] = 0.0
         state.stage_friction[k] = 0.0
-    if not world.switches.contacts:
+    if not world.switches.contacts or world.implicit:
         return
     contacts, count = state.contacts, state.contact_count[0]
     if stage > 0:

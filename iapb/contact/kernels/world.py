@@ -11,8 +11,10 @@ from iapb.contact.kernels.broadphase import BroadPhase
 from iapb.contact.kernels.coulomb import StepFriction
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
+from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
+from iapb.mechanics.kernels.free_motion import FreeMotion
 
 
 class Switches(NamedTuple):
@@ -62,6 +64,8 @@ class World(NamedTuple):
     gravity: np.ndarray  # (3,) [m/s²]
     stiffness: float  # K [N/m] (5)
     damping: float  # B [N s/m] (5)
+    implicit: bool  # resting forces implicit in the velocity; False: the paper's explicit (5)
+    tangents: int  # of a contact: 1 in the plane, 2 in space
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction_class: np.ndarray  # (shapes + stops,) int64
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
@@ -79,6 +83,8 @@ class World(NamedTuple):
     stage_fraction: np.ndarray  # (s,) time of each force evaluation as a fraction of the step, first 0
     stage_weight: np.ndarray  # (s,) weight of each force evaluation, sum 1
     semi_implicit: bool  # the new velocity moves the configuration (one stage only)
+    conserving: bool  # free motion keeps momentum (`iapb.mechanics.kernels.free_motion`); one stage only
+    free: FreeMotion
 
 
 class State(NamedTuple):
@@ -127,4 +133,8 @@ class State(NamedTuple):
     push_work: PushWork
     friction_work: FrictionWork
     step_friction: StepFriction
+    rest_work: RestWork
+    located_q: np.ndarray  # (nq,) configuration of mass_matrix and lower; NaN: any
+    root_momentum: np.ndarray  # (6 t,) scratch of free motion
+    tree_energy: np.ndarray  # (t,) the same
     impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

@@ -89,23 +89,29 @@ def integrate_planar_se2(q, i, v, k, dt, out):
 
 
 @kernel
+def integrate_body(m, b, q, v, dt, out):
+    """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity v."""
+    kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+    if kind == FIXED:
+        return
+    elif kind == CONTINUOUS:
+        turn_pair(q, i, v[k] * dt, out)
+    elif kind == SPHERICAL:
+        turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
+    elif kind == FREE_FLYER:
+        integrate_free_flyer(q, i, v, k, dt, out)
+    elif kind == PLANAR_SE2:
+        integrate_planar_se2(q, i, v, k, dt, out)
+    else:
+        for j in range(m.v_count[b]):
+            out[i + j] = q[i + j] + dt * v[k + j]
+
+
+@kernel
 def integrate(m, q, v, dt, out):
     """out (nq,) <- q moved for dt with the constant velocity v; out may be q itself."""
     for b in range(m.kind.shape[0]):
-        kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
-        if kind == FIXED:
-            continue
-        elif kind == CONTINUOUS:
-            turn_pair(q, i, v[k] * dt, out)
-        elif kind == SPHERICAL:
-            turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
-        elif kind == FREE_FLYER:
-            integrate_free_flyer(q, i, v, k, dt, out)
-        elif kind == PLANAR_SE2:
-            integrate_planar_se2(q, i, v, k, dt, out)
-        else:
-            for j in range(m.v_count[b]):
-                out[i + j] = q[i + j] + dt * v[k + j]
+        integrate_body(m, b, q, v, dt, out)
 
 
 @kernel

@@ -9,7 +9,7 @@ from iapb.compiled import kernel
 from iapb.elementary import arc_tangent
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
-from iapb.mechanics.kernels.configuration import difference
+from iapb.mechanics.kernels.configuration import difference, turn_vector
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
 from iapb.mechanics.kernels.kinematics import forward_kinematics, motion_at
 from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
@@ -226,7 +226,21 @@ def impact_loss(mass_matrix, lower, v, impulse, change):
 
 
 @kernel
-def displacements_along(m, q, out):
-    """out (n - 1, d) <- the displacement of each step of a trajectory q (n, nq), see `difference`."""
+def displacements_along(m, q, straight, out):
+    """out (n - 1, d) <- the displacement of each step of a trajectory q (n, nq), see `difference`.
+
+    With `straight`, that of a free flyer is the path of its centre of mass, in body axes at the start of the step,
+    minus phi x c: the work of a force that keeps its direction in the world, where `difference` gives a screw motion.
+    """
     for k in range(out.shape[0]):
         difference(m, q[k], q[k + 1], out[k])
+        if straight:
+            for b in range(m.kind.shape[0]):
+                if m.kind[b] == FREE_FLYER:
+                    i, j, c = m.q_start[b], m.v_start[b], load(m.center_of_mass, b)
+                    now, then = q[k, i : i + 7], q[k + 1, i : i + 7]
+                    path = (then[0] - now[0], then[1] - now[1], then[2] - now[2])
+                    path = add(path, turn_vector(then[3], then[4], then[5], then[6], c))
+                    path = subtract(turn_vector(-now[3], -now[4], -now[5], now[6], path), c)
+                    path = subtract(path, cross((out[k, j + 3], out[k, j + 4], out[k, j + 5]), c))
+                    out[k, j], out[k, j + 1], out[k, j + 2] = path

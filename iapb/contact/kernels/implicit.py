@@ -1,0 +1,532 @@
+"""Resting contact, implicit in the velocity: the forces of a step act at its end, so no stiffness makes energy.
+
+v* is the velocity after impulses and applied forces. Over the contacts of a group, with γ = J v and gap φ <= 0,
+
+    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k = K Δt + B,
+
+w the tangential velocities, c = μ Δt f the limit of friction and h(|w|) = |w|, rounded within ε c of zero so that it has
+a derivative: there a contact sticks, and creeps with ε times what its limit would give its own mass. The function is
+strictly convex: one answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with
+a line search solves it, from the velocity before the step's forces, which at rest is the answer.
+The limits of friction follow from the forces, so both are solved in turns; any limit c >= 0 dissipates.
+
+Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B >= 0 and Δt > 0
+(`verification.proofs`). A solution that is not accurate enough to show this in numbers is shortened until it does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.contact_set import group_of_contact, moving_tree
+from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
+from iapb.mechanics.kernels.kinematics import add_point_force
+from iapb.mechanics.kernels.vectors import add, load, scale, store
+
+CREEP = 1e-8  # ε: a sticking contact slips with this share of the speed that its friction would give its own mass
+EXACT = 1e-12  # share of the terms of a momentum balance below which it counts as solved
+GOOD = 1e-9  # the same, where rounding allows no better
+ITERATIONS = 60  # of Newton's method for given limits of friction
+TURNS = 12  # of the limits of friction in a step; the next step goes on from the last ones
+SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
+SEARCHES = 40  # evaluations of a line search
+GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
+
+
+class RestWork(NamedTuple):
+    """Scratch of a group's resting contacts: c contacts with s rows each (normal, tangents), d coordinates, t trees."""
+
+    first: np.ndarray  # (t,) int64 first contact of each group, by its first tree, −1 = none
+    next: np.ndarray  # (c,) int64 contact of the same group that follows, −1 = none
+    offset: np.ndarray  # (t,) int64 first local coordinate of each tree
+    contact: np.ndarray  # (c,) int64 contacts of the group
+    tree: np.ndarray  # (c, 2) int64 their two trees, −1 = none or the same
+    rows: np.ndarray  # (c s, 2 w) rows of J: w entries for each of the two trees
+    speed: np.ndarray  # (c s,) J v [m/s]
+    change: np.ndarray  # (c s,) J Δv of a Newton step
+    p: np.ndarray  # (c s,) impulses of the step [N s]
+    limit: np.ndarray  # (c,) limits c of friction [N s]
+    soft: np.ndarray  # (c,) ε W of the tangents [1/kg]
+    envelope: np.ndarray  # (d,) int64 first nonzero column of each row of the Newton matrix
+    v: np.ndarray  # (d,) local velocities
+    free: np.ndarray  # (d,) v*
+    balance: np.ndarray  # (d,) M (v − v*) − Jᵀ p
+    terms: np.ndarray  # (d,) sum of the sizes of its terms
+    step: np.ndarray  # (d,) Newton step
+    given: np.ndarray  # (d,) M Δv of it
+    shortened: np.ndarray  # (1,) int64 number of groups, since the start, whose solution was shortened
+
+
+def make_rest_work(coordinates: int, contacts: int, rows: int, tree_size: int, trees: int) -> RestWork:
+    """Allocate the scratch; `rows`: of each contact, `tree_size`: coordinates of the largest tree."""
+    c, d = contacts, coordinates
+    whole = {"first": trees, "next": c, "offset": trees, "contact": c, "envelope": d, "shortened": 1}
+    vectors = {"speed": c * rows, "change": c * rows, "p": c * rows, "limit": c, "soft": c, "v": d, "free": d,
+               "balance": d, "terms": d, "step": d, "given": d}
+    return RestWork(tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * rows, 2 * tree_size)),
+                    **{name: np.zeros(size, np.int64) for name, size in whole.items()},
+                    **{name: np.zeros(size) for name, size in vectors.items()})
+
+
+@kernel
+def rest_implicitly(world, state, rubs):
+    """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and friction_force."""
+    if not list_groups(world, state):
+        return
+    for group in range(world.tree_start.shape[0]):
+        if state.rest_work.first[group] >= 0:
+            rest_group(world, state, group, 1 + world.tangents if rubs else 1)
+
+
+@kernel
+def list_groups(world, state):
+    """Chain the contacts of each group; return whether there is any."""
+    work, contacts, some = state.rest_work, state.contacts, False
+    work.first[:] = -1
+    for i in range(state.contact_count[0] - 1, -1, -1):
+        contacts.normal_force[i] = 0.0
+        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
+                                 state.group_of_tree)
+        if group >= 0 and contacts.gap[i] <= 0.0:
+            work.next[i], work.first[group], some = work.first[group], i, True
+    return some
+
+
+@kernel
+def rest_group(world, state, group, s):
+    """Solve one group, with s rows a contact, and give its trees their new velocity."""
+    size = place_trees(world, state, group)
+    count = gather_contacts(world, state, group, s)
+    k = world.stiffness * world.dt + world.damping
+    solved = solve(world, state, group, size, count, s, k)
+    for _ in range(TURNS if s > 1 else 0):
+        if not follow_limits(world, state, count, s):
+            break
+        solved = solve(world, state, group, size, count, s, k)
+    guard(world, state, group, count, s, solved)
+    give_back(world, state, group, count, s)
+
+
+@kernel
+def place_trees(world, state, group):
+    """Number the coordinates of the group; copy v* and the first guess, the velocity before the forces of the step."""
+    work, size = state.rest_work, 0
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] != group:
+            continue
+        work.offset[t] = size
+        for k in range(world.tree_start[t], world.tree_stop[t]):
+            work.free[size], work.v[size] = state.v[k], state.start_v[k]
+            work.envelope[size] = work.offset[t]
+            size += 1
+    return size
+
+
+@kernel
+def gather_contacts(world, state, group, s):
+    """Write rows, limits and softness of the group's contacts; return their number."""
+    work, contacts, count, begin, i = state.rest_work, state.contacts, 0, 0, state.rest_work.first[group]
+    while i >= 0:
+        work.contact[count] = i
+        a = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        b = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        if a < 0:
+            a, b = b, -1
+        work.tree[count, 0], work.tree[count, 1] = a, -1 if b == a else b
+        if b >= 0 and b != a:
+            low, high = min(a, b), max(a, b)
+            for k in range(world.tree_stop[high] - world.tree_start[high]):
+                at = work.offset[high] + k
+                work.envelope[at] = min(work.envelope[at], work.offset[low])
+        n = load(contacts.normal, i)
+        for j in range(s):
+            write_row(world, state, count, count * s + j, i, n if j == 0 else tangent_of(n, j - 1, s - 1))
+        work.limit[count] = 0.0
+        if s > 1:
+            mu = friction_of(world, contacts, i)
+            before = same_contact_before(state, i, begin)
+            if before >= 0:
+                begin = before + 1
+                work.limit[count] = mu * state.previous.normal_force[before] * world.dt
+            work.soft[count] = max(1e-300, CREEP * own_mobility(world, state, count, s))
+        count += 1
+        i = work.next[i]
+    return count
+
+
+@kernel
+def same_contact_before(state, i, begin):
+    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
+    now, before, total = state.contacts, state.previous, state.contact_count[1]
+    for k in range(total):
+        j = begin + k if begin + k < total else begin + k - total
+        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
+                and now.feature[i] == before.feature[j]):
+            return j
+    return -1
+
+
+@kernel
+def write_row(world, state, r, j, i, direction):
+    """Write row j of J, along a direction at contact i, which is number r of the group."""
+    work, row, x = state.rest_work, state.row, load(state.contacts.point, i)
+    width = work.rows.shape[1] // 2
+    for side in range(2):
+        t = work.tree[r, side]
+        if t >= 0:
+            row[world.tree_start[t] : world.tree_stop[t]] = 0.0
+    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, direction, 1.0, row)
+    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, direction, -1.0, row)
+    for side in range(2):
+        t = work.tree[r, side]
+        if t >= 0:
+            start = world.tree_start[t]
+            for k in range(world.tree_stop[t] - start):
+                work.rows[j, side * width + k] = row[start + k]
+
+
+@kernel
+def own_mobility(world, state, r, s):
+    """Return the trace of J M⁻¹ Jᵀ of the tangents of contact r [1/kg]."""
+    work, lower, total = state.rest_work, state.lower, 0.0
+    width = work.rows.shape[1] // 2
+    for j in range(r * s + 1, (r + 1) * s):
+        for side in range(2):
+            t = work.tree[r, side]
+            if t < 0:
+                continue
+            start = world.tree_start[t]
+            for k in range(start, world.tree_stop[t]):
+                entry = work.rows[j, side * width + k - start]
+                for h in range(start, k):
+                    entry -= lower[k, h] * state.row[h]
+                state.row[k] = entry / lower[k, k]
+                total += state.row[k] * state.row[k]
+    return total
+
+
+@kernel
+def along_rows(world, work, count, s, v, out):
+    """out <- J v of local velocities."""
+    width = work.rows.shape[1] // 2
+    for r in range(count):
+        for j in range(r * s, (r + 1) * s):
+            total = 0.0
+            for side in range(2):
+                t = work.tree[r, side]
+                if t >= 0:
+                    at = work.offset[t]
+                    for k in range(world.tree_stop[t] - world.tree_start[t]):
+                        total += work.rows[j, side * width + k] * v[at + k]
+            out[j] = total
+
+
+@kernel
+def times_mass(world, state, group, v, out):
+    """out <- M v of local velocities, with Δt D of damped joints."""
+    work = state.rest_work
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] != group:
+            continue
+        start, at = world.tree_start[t], work.offset[t]
+        for i in range(world.tree_stop[t] - start):
+            total = 0.0
+            for j in range(world.tree_stop[t] - start):
+                total += state.mass_matrix[start + i, start + j] * v[at + j]
+            if world.switches.joint_damping:
+                total += world.dt * world.joint_damping[start + i] * v[at + i]
+            out[at + i] = total
+
+
+@kernel
+def push(world, state, r, k, gamma):
+    """Return the normal impulse Δt f of contact r at the normal velocity γ."""
+    return world.dt * max(0.0, -world.stiffness * state.contacts.gap[state.rest_work.contact[r]] - k * gamma)
+
+
+@kernel
+def slide_length(work, r, s, share):
+    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(ε W, |w|/c)."""
+    square = 0.0
+    for j in range(r * s + 1, (r + 1) * s):
+        w = work.speed[j] + share * work.change[j]
+        square += w * w
+    size = math.sqrt(square)
+    return size, max(work.soft[r], size / work.limit[r])
+
+
+@kernel
+def slope(world, state, count, s, k, share, linear, quadratic):
+    """Return the derivative of the minimised function along the Newton step, at `share` of it."""
+    work, total = state.rest_work, linear + share * quadratic
+    for r in range(count):
+        j = r * s
+        total -= push(world, state, r, k, work.speed[j] + share * work.change[j]) * work.change[j]
+        if s > 1 and work.limit[r] > 0.0:
+            _, divisor = slide_length(work, r, s, share)
+            for j in range(r * s + 1, (r + 1) * s):
+                total += (work.speed[j] + share * work.change[j]) / divisor * work.change[j]
+    return total
+
+
+@kernel
+def open_balance(world, state, group, size, count, s, k):
+    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the largest share of its terms that is left."""
+    work = state.rest_work
+    width = work.rows.shape[1] // 2
+    along_rows(world, work, count, s, work.v, work.speed)
+    times_mass(world, state, group, work.v, work.balance)
+    times_mass(world, state, group, work.free, work.step)
+    for i in range(size):
+        work.terms[i] = abs(work.balance[i]) + abs(work.step[i])
+        work.balance[i] -= work.step[i]
+    for r in range(count):
+        work.p[r * s] = push(world, state, r, k, work.speed[r * s])
+        if s > 1:
+            divisor = 1.0
+            if work.limit[r] > 0.0:
+                _, divisor = slide_length(work, r, s, 0.0)
+            for j in range(r * s + 1, (r + 1) * s):
+                work.p[j] = -work.speed[j] / divisor if work.limit[r] > 0.0 else 0.0
+        for j in range(r * s, (r + 1) * s):
+            for side in range(2):
+                t = work.tree[r, side]
+                if t < 0 or work.p[j] == 0.0:
+                    continue
+                at = work.offset[t]
+                for i in range(world.tree_stop[t] - world.tree_start[t]):
+                    part = work.rows[j, side * width + i] * work.p[j]
+                    work.balance[at + i] -= part
+                    work.terms[at + i] += abs(part)
+    worst = 0.0
+    for i in range(size):
+        if work.balance[i] != 0.0:
+            worst = max(worst, abs(work.balance[i]) / work.terms[i])
+    return worst
+
+
+@kernel
+def add_square(world, state, r, one, other, factor):
+    """Add factor · J_oneᵀ J_other of contact r to the lower triangle of the Newton matrix."""
+    work, matrix = state.rest_work, state.group_lower
+    width = work.rows.shape[1] // 2
+    for side in range(2):
+        t = work.tree[r, side]
+        if t < 0:
+            continue
+        at = work.offset[t]
+        for i in range(world.tree_stop[t] - world.tree_start[t]):
+            left = factor * work.rows[one, side * width + i]
+            if left == 0.0:
+                continue
+            for second in range(2):
+                u = work.tree[r, second]
+                if u < 0 or work.offset[u] > at:
+                    continue
+                to = work.offset[u]
+                for j in range(world.tree_stop[u] - world.tree_start[u]):
+                    if to + j <= at + i:
+                        matrix[at + i, to + j] += left * work.rows[other, second * width + j]
+
+
+@kernel
+def newton_matrix(world, state, group, size, count, s, k):
+    """Write M + Jᵀ (∂p/∂γ) J to the lower triangle of group_lower, within the envelope."""
+    work, matrix = state.rest_work, state.group_lower
+    for i in range(size):
+        for j in range(work.envelope[i], i + 1):
+            matrix[i, j] = 0.0
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] != group:
+            continue
+        start, at = world.tree_start[t], work.offset[t]
+        for i in range(world.tree_stop[t] - start):
+            for j in range(i + 1):
+                matrix[at + i, at + j] = state.mass_matrix[start + i, start + j]
+            if world.switches.joint_damping:
+                matrix[at + i, at + i] += world.dt * world.joint_damping[start + i]
+    for r in range(count):
+        n = r * s
+        if work.p[n] > 0.0:
+            add_square(world, state, r, n, n, world.dt * k)
+        if s == 1 or not work.limit[r] > 0.0:
+            continue
+        size_of_slip, divisor = slide_length(work, r, s, 0.0)
+        sticks = divisor == work.soft[r]
+        for j in range(n + 1, n + s):
+            for h in range(n + 1, n + s):
+                factor = 1.0 / divisor if j == h else 0.0
+                if not sticks:
+                    factor -= work.speed[j] * work.speed[h] / (size_of_slip * size_of_slip) / divisor
+                if factor != 0.0:
+                    add_square(world, state, r, j, h, factor)
+
+
+@kernel
+def factor_envelope(matrix, envelope, size):
+    """Overwrite the lower triangle by its Cholesky factor; return False if a pivot is not positive."""
+    for i in range(size):
+        row = matrix[i]
+        for j in range(envelope[i], i):
+            total, other = row[j], matrix[j]
+            for k in range(max(envelope[i], envelope[j]), j):
+                total -= row[k] * other[k]
+            row[j] = total / other[j]
+        pivot = row[i]
+        for k in range(envelope[i], i):
+            pivot -= row[k] * row[k]
+        if not pivot > 0.0:
+            return False
+        row[i] = math.sqrt(pivot)
+    return True
+
+
+@kernel
+def solve_envelope(matrix, envelope, size, x):
+    """Solve L Lᵀ x = x in place."""
+    for i in range(size):
+        total = x[i]
+        for k in range(envelope[i], i):
+            total -= matrix[i, k] * x[k]
+        x[i] = total / matrix[i, i]
+    for i in range(size - 1, -1, -1):
+        x[i] /= matrix[i, i]
+        for k in range(envelope[i], i):
+            x[k] -= matrix[i, k] * x[i]
+
+
+@kernel
+def solve(world, state, group, size, count, s, k):
+    """Minimise for the present limits of friction, from work.v; return whether the balance is solved."""
+    work = state.rest_work
+    worst = open_balance(world, state, group, size, count, s, k)
+    for _ in range(ITERATIONS):
+        if worst <= EXACT:
+            return True
+        newton_matrix(world, state, group, size, count, s, k)
+        if not factor_envelope(state.group_lower, work.envelope, size):
+            return worst <= GOOD
+        for i in range(size):
+            work.step[i] = -work.balance[i]
+        solve_envelope(state.group_lower, work.envelope, size, work.step)
+        along_rows(world, work, count, s, work.step, work.change)
+        share = line_search(world, state, group, size, count, s, k)
+        for i in range(size):
+            work.v[i] += share * work.step[i]
+        before, worst = worst, open_balance(world, state, group, size, count, s, k)
+        if share == 1.0 and worst <= GOOD and worst > 0.5 * before:
+            return True
+    return worst <= GOOD
+
+
+@kernel
+def line_search(world, state, group, size, count, s, k):
+    """Return the share of the Newton step at which the slope vanishes, 1 if it is still negative there."""
+    work, linear, quadratic = state.rest_work, 0.0, 0.0
+    for i in range(size):
+        work.terms[i] = work.v[i] - work.free[i]
+    times_mass(world, state, group, work.terms, work.given)
+    for i in range(size):
+        linear += work.given[i] * work.step[i]
+    times_mass(world, state, group, work.step, work.given)
+    for i in range(size):
+        quadratic += work.given[i] * work.step[i]
+    low, high = 0.0, 1.0
+    at_low = slope(world, state, count, s, k, 0.0, linear, quadratic)
+    at_high = slope(world, state, count, s, k, 1.0, linear, quadratic)
+    if not at_high > 1e-3 * abs(at_low):
+        return 1.0
+    start = abs(at_low)
+    for _ in range(SEARCHES):
+        share = low + (high - low) * at_low / (at_low - at_high)
+        found = slope(world, state, count, s, k, share, linear, quadratic)
+        if abs(found) <= 1e-3 * start:
+            return share
+        if found > 0.0:
+            high, at_high, at_low = share, found, 0.5 * at_low
+        else:
+            low, at_low, at_high = share, found, 0.5 * at_high
+    return low if low > 0.0 else high
+
+
+@kernel
+def follow_limits(world, state, count, s):
+    """Set the limits of friction to those of the present normal impulses; return whether any changed noticeably."""
+    work, changed, largest = state.rest_work, False, 0.0
+    for r in range(count):
+        largest = max(largest, work.p[r * s])
+    for r in range(count):
+        limit = friction_of(world, state.contacts, work.contact[r]) * work.p[r * s]
+        most = max(limit, work.limit[r])
+        changed = changed or abs(limit - work.limit[r]) > SETTLED * most and most > SETTLED * SETTLED * largest
+        work.limit[r] = limit
+    return changed
+
+
+@kernel
+def spring_energy(world, state, count, s, share):
+    """Return Φ [J] at the gaps that the velocity `share` v would lead to."""
+    work, total = state.rest_work, 0.0
+    for r in range(count):
+        gap = min(0.0, state.contacts.gap[work.contact[r]] + share * world.dt * work.speed[r * s])
+        total += 0.5 * world.stiffness * gap * gap
+    return total
+
+
+@kernel
+def guard(world, state, group, count, s, solved):
+    """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays as it is."""
+    work, after, before, size = state.rest_work, 0.0, 0.0, 0
+    if solved:
+        return
+    times_mass(world, state, group, work.v, work.balance)
+    times_mass(world, state, group, work.free, work.step)
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] == group:
+            size += world.tree_stop[t] - world.tree_start[t]
+    for i in range(size):
+        after += 0.5 * work.v[i] * work.balance[i]
+        before += 0.5 * work.free[i] * work.step[i]
+    allowed, share = (before + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN), 1.0
+    while after * share * share + spring_energy(world, state, count, s, share) > allowed:
+        share = 0.5 * share if share > 1e-3 else 0.0
+        if share == 0.0:
+            break
+    if share < 1.0:
+        work.shortened[0] += 1
+        for i in range(size):
+            work.v[i] *= share
+
+
+@kernel
+def give_back(world, state, group, count, s):
+    """Write the group's velocity to v and mean_v, and the forces to the contacts and the generalized forces."""
+    work, contacts, m, w = state.rest_work, state.contacts, world.mechanism, state.body
+    width = work.rows.shape[1] // 2
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] == group:
+            for k in range(world.tree_start[t], world.tree_stop[t]):
+                state.v[k] = state.mean_v[k] = work.v[work.offset[t] + k - world.tree_start[t]]
+    for r in range(count):
+        i, force = work.contact[r], (0.0, 0.0, 0.0)
+        contacts.normal_force[i] = work.p[r * s] / world.dt
+        for side in range(2):
+            t = work.tree[r, side]
+            if t >= 0:
+                for k in range(world.tree_start[t], world.tree_stop[t]):
+                    entry = work.rows[r * s, side * width + k - world.tree_start[t]]
+                    state.penalty_force[k] += entry * contacts.normal_force[i]
+        if s == 1 or not work.limit[r] > 0.0:
+            continue
+        n = load(contacts.normal, i)
+        for j in range(1, s):
+            force = add(force, scale(work.p[r * s + j] / world.dt, tangent_of(n, j - 1, s - 1)))
+        store(contacts.friction_force, i, force)
+        x = load(contacts.point, i)
+        add_point_force(m, w, contacts.body_a[i], x, force, state.friction_force)
+        add_point_force(m, w, contacts.body_b[i], x, scale(-1.0, force), state.friction_force)

@@ -1,0 +1,262 @@
+"""Free motion over a step: it keeps momentum in the world's axes and makes no kinetic energy.
+
+A step applies forces and impulses at its start (the kick); free motion then moves each tree for Δt (the drift).
+
+STRAIGHT  M is constant and B = 0, such as a body in the plane or a slide: q moves with v.
+RIGID     one rigid body that turns freely or about a fixed point. Its angular momentum l in body axes turns against the
+          body, so R l is constant. With the principal moments I_1 <= I_2 <= I_3 the energy |l|²/2I_2 turns the body
+          about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1² + ½(1/I_3 − 1/I_2) l_3², is split into turns about the axes
+          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997). The motion is exact for a ball and
+          for a body with two equal moments, and of second order otherwise. The centre of mass moves straight.
+LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both ends. The velocity of
+          a root that moves freely then follows from the conserved momentum, and the rates of the joints are scaled
+          so that the kinetic energy is that before the drift. Second order.
+"""
+
+from __future__ import annotations
+
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.compiled import kernel
+from iapb.elementary import sine_cosine
+from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
+from iapb.mechanics.kernels.arrays import MechanismArrays
+from iapb.mechanics.kernels.cholesky import solve_mass
+from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
+from iapb.mechanics.kernels.vectors import add, column, cross, dot, load, scale, subtract, transform, transform_back
+from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia, rigid_part
+
+STRAIGHT, RIGID, LINKAGE = range(3)
+RIGID_ANGLE, LINKAGE_ANGLE = 0.05, 0.02  # rad: a tree that turns by more in a step moves in several smaller ones
+MOST_PARTS = 100
+STRETCH = 1.1  # largest factor on the rates of joints; a larger one would mean that the step is far too long
+
+
+class FreeMotion(NamedTuple):
+    """What free motion needs to know of each of t trees (constant)."""
+
+    kind: np.ndarray  # (t,) int64 STRAIGHT, RIGID or LINKAGE
+    root: np.ndarray  # (t,) int64 first body that moves, −1 = none
+    base: np.ndarray  # (t,) int64 number of root velocities with a conserved momentum
+    center: np.ndarray  # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
+    axes: np.ndarray  # (t, 3, 3) its principal axes as columns, both in the root's axes
+    moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
+    turning: bool  # whether any tree is RIGID or a LINKAGE
+    linked: bool  # whether any tree is a LINKAGE
+
+
+def make_free_motion(m: MechanismArrays, tree_of_body: np.ndarray) -> FreeMotion:
+    """Return the constants of the free motion of the trees, given as the tree of each body."""
+    count = 1 + int(tree_of_body.max())
+    found = FreeMotion(np.zeros(count, np.int64), np.full(count, -1, np.int64), np.zeros(count, np.int64),
+                       np.zeros((count, 3)), np.zeros((count, 3, 3)), np.ones((count, 3)), False, False)
+    merged, carriers = moving_parts(m), [b for b in range(len(m.kind)) if m.v_count[b] > 0]
+    for t in range(count):
+        bodies = np.flatnonzero(tree_of_body == t).tolist()
+        moving = [b for b in bodies if m.v_count[b] > 0]
+        if not moving:
+            continue
+        root = found.root[t] = moving[0]
+        kind, at = int(m.kind[root]), carriers.index(root)
+        if len(moving) == 1 and rigid_part(m, root) and kind in (FREE_FLYER, SPHERICAL):
+            found.kind[t], center, inertia = RIGID, merged.center_of_mass[at], merged.inertia[at]
+            if kind == FREE_FLYER:
+                found.center[t] = center
+            else:
+                inertia = inertia + merged.mass[at] * point_inertia(center)
+            found.moments[t], found.axes[t] = principal_axes(inertia)
+        elif has_velocity_terms(m, bodies):
+            found.kind[t], carried = LINKAGE, {root}
+            for b in bodies:
+                carried |= {b} if m.parent[b] in carried else set()
+            if kind in (FREE_FLYER, PLANAR, SPHERICAL) and carried.issuperset(moving):
+                found.base[t] = m.v_count[root]
+    return found._replace(turning=bool((found.kind != STRAIGHT).any()), linked=bool((found.kind == LINKAGE).any()))
+
+
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments, ascending, and the axes as columns of a rotation, by Jacobi's method.
+
+    Without LAPACK: the same bits on every processor.
+    """
+    matrix, axes = [[float(x) for x in row] for row in inertia], np.eye(3).tolist()
+    for _ in range(30):
+        i, j = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(matrix[at[0]][at[1]]))
+        if abs(matrix[i][j]) <= 1e-17 * (abs(matrix[i][i]) + abs(matrix[j][j])):
+            break
+        ratio = (matrix[j][j] - matrix[i][i]) / (2.0 * matrix[i][j])
+        t = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + sqrt(ratio * ratio + 1.0))
+        c = 1.0 / sqrt(t * t + 1.0)
+        s = t * c
+        for rows in (matrix, axes):
+            for row in rows:
+                row[i], row[j] = c * row[i] - s * row[j], s * row[i] + c * row[j]
+        matrix[i], matrix[j] = ([c * a - s * b for a, b in zip(matrix[i], matrix[j], strict=True)],
+                                [s * a + c * b for a, b in zip(matrix[i], matrix[j], strict=True)])
+    order = sorted(range(3), key=lambda k: matrix[k][k])
+    turned = np.array(axes)[:, order]
+    if np.dot(np.cross(turned[:, 0], turned[:, 1]), turned[:, 2]) < 0.0:
+        turned[:, 2] *= -1.0
+    return np.array([matrix[k][k] for k in order]), np.ascontiguousarray(turned)
+
+
+@kernel
+def turn_freely(free, t, q, i, v, k, dt):
+    """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as it is."""
+    axes, I = free.axes, (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
+    omega = transform_back(axes, t, (v[k], v[k + 1], v[k + 2]))
+    l0, l1, l2 = I[0] * omega[0], I[1] * omega[1], I[2] * omega[2]
+    turn_quaternion(q, i, transform(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q)
+    first, third = 1.0 / I[0] - 1.0 / I[1], 1.0 / I[2] - 1.0 / I[1]
+    if first != 0.0 or third != 0.0:
+        parts = 1
+        if first != 0.0 and third != 0.0:
+            parts = max(1, min(MOST_PARTS, ceil(dt * sqrt(dot(omega, omega)) / RIGID_ANGLE)))
+        h = dt / parts
+        for _ in range(parts):
+            for half in range(2):
+                angle = 0.5 * h * first * l0
+                turn_quaternion(q, i, scale(angle, column(axes, t, 0)), q)
+                l1, l2 = turned_back(angle, l1, l2)
+                if half == 0:
+                    angle = h * third * l2
+                    turn_quaternion(q, i, scale(angle, column(axes, t, 2)), q)
+                    l0, l1 = turned_back(angle, l0, l1)
+    v[k], v[k + 1], v[k + 2] = transform(axes, t, (l0 / I[0], l1 / I[1], l2 / I[2]))
+
+
+@kernel
+def turned_back(angle, x, y):
+    """Return (x, y) in axes that have turned by the angle [rad]; the length stays as it is."""
+    s, c = sine_cosine(angle)
+    return c * x + s * y, c * y - s * x
+
+
+@kernel
+def fly(m, free, t, q, v, dt):
+    """Move a RIGID free flyer: its centre of mass goes straight, and the body turns freely."""
+    b = free.root[t]
+    i, k = m.q_start[b], m.v_start[b]
+    c, omega = load(free.center, t), (v[k + 3], v[k + 4], v[k + 5])
+    u = add((v[k], v[k + 1], v[k + 2]), cross(omega, c))
+    x, y, z, s = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+    path = scale(dt, turn_vector(x, y, z, s, u))
+    if dot(omega, omega) > 0.0:
+        center, velocity = turn_vector(x, y, z, s, c), turn_vector(x, y, z, s, u)
+        turn_freely(free, t, q, i + 3, v, k + 3, dt)
+        x, y, z, s = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+        path = add(path, subtract(center, turn_vector(x, y, z, s, c)))
+        u = turn_vector(-x, -y, -z, s, velocity)
+        v[k], v[k + 1], v[k + 2] = subtract(u, cross((v[k + 3], v[k + 4], v[k + 5]), c))
+    q[i], q[i + 1], q[i + 2] = q[i] + path[0], q[i + 1] + path[1], q[i + 2] + path[2]
+
+
+@kernel
+def move_simple_trees(m, free, tree_of_body, q, v, dt):
+    """Move all trees but linkages for dt [s]."""
+    for b in range(m.kind.shape[0]):
+        if free.kind[tree_of_body[b]] == STRAIGHT:
+            integrate_body(m, b, q, v, dt, q)
+    for t in range(free.kind.shape[0]):
+        if free.kind[t] == RIGID:
+            b = free.root[t]
+            if m.kind[b] == FREE_FLYER:
+                fly(m, free, t, q, v, dt)
+            else:
+                turn_freely(free, t, q, m.q_start[b], v, m.v_start[b], dt)
+
+
+@kernel
+def parts_of_linkages(m, free, start, stop, v, dt):
+    """Return the number of equal parts in which linkages move over the step, by their fastest rotating joint."""
+    fastest = 0.0
+    for t in range(free.kind.shape[0]):
+        if free.kind[t] == LINKAGE:
+            for k in range(start[t], stop[t]):
+                if m.dof_rotates[k]:
+                    fastest = max(fastest, abs(v[k]))
+    return max(1, min(MOST_PARTS, ceil(dt * fastest / LINKAGE_ANGLE)))
+
+
+@kernel
+def base_momentum(m, free, w, q, mass, start, stop, t, v, out):
+    """out (6,) <- momentum of the root's own dofs in axes that do not move; return the kinetic energy [J] of tree t."""
+    energy = 0.0
+    for i in range(start, stop):
+        total = 0.0
+        for j in range(start, stop):
+            total += mass[i, j] * v[j]
+        energy += 0.5 * v[i] * total
+        if i - start < free.base[t]:
+            out[i - start] = total
+    to_fixed_axes(m, free, w, q, t, out, 1.0)
+    return energy
+
+
+@kernel
+def to_fixed_axes(m, free, w, q, t, p, way):
+    """Turn the momentum p of a root into fixed axes and about the origin (way 1), or back to the root (way −1)."""
+    b = free.root[t]
+    if free.base[t] == 0:
+        return
+    if m.kind[b] == PLANAR:
+        i = m.q_start[b]
+        p[2] += way * (q[i] * p[1] - q[i + 1] * p[0])
+    elif m.kind[b] == SPHERICAL:
+        l = (p[0], p[1], p[2])
+        p[0], p[1], p[2] = transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l)
+    else:
+        place, linear, angular = load(w.position, b), (p[0], p[1], p[2]), (p[3], p[4], p[5])
+        if way > 0.0:
+            linear, angular = transform(w.rotation, b, linear), transform(w.rotation, b, angular)
+            angular = add(angular, cross(place, linear))
+        else:
+            angular = transform_back(w.rotation, b, subtract(angular, cross(place, linear)))
+            linear = transform_back(w.rotation, b, linear)
+        p[0], p[1], p[2] = linear
+        p[3], p[4], p[5] = angular
+
+
+@kernel
+def keep_momentum_and_energy(mass, lower, start, stop, base, p, energy, v, scratch):
+    """Give the root the velocity of its momentum p and scale the other rates so that the kinetic energy is `energy`.
+
+    With the root's momentum fixed, KE = ½ pᵀ M_bb⁻¹ p + ½ v_jᵀ S v_j: the second part is scaled. scratch : (d,)
+    """
+    block = lower[start : start + base, start : start + base]
+    solve_mass(block, p[:base], scratch[:base])
+    carried = 0.5 * dot_of(p[:base], scratch[:base])
+    solve_root(mass, block, start, stop, base, p, v)
+    own = -carried
+    for i in range(start, stop):
+        for j in range(start, stop):
+            own += 0.5 * v[i] * mass[i, j] * v[j]
+    if not own > 1e-12 * (carried + abs(energy)):
+        return
+    factor = min(STRETCH, sqrt(max(0.0, energy - carried) / own))
+    for k in range(start + base, stop):
+        v[k] *= factor
+    solve_root(mass, block, start, stop, base, p, v)
+
+
+@kernel
+def solve_root(mass, block, start, stop, base, p, v):
+    """Solve M_bb v_b = p − M_bj v_j for the root's velocities."""
+    for i in range(base):
+        total = p[i]
+        for j in range(start + base, stop):
+            total -= mass[start + i, j] * v[j]
+        v[start + i] = total
+    solve_mass(block, v[start : start + base], v[start : start + base])
+
+
+@kernel
+def dot_of(a, b):
+    """Return a · b of two vectors."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * b[k]
+    return total
