@@ -4,9 +4,8 @@ v* is the velocity after impulses and applied forces. Over the contacts of a gro
 
     v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k = K Δt + B,
 
-w the tangential velocities, c = μ Δt f the limit of friction and h(|w|) = |w|, rounded within ε c of zero so that it has
-a derivative: there a contact sticks, and creeps with ε times what its limit would give its own mass. The function is
-strictly convex: one answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with
+w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the speed STICKING so
+that it has a derivative: a contact that sticks creeps more slowly than that. The function is strictly convex: one answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with
 a line search solves it, from the velocity before the step's forces, which at rest is the answer.
 The limits of friction follow from the forces, so both are solved in turns; any limit c >= 0 dissipates.
 
@@ -27,9 +26,9 @@ from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, load, scale, store
 
-CREEP = 1e-8  # ε: a sticking contact slips with this share of the speed that its friction would give its own mass
-EXACT = 1e-12  # share of the terms of a momentum balance below which it counts as solved
-GOOD = 1e-9  # the same, where rounding allows no better
+STICKING = 1e-8  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
+EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
+GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction
 TURNS = 12  # of the limits of friction in a step; the next step goes on from the last ones
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
@@ -50,14 +49,13 @@ class RestWork(NamedTuple):
     change: np.ndarray  # (c s,) J Δv of a Newton step
     p: np.ndarray  # (c s,) impulses of the step [N s]
     limit: np.ndarray  # (c,) limits c of friction [N s]
-    soft: np.ndarray  # (c,) ε W of the tangents [1/kg]
     envelope: np.ndarray  # (d,) int64 first nonzero column of each row of the Newton matrix
     v: np.ndarray  # (d,) local velocities
     free: np.ndarray  # (d,) v*
     balance: np.ndarray  # (d,) M (v − v*) − Jᵀ p
-    terms: np.ndarray  # (d,) sum of the sizes of its terms
+    change_of_v: np.ndarray  # (d,) v − v*
     step: np.ndarray  # (d,) Newton step
-    given: np.ndarray  # (d,) M Δv of it
+    given: np.ndarray  # (d,) M times a vector, or L⁻¹ of one
     shortened: np.ndarray  # (1,) int64 number of groups, since the start, whose solution was shortened
 
 
@@ -65,8 +63,8 @@ def make_rest_work(coordinates: int, contacts: int, rows: int, tree_size: int, t
     """Allocate the scratch; `rows`: of each contact, `tree_size`: coordinates of the largest tree."""
     c, d = contacts, coordinates
     whole = {"first": trees, "next": c, "offset": trees, "contact": c, "envelope": d, "shortened": 1}
-    vectors = {"speed": c * rows, "change": c * rows, "p": c * rows, "limit": c, "soft": c, "v": d, "free": d,
-               "balance": d, "terms": d, "step": d, "given": d}
+    vectors = {"speed": c * rows, "change": c * rows, "p": c * rows, "limit": c, "v": d, "free": d,
+               "balance": d, "change_of_v": d, "step": d, "given": d}
     return RestWork(tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * rows, 2 * tree_size)),
                     **{name: np.zeros(size, np.int64) for name, size in whole.items()},
                     **{name: np.zeros(size) for name, size in vectors.items()})
@@ -148,12 +146,11 @@ def gather_contacts(world, state, group, s):
             write_row(world, state, count, count * s + j, i, n if j == 0 else tangent_of(n, j - 1, s - 1))
         work.limit[count] = 0.0
         if s > 1:
-            mu = friction_of(world, contacts, i)
             before = same_contact_before(state, i, begin)
             if before >= 0:
                 begin = before + 1
-                work.limit[count] = mu * state.previous.normal_force[before] * world.dt
-            work.soft[count] = max(1e-300, CREEP * own_mobility(world, state, count, s))
+                work.limit[count] = (friction_of(world, contacts, i) * state.previous.normal_force[before]
+                                     * world.dt)
         count += 1
         i = work.next[i]
     return count
@@ -188,26 +185,6 @@ def write_row(world, state, r, j, i, direction):
             start = world.tree_start[t]
             for k in range(world.tree_stop[t] - start):
                 work.rows[j, side * width + k] = row[start + k]
-
-
-@kernel
-def own_mobility(world, state, r, s):
-    """Return the trace of J M⁻¹ Jᵀ of the tangents of contact r [1/kg]."""
-    work, lower, total = state.rest_work, state.lower, 0.0
-    width = work.rows.shape[1] // 2
-    for j in range(r * s + 1, (r + 1) * s):
-        for side in range(2):
-            t = work.tree[r, side]
-            if t < 0:
-                continue
-            start = world.tree_start[t]
-            for k in range(start, world.tree_stop[t]):
-                entry = work.rows[j, side * width + k - start]
-                for h in range(start, k):
-                    entry -= lower[k, h] * state.row[h]
-                state.row[k] = entry / lower[k, k]
-                total += state.row[k] * state.row[k]
-    return total
 
 
 @kernel
@@ -251,13 +228,13 @@ def push(world, state, r, k, gamma):
 
 @kernel
 def slide_length(work, r, s, share):
-    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(ε W, |w|/c)."""
+    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(|w|, STICKING)/c."""
     square = 0.0
     for j in range(r * s + 1, (r + 1) * s):
         w = work.speed[j] + share * work.change[j]
         square += w * w
     size = math.sqrt(square)
-    return size, max(work.soft[r], size / work.limit[r])
+    return size, max(size, STICKING) / work.limit[r]
 
 
 @kernel
@@ -276,14 +253,17 @@ def slope(world, state, count, s, k, share, linear, quadratic):
 
 @kernel
 def open_balance(world, state, group, size, count, s, k):
-    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the largest share of its terms that is left."""
-    work = state.rest_work
+    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that it would give, as a share of the step's.
+
+    The energy of the step is that of v* and of the springs.
+    """
+    work, energy = state.rest_work, 0.0
     width = work.rows.shape[1] // 2
     along_rows(world, work, count, s, work.v, work.speed)
     times_mass(world, state, group, work.v, work.balance)
     times_mass(world, state, group, work.free, work.step)
     for i in range(size):
-        work.terms[i] = abs(work.balance[i]) + abs(work.step[i])
+        energy += 0.5 * work.free[i] * work.step[i]
         work.balance[i] -= work.step[i]
     for r in range(count):
         work.p[r * s] = push(world, state, r, k, work.speed[r * s])
@@ -300,14 +280,21 @@ def open_balance(world, state, group, size, count, s, k):
                     continue
                 at = work.offset[t]
                 for i in range(world.tree_stop[t] - world.tree_start[t]):
-                    part = work.rows[j, side * width + i] * work.p[j]
-                    work.balance[at + i] -= part
-                    work.terms[at + i] += abs(part)
-    worst = 0.0
-    for i in range(size):
-        if work.balance[i] != 0.0:
-            worst = max(worst, abs(work.balance[i]) / work.terms[i])
-    return worst
+                    work.balance[at + i] -= work.rows[j, side * width + i] * work.p[j]
+    for r in range(count):
+        if work.p[r * s] > 0.0:
+            energy += 0.5 * work.p[r * s] * work.p[r * s] / (world.dt * k)
+    wrong = 0.0
+    for t in range(world.tree_start.shape[0]):
+        if state.group_of_tree[t] == group:
+            start, stop, at = world.tree_start[t], world.tree_stop[t], work.offset[t]
+            for i in range(start, stop):  # |L⁻¹ r|² = rᵀ M⁻¹ r
+                entry = work.balance[at + i - start]
+                for h in range(start, i):
+                    entry -= state.lower[i, h] * work.given[at + h - start]
+                work.given[at + i - start] = entry / state.lower[i, i]
+                wrong += 0.5 * work.given[at + i - start] * work.given[at + i - start]
+    return wrong / energy if energy > 0.0 else wrong
 
 
 @kernel
@@ -357,12 +344,12 @@ def newton_matrix(world, state, group, size, count, s, k):
         if s == 1 or not work.limit[r] > 0.0:
             continue
         size_of_slip, divisor = slide_length(work, r, s, 0.0)
-        sticks = divisor == work.soft[r]
+        sticks = size_of_slip <= STICKING
         for j in range(n + 1, n + s):
             for h in range(n + 1, n + s):
                 factor = 1.0 / divisor if j == h else 0.0
                 if not sticks:
-                    factor -= work.speed[j] * work.speed[h] / (size_of_slip * size_of_slip) / divisor
+                    factor -= (work.speed[j] / size_of_slip) * (work.speed[h] / size_of_slip) / divisor
                 if factor != 0.0:
                     add_square(world, state, r, j, h, factor)
 
@@ -429,8 +416,8 @@ def line_search(world, state, group, size, count, s, k):
     """Return the share of the Newton step at which the slope vanishes, 1 if it is still negative there."""
     work, linear, quadratic = state.rest_work, 0.0, 0.0
     for i in range(size):
-        work.terms[i] = work.v[i] - work.free[i]
-    times_mass(world, state, group, work.terms, work.given)
+        work.change_of_v[i] = work.v[i] - work.free[i]
+    times_mass(world, state, group, work.change_of_v, work.given)
     for i in range(size):
         linear += work.given[i] * work.step[i]
     times_mass(world, state, group, work.step, work.given)
@@ -439,7 +426,7 @@ def line_search(world, state, group, size, count, s, k):
     low, high = 0.0, 1.0
     at_low = slope(world, state, count, s, k, 0.0, linear, quadratic)
     at_high = slope(world, state, count, s, k, 1.0, linear, quadratic)
-    if not at_high > 1e-3 * abs(at_low):
+    if at_low >= 0.0 or not at_high > 1e-3 * abs(at_low):
         return 1.0
     start = abs(at_low)
     for _ in range(SEARCHES):
