@@ -363,7 +363,7 @@ def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int
         friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
         step_friction=make_step_friction(d, capacity * (rubbing and not implicit), tangents, largest_tree),
         rest_work=make_rest_work(d * implicit, capacity * implicit, 1 + tangents, largest_tree, trees),
-        located_q=np.full(nq, np.nan), root_momentum=np.zeros(6 * trees), tree_energy=np.zeros(trees),
+        located_q=np.full(nq, np.nan), root_momentum=np.zeros(9 * trees), tree_energy=np.zeros(trees),
         impacts=_make_log(trees, d), **vectors, **squares,
     )).twin()
 

@@ -6,10 +6,10 @@ without contact get half of gravity before and half after they move, so their mo
 the order is 1.
 
 All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate
-the acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start of
-the step with velocity and acceleration of the stage before it, and has the weight `weight[i]`. The compiled step reads
-these numbers; `Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python only;
-it keeps its fourth order where rotations do not commute.
+the acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start
+of the step with velocity and acceleration of the stage before it, and has the weight `weight[i]`. The compiled step
+reads these numbers; `Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python
+only; it keeps its fourth order where rotations do not commute.
 
 On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """

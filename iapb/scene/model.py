@@ -478,7 +478,8 @@ def scene_schema() -> dict[str, Any]:
     parts = schema["$defs"]
     for name in ("Scene", "SpatialScene"):
         contact = parts[name]["properties"]["contact"]
-        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, {"enum": ["auto", "paper"]}], **contact}
+        words = {"enum": ["auto", "paper"]}
+        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, words], **contact}
     parts["SpatialScene"] = _with_robots(parts["SpatialScene"])
     return {
         "$schema": DIALECT, "title": "Scene file", "type": "object",

@@ -5,8 +5,9 @@ v* is the velocity after impulses and applied forces. Over the contacts of a gro
     v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k = K Δt + B,
 
 w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the speed STICKING so
-that it has a derivative: a contact that sticks creeps more slowly than that. The function is strictly convex: one answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with
-a line search solves it, from the velocity before the step's forces, which at rest is the answer.
+that it has a derivative: a contact that sticks creeps more slowly than that. The function is strictly convex: one
+answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with a line search solves
+it, from the velocity before the step's forces, which at rest is the answer.
 The limits of friction follow from the forces, so both are solved in turns; any limit c >= 0 dissipates.
 
 Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B >= 0 and Δt > 0
@@ -253,9 +254,9 @@ def slope(world, state, count, s, k, share, linear, quadratic):
 
 @kernel
 def open_balance(world, state, group, size, count, s, k):
-    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that it would give, as a share of the step's.
+    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that the balance would give the bodies.
 
-    The energy of the step is that of v* and of the springs.
+    It is a share of the energy of the step, that of v* and of the springs.
     """
     work, energy = state.rest_work, 0.0
     width = work.rows.shape[1] // 2

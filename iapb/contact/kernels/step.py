@@ -16,18 +16,23 @@ from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities, friction_of
+from iapb.mechanics.joints import SPHERICAL
 from iapb.mechanics.kernels.cholesky import cholesky, cholesky_tree_blocks, solve_mass, solve_tree_blocks
 from iapb.mechanics.kernels.configuration import integrate, integrate_body
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
 from iapb.mechanics.kernels.free_motion import (
     LINKAGE,
     base_momentum,
+    center_of,
     keep_momentum_and_energy,
+    linear_momentum,
     move_simple_trees,
     parts_of_linkages,
+    shift_root,
     to_fixed_axes,
 )
 from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.mechanics.kernels.vectors import add, scale, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may overflow: the motion has
@@ -95,7 +100,7 @@ def locate(world, state):
 @kernel
 def is_located(state):
     """Return whether M and its factor are those of q already."""
-    for i in range(state.q.shape[0]):
+    for i in range(state.q.shape[0]):  # noqa: SIM110 - a kernel has no generators
         if state.q[i] != state.located_q[i]:
             return False
     return True
@@ -252,8 +257,12 @@ def swing(world, state, h):
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
             start, stop = world.tree_start[t], world.tree_stop[t]
+            p = state.root_momentum[9 * t : 9 * t + 9]
             state.tree_energy[t] = base_momentum(m, free, state.body, state.q, state.mass_matrix, start, stop, t,
-                                                 state.v, state.root_momentum[6 * t : 6 * t + 6])
+                                                 state.v, p)
+            center, mass = center_of(m, state.body, world.tree_of_body, t)
+            path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
+            p[6], p[7], p[8] = add(center, path)
             for k in range(start, stop):
                 state.v[k] += 0.5 * h * a[k]
     for b in range(m.kind.shape[0]):
@@ -265,6 +274,13 @@ def swing(world, state, h):
                 state.v[k] += 0.5 * h * a[k]
     if not locate(world, state):
         return False
+    for t in range(free.kind.shape[0]):
+        if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
+            p = state.root_momentum[9 * t : 9 * t + 9]
+            center, _ = center_of(m, state.body, world.tree_of_body, t)
+            shift_root(m, free, state.body, world.tree_of_body, state.q, t, subtract((p[6], p[7], p[8]), center))
+    copy_into(state.located_q, state.q)
+    copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
     copy_into(state.mean_acceleration, a)
     coriolis(world, state)
     for t in range(free.kind.shape[0]):
@@ -272,7 +288,7 @@ def swing(world, state, h):
             start, stop = world.tree_start[t], world.tree_stop[t]
             for k in range(start, stop):
                 state.v[k] += 0.5 * h * (a[k] - state.mean_acceleration[k])
-            p = state.root_momentum[6 * t : 6 * t + 6]
+            p = state.root_momentum[9 * t : 9 * t + 9]
             to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
             keep_momentum_and_energy(state.mass_matrix, state.lower, start, stop, free.base[t], p,
                                      state.tree_energy[t], state.v, state.bias)

@@ -135,6 +135,6 @@ class State(NamedTuple):
     step_friction: StepFriction
     rest_work: RestWork
     located_q: np.ndarray  # (nq,) configuration of mass_matrix and lower; NaN: any
-    root_momentum: np.ndarray  # (6 t,) scratch of free motion
+    root_momentum: np.ndarray  # (9 t,) scratch of free motion: a root's momentum and its centre
     tree_energy: np.ndarray  # (t,) the same
     impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

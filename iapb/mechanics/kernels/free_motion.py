@@ -9,8 +9,9 @@ RIGID     one rigid body that turns freely or about a fixed point. Its angular m
           1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997). The motion is exact for a ball and
           for a body with two equal moments, and of second order otherwise. The centre of mass moves straight.
 LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both ends. The velocity of
-          a root that moves freely then follows from the conserved momentum, and the rates of the joints are scaled
-          so that the kinetic energy is that before the drift. Second order.
+          a root that moves freely then follows from the conserved momentum, its position from the straight path of
+          the centre of mass, and the rates of the joints are scaled so that the kinetic energy is that before.
+          Second order.
 """
 
 from __future__ import annotations
@@ -26,11 +27,22 @@ from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.cholesky import solve_mass
 from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
-from iapb.mechanics.kernels.vectors import add, column, cross, dot, load, scale, subtract, transform, transform_back
+from iapb.mechanics.kernels.vectors import (
+    add,
+    column,
+    cross,
+    dot,
+    load,
+    scale,
+    store,
+    subtract,
+    transform,
+    transform_back,
+)
 from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia, rigid_part
 
 STRAIGHT, RIGID, LINKAGE = range(3)
-RIGID_ANGLE, LINKAGE_ANGLE = 0.05, 0.02  # rad: a tree that turns by more in a step moves in several smaller ones
+RIGID_ANGLE, LINKAGE_ANGLE = 0.02, 0.02  # rad: a tree that turns by more in a step moves in several smaller ones
 MOST_PARTS = 100
 STRETCH = 1.1  # largest factor on the rates of joints; a larger one would mean that the step is far too long
 
@@ -218,6 +230,44 @@ def to_fixed_axes(m, free, w, q, t, p, way):
             linear = transform_back(w.rotation, b, linear)
         p[0], p[1], p[2] = linear
         p[3], p[4], p[5] = angular
+
+
+@kernel
+def linear_momentum(m, free, t, p):
+    """Return the linear momentum [N s], in world axes, of a root's momentum in fixed axes; zero if it cannot move."""
+    if free.base[t] == 0 or m.kind[free.root[t]] == SPHERICAL:
+        return (0.0, 0.0, 0.0)
+    return (p[0], p[1], 0.0 if m.kind[free.root[t]] == PLANAR else p[2])
+
+
+@kernel
+def center_of(m, w, tree_of_body, t):
+    """Return the centre of mass of tree t [m] and its mass [kg]."""
+    mass, moment = 0.0, (0.0, 0.0, 0.0)
+    for b in range(m.kind.shape[0]):
+        if tree_of_body[b] == t:
+            mass += m.mass[b]
+            moment = add(moment, scale(m.mass[b], load(w.center, b)))
+    return scale(1.0 / mass if mass > 0.0 else 0.0, moment), mass
+
+
+@kernel
+def shift_root(m, free, w, tree_of_body, q, t, shift):
+    """Move tree t by a vector [m] in world axes: the root's coordinates and the placements in the workspace."""
+    root = free.root[t]
+    i = m.q_start[root]
+    if m.kind[root] == PLANAR:
+        k = m.v_start[root]
+        local = (dot(load(w.axis, k), shift), dot(load(w.axis, k + 1), shift), 0.0)
+    else:
+        local = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], transform_back(w.rotation, root, shift))
+    q[i], q[i + 1] = q[i] + local[0], q[i + 1] + local[1]
+    if m.kind[root] != PLANAR:
+        q[i + 2] += local[2]
+    for b in range(m.kind.shape[0]):
+        if tree_of_body[b] == t:
+            store(w.position, b, add(load(w.position, b), shift))
+            store(w.center, b, add(load(w.center, b), shift))
 
 
 @kernel
