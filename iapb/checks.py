@@ -1,6 +1,7 @@
 """Check a scene before its run for settings that make the result meaningless. Each warning says what value to set.
 
-A lasting contact oscillates on its spring and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
+The explicit forces of the paper have limits that implicit contact has not. A lasting contact oscillates on its spring
+and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
 b = B Δt/m. A step of the law's integrator maps (gap, velocity) linearly. The oscillation grows if that map has an
 eigenvalue of modulus above 1; for semi-implicit Euler this means k + 2 b > 4. Contacts that share a body oscillate
 together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
@@ -390,13 +391,15 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
         Empty if nothing is wrong.
     """
     chosen: Any = ImpulseAugmented() if law is None else law
+    chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
     start = Start(settled(scene)[0])
     uses: frozenset[str] = getattr(chosen, "uses", frozenset())
     found = [*_degrees(scene), *_overlaps(start), *_fast(start)]
     if PENALTY in uses:
-        found += [*_too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler")), *_sags(start)]
-    if FRICTION in uses and PENALTY in uses:
-        found += _overdriven_friction(start)
+        found += _sags(start)
+        if scene.contact.forces == "paper":
+            found += _too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler"))
+            found += _overdriven_friction(start) if FRICTION in uses else ()
     if IMPULSES in uses and IMPACT_FRICTION not in uses and start.scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
     return tuple(found)
@@ -558,7 +561,8 @@ def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
     many = f"{limits.contacts} contact{'s' * (limits.contacts > 1)}"
     who = f"{limits.where} ({many}, effective mass {limits.mass:.3g} kg)"
     remedy = f"or rate >= {_up(limits.rate)} Hz" if math.isfinite(limits.rate) else "or another integrator"
-    if limits.stiffness == 0.0:
+    by_damping = limits.damping > 0.0 and contact.damping * limits.stiffness > contact.stiffness * limits.damping
+    if limits.stiffness == 0.0 or by_damping:
         yield Caution("damping", limits.where, f"contact.damping = {contact.damping:g} N s/m is more than a step of "
                       f"{start.scene.rate:g} Hz can hold at {who}: set contact.damping <= "
                       f"{_down(limits.damping)}, {remedy}")
@@ -683,15 +687,19 @@ def _firm(scene: Scene) -> tuple[dict[str, float], str]:
 
 def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with the values that `contact.auto` chooses, and a remark."""
-    mobility, rows = start.critical[0]
-    mobility *= SPARE if len(start.blocks) > 1 else 1.0
-    if mobility == 0.0:
-        return scene.with_values({"contact.auto": False}), ()
     dt, given = start.dt, scene.contact.model_fields_set
     choice: dict[str, float] = {}
+    said = who = ""
     if scene.contact.forces == "implicit":
-        choice, _ = _firm(scene)
+        choice, said = _firm(scene)
         given = given | {"stiffness", "damping"}
+    mobility, rows = start.critical[0]
+    mobility *= SPARE if len(start.blocks) > 1 else 1.0
+    if mobility == 0.0:  # nothing is near enough to know what will touch: as if the lightest body did
+        mobility = SPARE * max((1.0 / body.mass for body in scene.bodies if body.mass > 0.0), default=0.0)
+        who = "the lightest body"
+    if mobility == 0.0 or not len(start.rows) and not len(start.pairs):
+        return scene.with_values({"contact.auto": False}), ()
     if "stiffness" not in given:
         choice["stiffness"] = _two_digits(AUTO_K / (mobility * dt**2), math.floor)
     if "damping" not in given:
@@ -701,8 +709,10 @@ def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
     if "coherence_distance" not in given:
         choice["coherence_distance"] = _two_digits(2.0 * _top_speed(start) * dt, math.ceil)
     choice = {name: min(value, LARGEST_NUMBER) for name, value in choice.items()}
-    said = ("contact.auto chose " + ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-            + f": effective mass {1.0 / mobility:.3g} kg at {start.names(rows)}, {scene.rate:g} Hz")
+    if not said:
+        values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
+        said = (f"contact.auto chose {values}: effective mass {1.0 / mobility:.3g} kg at "
+                f"{who or start.names(rows)}, {scene.rate:g} Hz")
     return scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()}), (said,)
 
 

@@ -531,6 +531,8 @@ def decide_for(
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
     """Do what `decide_effects` does for a settled scene with known facts."""
+    if law is not None and not isinstance(law, str) and hasattr(law, "within"):
+        law = law.within(scene)
     known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
     if rendering is None and law is not None and not isinstance(law, str):
         rendering = getattr(law, "rendering", "full")

@@ -27,7 +27,7 @@ from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, load, scale, store
 
-STICKING = 1e-8  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
+STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
 GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction

@@ -110,7 +110,7 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                                 [s * a + c * b for a, b in zip(matrix[i], matrix[j], strict=True)])
     order = sorted(range(3), key=lambda k: matrix[k][k])
     turned = np.array(axes)[:, order]
-    if np.dot(np.cross(turned[:, 0], turned[:, 1]), turned[:, 2]) < 0.0:
+    if float((np.cross(turned[:, 0], turned[:, 1]) * turned[:, 2]).sum()) < 0.0:
         turned[:, 2] *= -1.0
     return np.array([matrix[k][k] for k in order]), np.ascontiguousarray(turned)
 
