@@ -82,6 +82,7 @@ _QUANTITIES = {
     "attitude error": ("Attitude", "attitude error [rad]"),
 }
 _INTEGRATORS = {
+    "momentum": STYLES["momentum"],
     "semi_implicit_euler": STYLES["semi-implicit Euler"],
     "midpoint": STYLES["midpoint"],
     "runge_kutta_4": STYLES["Runge-Kutta 4"],

@@ -29,7 +29,7 @@ def scene(*bodies: dict[str, Any], walls: Any = (FLOOR,), rate: float = 1000.0, 
           gravity: Any = (0, -9.81), **contact: Any) -> Scene:
     return Scene.model_validate({
         "name": "made", "rate": rate, "duration": duration, "gravity": gravity, "bodies": list(bodies),
-        "walls": list(walls), "contact": contact})
+        "walls": list(walls), "contact": {"forces": "paper"} | contact})
 
 
 def kinds(found: Scene) -> set[str]:
@@ -168,12 +168,13 @@ def test_auto_chooses_what_the_step_holds_and_what_is_given_stays() -> None:
     text = "name: made\nrate: 1000\nduration: 0.1\ngravity: [0, -9.81]\nbodies:\n  - {name: b, joint: planar, " \
            "mass: 1, inertia: 0.0016666666, shapes: [{kind: box, size: [0.1, 0.1]}], position: [0, 0.2, 0]}\nwalls:\n" \
            "  - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}\n"
-    chosen, (said,) = settled(scene_from_text(text + "contact: auto\n"))
+    chosen, (said,) = settled(scene_from_text(text + "contact: {forces: paper, auto: true}\n"))
     assert chosen.contact.stiffness == 66000.0 and chosen.contact.damping == 160.0  # 0.2 and 0.5 of m/3 and steps
     assert "stiffness = 66000 N/m" in said and not check_scene(chosen)
-    given, (said,) = settled(scene_from_text(text + "contact: {auto: true, stiffness: 2000, friction: 0.3}\n"))
+    given, (said,) = settled(scene_from_text(
+        text + "contact: {forces: paper, auto: true, stiffness: 2000, friction: 0.3}\n"))
     assert given.contact.stiffness == 2000.0 and given.contact.friction == 0.3 and "stiffness" not in said
-    lighter = scene_from_text(text + "contact: auto\n")
+    lighter = scene_from_text(text + "contact: {forces: paper, auto: true}\n")
     heavier = lighter.with_values({"bodies.b.mass": 2.0, "bodies.b.inertia": 0.003333})
     assert settled(heavier)[0].contact.stiffness == pytest.approx(2 * 66000.0, rel=0.02)
     again = scene_from_text(chosen.source_text)
@@ -232,7 +233,7 @@ def test_a_ball_that_tunnels_in_space_is_not_trusted() -> None:
                         "shapes": [{"kind": "sphere", "radius": 0.005, "center": [0, 0, 0.03]}],
                         "position": [0, 0, 0.13, 1, 0, 0, 0], "velocity": [0, 0, 40.0, 0, 0, 0]}],  # upside down
             "walls": [{"name": "plate", "kind": "box", "size": [0.2, 0.2, 0.004], "rpy": [0.2, 0.1, 0.3]}],
-            "contact": {"stiffness": 1e4}}  # fmt: skip
+            "contact": {"forces": "paper", "stiffness": 1e4}}  # fmt: skip
     assert any("passes through plate" in why for why in run_of(SpatialScene.model_validate(made)).distrust)
 
 
@@ -341,7 +342,8 @@ def test_a_ball_in_space_and_a_box_on_four_corners_rest() -> None:
     floor = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
     run = simulate(SpatialScene.model_validate({
         "name": "made", "dimensions": 3, "rate": 1000.0, "duration": 0.5, "gravity": [0, 0, -9.81], "bodies": bodies,
-        "walls": [floor], "contact": {"stiffness": 1e4, "damping": 20.0, "friction": 0.4, "resting_start": True}}))
+        "walls": [floor], "integrator": "semi_implicit_euler",
+        "contact": {"forces": "paper", "stiffness": 1e4, "damping": 20.0, "friction": 0.4, "resting_start": True}}))
     assert run.q[0, [2, 9]] - 0.05 == pytest.approx([-2.0 * 9.81 / 1e4, -9.81 / 4e4], rel=1e-6)
     assert np.abs(run.q - run.q[0]).max() < 1e-8
 

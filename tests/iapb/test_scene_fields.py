@@ -31,7 +31,7 @@ def on_slope(**values: Any) -> Scene:
         "name": "slope", "rate": 1000.0, "duration": 0.3, "bodies": [box],
         "gravity": [9.81 * math.sin(TILT), -9.81 * math.cos(TILT)],
         "walls": [{"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}],
-        "contact": {"stiffness": 1e4, "damping": 100.0}})
+        "contact": {"forces": "paper", "stiffness": 1e4, "damping": 100.0}})
     return scene.with_values(values)
 
 
@@ -173,7 +173,7 @@ def swinging(**values: Any) -> Scene:
     """A rod on a hinge, without gravity: 0.1 kg m2 about it, turning at 2 rad/s."""
     rod = {"name": "rod", "joint": "revolute", "mass": 1.0, "inertia": 0.1, "velocity": [2.0]}
     scene = Scene.model_validate({"name": "rod", "rate": 1000.0, "duration": 0.5, "bodies": [rod],
-                                  "contact": {"stiffness": 1e4, "damping": 0.0}})
+                                  "contact": {"forces": "paper", "stiffness": 1e4, "damping": 0.0}})
     return scene.with_values(values)
 
 
@@ -246,7 +246,7 @@ def test_a_limit_holds_all_that_its_joint_carries(law: Any) -> None:
 
 
 def test_a_limit_that_gives_way_is_said_before_and_after_the_run() -> None:
-    scene = loaded("revolute", contact={"auto": True})  # a stiffness that the motor alone allows
+    scene = loaded("revolute", contact={"forces": "paper", "auto": True})  # a stiffness that the motor alone allows
     (caution,) = check_scene(scene)
     assert caution.kind == "sag" and "limit of arm holds its joint beyond it" in caution.text
     assert any("motor.angle is -0.4" in why and "times their range" in why for why in simulate(scene).distrust)

@@ -33,7 +33,8 @@ def user_scene(rng: np.random.Generator) -> Scene:
     """Return a random scene of 0.4 s, of one of five kinds."""
     kind = rng.choice(["scattered", "stack", "slope", "balls", "linkage"])
     rate = float(np.round(10.0 ** rng.uniform(2.0, 4.0)))
-    contact = {"stiffness": float(10.0 ** rng.uniform(2.0, 9.0)), "friction": float(rng.uniform(0.0, 2.0)),
+    contact = {"forces": "paper",
+               "stiffness": float(10.0 ** rng.uniform(2.0, 9.0)), "friction": float(rng.uniform(0.0, 2.0)),
                "restitution": float(rng.choice([0.0, 0.0, 0.5, 0.9])),
                "friction_law": str(rng.choice(["coulomb", "coulomb", "regularised"]))}
     if rng.random() < 0.5:

@@ -184,7 +184,7 @@ bodies:
   - {name: body, joint: free_flyer, mass: 0.5, inertia: [2e-4, 3e-4, 4e-4], shapes: [%s],
      position: [0, 0, 0.2, 0, 0, 0, 1], velocity: [0.3, -0.2, 0, %s]}
 walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0.1, 1]}]
-contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+contact: {forces: paper, restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
 """
 _BALL, _BOX = "{kind: sphere, radius: 0.04, center: [0.01, 0, 0]}", "{kind: box, size: [0.06, 0.08, 0.03]}"
 
@@ -195,7 +195,7 @@ _SPHERE = (
 _CRADLE = (
     "name: cradle_in_space\ndimensions: 3\nrate: 1000\nduration: 1\nbodies:\n"
     + "".join(_SPHERE % row for row in ((0, 0.2, 0.0, 1.0), (1, 0.4, 0.0613, 0.0), (2, 0.2, 0.1227, 0.0)))
-    + "contact: {restitution: 0.7, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}\n"
+    + "contact: {forces: paper, restitution: 0.7, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}\n"
 )
 
 _SWINGING_ARM = """
@@ -210,7 +210,7 @@ bodies:
      inertia: [1e-3, 4e-3, 4e-3], center_of_mass: [0.1, 0, 0], velocity: [1],
      shapes: [{kind: sphere, radius: 0.03, center: [0.25, 0, 0]}]}
 walls: [{name: wall, kind: half_space, point: [0, 0, -0.2], normal: [0.2, 0, 1]}]
-contact: {restitution: 0, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+contact: {forces: paper, restitution: 0, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
 """
 
 TRUTH_SCENES = {

@@ -100,6 +100,7 @@ bodies:
 walls:
   - {{name: floor, kind: half_plane, point: [0, {_FLOOR!r}], normal: [0, 1]}}
 contact:
+  forces: paper
   restitution: {_RESTITUTION}
   friction: {_FRICTION}
   stiffness: 1e4
@@ -182,8 +183,8 @@ bodies:
     position: [0, {height}, 0]
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact: {{stiffness: 1e4, damping: 100, friction: {mu}, friction_law: {law}, friction_velocity: {creep},
-          coherence_distance: 2e-3}}
+contact: {{forces: paper, stiffness: 1e4, damping: 100, friction: {mu}, friction_law: {law},
+          friction_velocity: {creep}, coherence_distance: 2e-3}}
 hand: {{body: block, point: [0, -{level}], force: [{force}, 0, 0]}}
 """
 
@@ -270,6 +271,7 @@ bodies:
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
 contact:
+  forces: paper
   stiffness: {_STIFF}
   damping: 0
   friction: {_ROUGH}
@@ -367,7 +369,7 @@ bodies:
     velocity: [{speed}]
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact: {{stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2e-3}}
+contact: {{forces: paper, stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2e-3}}
 """
 
 

@@ -30,6 +30,7 @@ bodies:
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
 contact:
+  forces: paper
   restitution: {_RESTITUTION}
   stiffness: 1e5
   damping: 200
@@ -185,7 +186,7 @@ rate: 1000
 duration: 0.3
 bodies:
 {balls}
-contact: {{stiffness: {stiffness}, damping: 0, restitution: 1, coherence_distance: 2e-3}}
+contact: {{forces: paper, stiffness: {stiffness}, damping: 0, restitution: 1, coherence_distance: 2e-3}}
 """
 _CRADLE_STIFFNESS = 1e4
 # Undamped springs that are sampled once per step conserve energy up to the second-order error 2 K Δt² / m.

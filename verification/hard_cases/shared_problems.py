@@ -68,7 +68,7 @@ bodies:
      position: [{x[1]}], velocity: [{v[1]}]}}
 walls:
   - {{name: wall, kind: half_plane, point: [{wall}, 0], normal: [-1, 0]}}
-contact: {{restitution: {e}, coherence_distance: 5e-3}}
+contact: {{forces: paper, restitution: {e}, coherence_distance: 5e-3}}
 """
 
 

@@ -33,7 +33,7 @@ bodies:
 {bodies}
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact: {{stiffness: {stiffness}, damping: 50, friction: {mu}, coherence_distance: 2e-3}}
+contact: {{forces: paper, stiffness: {stiffness}, damping: 50, friction: {mu}, coherence_distance: 2e-3}}
 """
 _BODY = """  - {{name: box_{k}, joint: planar, mass: 1.0, inertia: {inertia!r}, position: [0, {y!r}, 0],
      velocity: [{v}, 0, 0], shapes: [{{kind: box, size: [{w}, {h}]}}]}}"""

@@ -73,7 +73,7 @@ def _drawn(
     gravity : share of the scenes that have gravity, and its field [m/s²]
     """
     values: Values = {**head, "rate": float(rng.choice(rates)), "bodies": bodies, "walls": walls(rng)}
-    values["duration"] = steps / values["rate"]
+    values["duration"], values["integrator"] = steps / values["rate"], "semi_implicit_euler"
     if rng.random() < gravity[0]:
         values["gravity"] = gravity[1]
     values["contact"] = _contact(rng, least_mass, 1.0 / values["rate"])
@@ -135,7 +135,7 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     stiffness = min(10.0 ** rng.uniform(2.0, 5.0), (STIFFEST / dt) ** 2 * least_mass)
     damping = rng.choice([0.0, 0.3, 1.0]) * np.sqrt(stiffness * least_mass)
     contact: Values = {
-        "stiffness": round(stiffness, 3), "damping": round(float(damping), 4),
+        "forces": "paper", "stiffness": round(stiffness, 3), "damping": round(float(damping), 4),
         "restitution": float(rng.choice([0.0, 0.5, 1.0, round(rng.uniform(), 3)])),
     }  # fmt: skip
     if rng.random() < 0.4:

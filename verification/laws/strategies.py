@@ -120,6 +120,7 @@ def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
                        "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(spin)],
                        "shapes": [{"kind": "box", "size": [0.1, 0.02], "center": [0.05, 0.0]}]})  # fmt: skip
     contact = {
+        "forces": "paper",
         "stiffness": 10.0 ** draw(st.integers(1, 4)), "damping": float(draw(st.sampled_from([0, 1, 10]))),
         "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
     }  # fmt: skip
@@ -127,7 +128,8 @@ def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
              {"name": "side", "kind": "half_plane", "point": [0.2, 0.0], "normal": [-1.0, 0.0]}]  # fmt: skip
     rate = float(draw(st.sampled_from([250, 1000])))
     values = {"name": "small_scene", "rate": rate, "duration": steps / rate, "bodies": bodies, "walls": walls,
-              "gravity": draw(st.sampled_from([None, [0.0, -10.0]])), "contact": contact}  # fmt: skip
+              "integrator": "semi_implicit_euler", "contact": contact,
+              "gravity": draw(st.sampled_from([None, [0.0, -10.0]]))}  # fmt: skip
     return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))
 
 
@@ -153,6 +155,7 @@ def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
                   "velocity": [float(x) for x in v[1]], "position": [0.12, 0.0, 0.05, *turn]},
     ]  # fmt: skip
     contact = {
+        "forces": "paper",
         "stiffness": 10.0 ** draw(st.integers(1, 3)), "damping": float(draw(st.sampled_from([0, 1]))),
         "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
     }  # fmt: skip
@@ -160,5 +163,5 @@ def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
              {"name": "side", "kind": "half_space", "point": [0.2, 0, 0], "normal": [-1, 0, 0]}]  # fmt: skip
     values = {"name": "small_scene_in_space", "dimensions": 3, "rate": 1000.0, "duration": steps / 1000.0,
               "bodies": bodies, "walls": walls, "gravity": draw(st.sampled_from([None, [0.0, 0.0, -10.0]])),
-              "contact": contact}  # fmt: skip
+              "contact": contact, "integrator": "semi_implicit_euler"}  # fmt: skip
     return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))

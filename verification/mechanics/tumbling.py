@@ -34,6 +34,7 @@ MOTIONS = {
     "turning over": TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 4.0, 2.8),
 }
 COARSEST = {
+    "momentum": 200,
     "semi_implicit_euler": 800,
     "midpoint": 200,
     "runge_kutta_4": 100,

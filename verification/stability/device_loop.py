@@ -76,7 +76,7 @@ class DeviceLoop:
             "bodies": [{"name": "tool", "joint": "prismatic", "axis": [1, 0], "mass": self.mass,
                         "shapes": [{"kind": "circle", "radius": RADIUS}], "position": [-RADIUS - self.clearance]}],
             "walls": [{"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}],
-            "contact": {"restitution": 0.0, **wall}, "device": {}, "couplings": couplings,
+            "contact": {"forces": "paper", "restitution": 0.0, **wall}, "device": {}, "couplings": couplings,
             "hand": {"body": "tool", "force": [0, 0, 0]},
         }))  # fmt: skip
 

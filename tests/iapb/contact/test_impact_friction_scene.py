@@ -27,7 +27,7 @@ bodies:
   - {name: box, joint: planar, mass: 0.5, inertia: 1e-3, shapes: [{kind: box, size: [0.2, 0.1]}],
      position: [0, 0.3, 0], velocity: [1.0, 0, 0]}
 walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]
-contact: {friction: 0.2, restitution: 0.6, stiffness: 0, damping: 0}
+contact: {forces: paper, friction: 0.2, restitution: 0.6, stiffness: 0, damping: 0}
 """)
 SPACE = scene_from_text("""\
 name: thrown_cuboid
@@ -39,7 +39,7 @@ bodies:
   - {name: box, joint: free_flyer, mass: 0.5, inertia: [1e-3, 2e-3, 3e-3], shapes: [{kind: box, size: [0.2, 0.1, 0.1]}],
      position: [0, 0, 0.3, 0, 0, 0, 1], velocity: [1.0, 0.5, 0, 3, 2, 1]}
 walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
-contact: {friction: 0.2, restitution: 0.6, stiffness: 0, damping: 0}
+contact: {forces: paper, friction: 0.2, restitution: 0.6, stiffness: 0, damping: 0}
 """)
 
 
@@ -125,7 +125,9 @@ def test_unequal_restitution_and_friction_in_one_impact() -> None:
 
 def test_the_law_says_what_it_is() -> None:
     assert LAW.name != ImpulseAugmented().name
-    assert LAW.settings["friction_in_impacts"] is True and ImpulseAugmented().settings["friction_in_impacts"] is False
+    assert LAW.settings["friction_in_impacts"] is True
+    assert ImpulseAugmented().within(PLANE).friction_in_impacts is False  # forces: paper
+    assert ImpulseAugmented().within(PLANE.with_values({"contact.forces": "implicit"})).friction_in_impacts is True
     assert thrown(False).law == LAW.name and thrown(False).law_settings["friction_in_impacts"] is True
     with pytest.raises(ArgumentError, match="friction_in_impacts"):
         ImpulseAugmented(friction_in_impacts="yes")  # type: ignore[arg-type]

@@ -205,7 +205,7 @@ def test_inner_stages_cluster_contacts_too(integrator):
 
 
 def test_settings_that_do_not_exist_are_named():
-    with pytest.raises(ArgumentError, match="integrator = 'euler': expected one of semi_implicit_euler"):
+    with pytest.raises(ArgumentError, match="integrator = 'euler': expected one of momentum, semi_implicit_euler"):
         Penalty("euler")
     with pytest.raises(ArgumentError, match="rendering = 'clip': expected one of full, saturate, scale, spread"):
         ImpulseAugmented(rendering="clip")

@@ -14,6 +14,8 @@ DURATION = 0.5  # [s]
 STEPS = 20  # of the coarsest run: small enough a step for the leading error term to rule
 ORDER_TOLERANCE = 0.15  # next error term at these steps
 ROD = np.diag([0.0, 1 / 12, 1 / 12])
+# `momentum` has its Coriolis terms in compiled kernels: see tests of free motion
+METHODS = [method for method in (*INTEGRATORS.values(), COMMUTATOR_FREE_4) if not method.conserving]
 
 
 def double_pendulum():
@@ -57,7 +59,7 @@ def measured_order(problem, method):
     return np.log2(errors[0] / errors[1])
 
 
-@pytest.mark.parametrize("method", [*INTEGRATORS.values(), COMMUTATOR_FREE_4], ids=lambda method: method.name)
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_measured_order_is_the_declared_one(method):
     assert measured_order(double_pendulum(), method) == pytest.approx(method.order, abs=ORDER_TOLERANCE)
     assert measured_order(tumbling_body(), method) == pytest.approx(method.group_order, abs=ORDER_TOLERANCE)
@@ -72,7 +74,7 @@ POLYNOMIALS = {  # of h A in q' = v, v' = K q: one step is exp(h A) up to the me
 POLYNOMIALS["commutator_free_4"] = POLYNOMIALS["runge_kutta_4"]
 
 
-@pytest.mark.parametrize("method", [*INTEGRATORS.values(), COMMUTATOR_FREE_4], ids=lambda method: method.name)
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_a_step_of_a_linear_system_is_the_methods_polynomial(method):
     """Damped springs, q'' = K q + D v: the stability function as a matrix."""
     rng = np.random.default_rng(0)

@@ -50,6 +50,8 @@ NOT_A_NAME = ["", "a b", "a.b", "1a", "é", "a\n", 3, None, "x" * 65]
 NOT_A_PAIR_OF_GAINS = [[1], [1, 1, 1], [-1, 1], [1, "x"], 3, []]
 
 REFUSED: list[tuple[str, list[Any]]] = [
+    ("integrator", ["leapfrog"]),
+    ("contact.forces", ["explicit"]),
     ("name", NOT_A_NAME),
     ("title", [3, None, "x" * 2001]),
     ("source", [3, None, "x" * 2001]),

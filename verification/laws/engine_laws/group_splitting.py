@@ -33,7 +33,8 @@ class TwoRooms:
 def draw(rng: np.random.Generator) -> TwoRooms:
     """Draw two random scenes; both use the step, gravity and contact constants of the first."""
     first = draw_scene(rng, STEPS).values
-    common = {key: first[key] for key in ("name", "rate", "duration", "contact")} | {"gravity": first.get("gravity")}
+    kept = ("name", "rate", "duration", "integrator", "contact")
+    common = {key: first[key] for key in kept} | {"gravity": first.get("gravity")}
     rooms = [_room(first["bodies"], "near", 0.0), _room(draw_scene(rng, STEPS).values["bodies"], "far", APART)]
     both = {key: rooms[0][key] + rooms[1][key] for key in ("bodies", "walls")}
     one, other, together = (SceneCase(common | room, "IAPB") for room in (*rooms, both))

@@ -32,6 +32,7 @@ def pile(masses: tuple[float, ...], law: str = "coulomb") -> Scene:
     return scene_from_text(f"""
 name: pile
 dimensions: 3
+integrator: semi_implicit_euler
 rate: {RATE}
 duration: 0.1
 gravity: [2, 1, -9.81]
@@ -39,7 +40,7 @@ bodies:
 {bodies}
 walls:
   - {{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}}
-contact: {{stiffness: 2000, damping: 5, friction: {MU}, friction_law: {law}}}
+contact: {{forces: paper, stiffness: 2000, damping: 5, friction: {MU}, friction_law: {law}}}
 """)
 
 
@@ -116,7 +117,7 @@ bodies:
      shapes: [{{kind: box, size: [0.15, 0.05]}}]}}
 walls:
   - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact: {{stiffness: 1e4, friction: 0.5, coherence_distance: 2e-3}}
+contact: {{forces: paper, stiffness: 1e4, friction: 0.5, coherence_distance: 2e-3}}
 """
 
 

@@ -58,7 +58,7 @@ bodies:
   - {{name: last, joint: {free}, mass: 0.9, {body}}}
 walls:
   - {{name: floor, {wall}}}
-contact: {{stiffness: 100, friction: {MU}}}
+contact: {{forces: paper, stiffness: 100, friction: {MU}}}
 """))
 
 

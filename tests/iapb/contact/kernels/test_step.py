@@ -30,6 +30,7 @@ def crowd(rows: str) -> System:
     return System(scene_from_text(f"""
 name: crowd
 dimensions: 3
+integrator: semi_implicit_euler
 rate: 1000
 duration: 0.1
 gravity: [0.3, -0.2, -9.81]
@@ -37,7 +38,7 @@ bodies:
 {''.join(body(k) for k in range(6))}
 walls:
   - {{name: floor, kind: half_space, point: [0, 0, -0.3], normal: [0.1, 0, 1]}}
-contact: {{stiffness: {K}, damping: {B}, friction: {MU}, friction_law: regularised,
+contact: {{forces: paper, stiffness: {K}, damping: {B}, friction: {MU}, friction_law: regularised,
           friction_velocity: {THRESHOLD}, restitution: {E},
           approach_velocity: {SLOW}, self_collision_rows: {rows}}}
 """))
@@ -229,7 +230,8 @@ def discs() -> Scene:
         f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 1e-5, shapes: [{{kind: circle, radius: 0.5}}]}}\n"
         for k in range(12)
     )
-    return scene_from_text(f"name: discs\nrate: 1000\nduration: 0.1\nbodies:\n{bodies}contact: {{stiffness: 500}}\n")
+    return scene_from_text("name: discs\nrate: 1000\nduration: 0.1\ncontact: {forces: paper, stiffness: 500}\n"
+                           f"bodies:\n{bodies}")
 
 
 def test_more_near_pairs_than_there_is_room_for_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
