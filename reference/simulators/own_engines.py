@@ -21,10 +21,6 @@ from reference.time_stepping import RigidConstraints
 
 COORDINATES, VELOCITIES = 7, 6  # number per free flyer
 STEP = 1e-3  # [s] the step at the haptic rate, for which both are designed
-IMPACT = {"stiffness": 1e3, "damping": 0.0, "coherence_distance": 2e-3}  # the paper's walls, lossless
-REST = {"stiffness": 1e4, "damping": 40.0, "coherence_distance": 1e-3}
-STACK_STEP = 5e-6  # [s] springs that carry 1000 kg are stable against 1 g only at such steps
-STACK = {"stiffness": 4e6, "damping": 2.5, "coherence_distance": 1e-3}
 
 
 class ImpulseAugmentedEngine:
@@ -37,14 +33,8 @@ class ImpulseAugmentedEngine:
         return _own_version()
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Return stiffness and damping per corner, as an author of a scene would choose them."""
-        if not scene.rests:
-            return Settings(step or STEP, dict(IMPACT))
-        heavy = max(body.mass for body in scene.bodies) > 100.0
-        if heavy and step is None:
-            return Settings(STACK_STEP, dict(STACK), "a stack of springs: the mass ratio asks for short steps")
-        return Settings(step or STEP, dict(REST), "springs that suit the lightest box cannot carry the heaviest"
-                        if heavy else "")  # fmt: skip
+        """Return the defaults of a scene: implicit contact whose stiffness follows from weights and sizes."""
+        return Settings(step or STEP, {"forces": "implicit"})
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with the compiled loop."""
@@ -87,7 +77,7 @@ def _own_version() -> str:
     return version("iapb")
 
 
-def own_scene(scene: FixedScene, step: float, duration: float, **contact: float) -> Scene:
+def own_scene(scene: FixedScene, step: float, duration: float, **contact: float | str) -> Scene:
     """Return a fixed scene as a `Scene`, with contact settings by the names of a scene file."""
     document = {
         "name": scene.name, "dimensions": 3, "rate": 1.0 / step, "duration": duration,
