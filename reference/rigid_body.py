@@ -7,11 +7,12 @@ Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` uses the engine
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,8 +21,12 @@ from iapb.mechanics.mechanism import Body, Mechanism
 
 Floats = NDArray[np.float64]
 
-# Step [s] of the fourth-order differences: truncation (h ω)⁴ω/480 and rounding stay below 1e-11 up to 10 rad/s.
-_RATE_STEP = 1e-3
+# Joints whose coordinates are not the integrals of their velocities, by Pinocchio's class.
+_CONTINUOUS, _PLANAR, _SPHERICAL, _FREE_FLYER = range(4)
+_TURNING = {"JointModelRUBZ": _CONTINUOUS, "JointModelPlanar": _PLANAR, "JointModelSpherical": _SPHERICAL,
+            "JointModelFreeFlyer": _FREE_FLYER}  # fmt: skip
+# A bias below this share of M |v|² in a few motions is rounding error: it is zero in every motion.
+_NO_BIAS, _MOTIONS = 1e-12, 4
 
 
 def _pinocchio() -> ModuleType:
@@ -140,11 +145,31 @@ class PinocchioMechanism:
 
     def rate(self, q: Floats, v: Floats) -> Floats:
         """Return dq/dt (nq,) of a motion with velocity v (d,) through q; this is v itself if nq = d."""
-        if self.nq == self.nv:
-            return v
-        near, far = ((self.integrate(q, v, h) - self.integrate(q, v, -h)) / (2.0 * h)
-                     for h in (_RATE_STEP, 2.0 * _RATE_STEP))  # fmt: skip
-        return np.asarray((4.0 * near - far) / 3.0)
+        return v if self.nq == self.nv else np.asarray(_rates(self._layout, q, v))
+
+    @cached_property
+    def _layout(self) -> NDArray[np.int64]:
+        """Class (-1: dq/dt = v), first coordinate and first velocity (n, 3) of the joints, and a last row of ends."""
+        joints = list(self.model.joints)[1:]
+        rows = [(_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v) for joint in joints]
+        return np.array([*rows, (-1, self.nq, self.nv)], np.int64)
+
+    def free_acceleration(self, q: Floats, v: Floats) -> Floats:
+        """Return dv/dt = −M⁻¹ B (d,) of the motion without forces, by the articulated body algorithm."""
+        self.model.gravity.linear = np.zeros(3)
+        return np.array(_pinocchio().aba(self.model, self.data, q, v, np.zeros(self.nv)))
+
+    @cached_property
+    def has_bias(self) -> bool:
+        """Whether B(q, v) differs from zero in some motion, tried in a few random ones. Without, v stays constant."""
+        rng = np.random.default_rng(0)
+        for _ in range(_MOTIONS):
+            v = rng.normal(size=self.nv)
+            q = self.integrate(_pinocchio().neutral(self.model), rng.normal(size=self.nv), 1.0)
+            scale = np.abs(self.mass_matrix(q)).sum(axis=1) * (v @ v)
+            if (np.abs(self.bias(q, v)) > _NO_BIAS * scale).any():
+                return True
+        return False
 
     def impulse_dynamics(self, q: Floats, v: Floats, contact_jacobian: Floats, restitution: float) -> Floats:
         """Return v after the impact (d,) by Pinocchio's `impulseDynamics`; rows must be independent."""
@@ -164,6 +189,32 @@ class PinocchioMechanism:
         if not self.model.existFrame(body, body_type):
             raise ArgumentError("body", body, "the name of a body of the model")
         return int(self.model.getFrameId(body, body_type))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _rates(layout, q, v):  # type: ignore[no-untyped-def]
+    """Return dq/dt (nq,) from velocities in body axes: R v of a position, ½ r ⊗ ω of a quaternion r = (x, y, z, w)."""
+    rate = np.empty(len(q))
+    for j in range(len(layout) - 1):
+        kind, a, b = layout[j]
+        if kind in (_CONTINUOUS, _PLANAR):
+            if kind == _PLANAR:
+                cos, sin = q[a + 2], q[a + 3]
+                rate[a], rate[a + 1] = cos * v[b] - sin * v[b + 1], sin * v[b] + cos * v[b + 1]
+                a, b = a + 2, b + 2
+            rate[a], rate[a + 1] = -q[a + 1] * v[b], q[a] * v[b]
+        elif kind in (_SPHERICAL, _FREE_FLYER):
+            if kind == _FREE_FLYER:
+                r, w, u = q[a + 3 : a + 6], q[a + 6], v[b : b + 3]
+                rate[a : a + 3] = u + 2.0 * np.cross(r, np.cross(r, u) + w * u)
+                a, b = a + 3, b + 3
+            r, w, turn = q[a : a + 3], q[a + 3], v[b : b + 3]
+            rate[a : a + 3] = 0.5 * (w * turn + np.cross(r, turn))
+            rate[a + 3] = -0.5 * (r @ turn)
+        else:
+            count = layout[j + 1, 1] - a
+            rate[a : a + count] = v[b : b + count]
+    return rate
 
 
 def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioMechanism:

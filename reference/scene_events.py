@@ -72,7 +72,9 @@ COMPUTATIONS = (
 BOUNCE = 1e-7  # largest height [m] of a neglected bounce; above twice every `closed`, so that other bounces open
 _KEPT = 0.1  # of `released`: threshold right after an event, lower so that a contact that let go does not last again
 _DEPENDENT = 1e-9  # singular value, relative to the largest, below which held rows depend on one another
-_DIFFERENCE = 1e-4  # step [s] of the fourth-order differences for J̇v: rounding and truncation are both near 1e-12
+# Largest time [s] and largest path [m, rad] of the fourth-order differences for J̇v: rounding and truncation are both
+# near 1e-12, of |v|² where that is large.
+_DIFFERENCE, _PATH = 1e-4, 1e-3
 _COMPARED = 11  # instants between two events at which computations are compared
 _AT_ONCE = 100  # most impacts at one instant: Newton's law can leave contacts that approach
 
@@ -211,8 +213,8 @@ class _Motion:
             ahead, behind = (self.rows(self.mechanics.integrate(q, v, s * h), v) for s in (1.0, -1.0))
             return np.array([(ahead[n][1] - behind[n][1]) @ v / (2.0 * h) for n in names])
 
-        found = self.rows(q, v)
-        drift = (4.0 * turning(_DIFFERENCE) - turning(2.0 * _DIFFERENCE)) / 3.0
+        found, h = self.rows(q, v), min(_DIFFERENCE, _PATH / max(float(np.abs(v).max()), 1.0))
+        drift = (4.0 * turning(h) - turning(2.0 * h)) / 3.0
         return _Here(v, mass, free, np.array([found[n][1] for n in names]), drift)
 
     def acceleration(self, state: Floats) -> tuple[Floats, Floats]:
@@ -369,8 +371,7 @@ def scene_truth(
 
 def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | None = None) -> SceneTruth:
     """Compute the motion with one set of tolerances."""
-    made = motion.system.make_state()
-    q, v = start or (made.q, made.v)
+    q, v = start or motion.system.start
     device = [q[motion.tool], v[motion.tool]] if motion.coupled else []
     state, now, duration = np.concatenate([q, v, *device]), 0.0, motion.duration
     segments: list[tuple[float, float, Callable[[float], Floats]]] = []
@@ -425,15 +426,13 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
 
 
 def _apart(one: SceneTruth, other: SceneTruth) -> tuple[float, float, float]:
-    """Return the largest differences of two computations of a motion, compared between equal events."""
+    """Return the largest differences of two computations: of q at equal times, of v between equal events, of events."""
     position = velocity = instant = 0.0
     mine, theirs = ((0.0, *truth.events, truth.end) for truth in (one, other))
     for k in range(len(mine) - 1):
-        (q, v), (q_other, v_other) = (
-            truth.state(np.linspace(at[k], at[k + 1], _COMPARED, endpoint=k == len(mine) - 2))
-            for truth, at in ((one, mine), (other, theirs))
-        )
+        times = [np.linspace(at[k], at[k + 1], _COMPARED, endpoint=k == len(mine) - 2) for at in (mine, theirs)]
+        (q, v), (q_other, v_other) = (truth.state(np.concatenate(times)) for truth in (one, other))
         instant = max(instant, abs(mine[k] - theirs[k]))
-        position = max(position, float(np.abs(q - q_other).max()) + instant * float(np.abs(v).max()))
-        velocity = max(velocity, float(np.abs(v - v_other).max()))
+        position = max(position, float(np.abs(q - q_other).max()))
+        velocity = max(velocity, float(np.abs(v[:_COMPARED] - v_other[_COMPARED:]).max()))
     return position, velocity, instant

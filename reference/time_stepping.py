@@ -1,7 +1,8 @@
 """The contact law of the "ideal" world and of CBuc: rigid contacts at velocity level, one QP per step.
 
-The step itself is in `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction). This module
-makes it a contact law that runs on every scene.
+Forces and impulses act at the start of the step, at its configuration, by `reference.rigid_step` (Moreau/Jean,
+Stewart-Trinkle/Anitescu, Poisson; dry friction). Then the mechanism moves on its own, by `reference.free_motion`. This
+module makes both a contact law that runs on every scene.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from reference.contact_rows import (
     write_contacts,
     write_impact,
 )
+from reference.free_motion import free_motion
 from reference.one_thread import one_thread
 from reference.rigid_step import (
     FRICTION_LAWS,
@@ -123,10 +125,12 @@ class RigidConstraints:
             return self._advance(system, state, applied_force, dt)
 
     def _advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
-        mechanics, q, v = mechanics_of(system), state.q.copy(), state.v.copy()
+        mechanics, q, v, g = mechanics_of(system), state.q.copy(), state.v.copy(), system.gravity
         mass = mechanics.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
-        force = applied_force - mechanics.inner_forces(q, v, system.gravity)
+        # B belongs to the free motion after the forces; where it is zero, its rounding errors keep their old place.
+        inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
+        force = applied_force - inner
         # Joint damping is implicit, by M + Δt D, as in the engine's step.
         damping, approach = system.joint_damping, system.scene.contact.approach_velocity
         damped = mass + dt * np.diag(damping)
@@ -147,10 +151,10 @@ class RigidConstraints:
         blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
         write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
         write_impact(state, system, v, mass, impulse, found.jacobian[blows])
-        q_plus = mechanics.integrate(q, step.velocity, dt)
+        q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
         contact_state = _contact_state(found, step.normal, blows)
         dragging -= damping * step.velocity
-        return StepResult(q_plus, step.velocity, pressing, dragging, impulse, contact_state)
+        return StepResult(q_plus, v_plus, pressing, dragging, impulse, contact_state)
 
     def _solve(
         self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float, found: ContactRows

@@ -31,7 +31,7 @@ _LEVELS = 4.0
 BOUNDED = 2.5
 # The truth's own error may be at most this share of the errors on the fine level: it changes an order by at most 0.1.
 WORTH = 0.1
-_ROUNDING = 1e-9  # per second of step: smaller errors are rounding and count as zero
+_ROUNDING = 1e-7  # per second of step: smaller errors are rounding and count as zero
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,266 @@
+"""Free motion of the reference against closed forms: tops, spins, throws, rolling; in steps and in the truth of events.
+
+The truth of events has no friction, so only the world "ideal-friction" is asked to roll.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.special import ellipj
+
+from iapb.errors import SolverError
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_names
+from iapb.scene.mechanism import mechanism_of
+from iapb.simulation import simulate
+from reference.free_motion import free_motion
+from reference.random_mechanisms import random_mechanism
+from reference.rigid_body import PinocchioMechanism, model_of
+from reference.scene_events import scene_truth
+from reference.time_stepping import RigidConstraints
+
+Floats = NDArray[np.float64]
+Moved = Callable[[Scene, float], tuple[Floats, Floats, Floats]]
+G = 9.81
+UPRIGHT = [0.0, 0.0, 0.0, 1.0]
+
+
+def by_steps(scene: Scene, duration: float) -> tuple[Floats, Floats, Floats]:
+    """Return times (n,), q (n, nq) and v (n, d) of the world "ideal"."""
+    run = simulate(scene, RigidConstraints(), steps=round(duration * scene.rate))
+    return run.time, run.q, run.v
+
+
+def by_events(scene: Scene, duration: float) -> tuple[Floats, Floats, Floats]:
+    """Return times (n,), q (n, nq) and v (n, d) of the event-driven truth."""
+    time = np.linspace(0.0, duration, 21)
+    return time, *scene_truth(scene, duration).state(time)
+
+
+both = pytest.mark.parametrize("moved", [by_steps, by_events])
+
+
+def scene_of(*bodies: dict[str, Any], gravity: float = 0.0, **given: Any) -> SpatialScene:
+    """Return a scene in space at 1 kHz."""
+    found: SpatialScene = SpatialScene.model_validate({
+        "name": "free", "dimensions": 3, "rate": 1000.0, "duration": 10.0, "gravity": [0.0, 0.0, -gravity],
+        "bodies": [{"name": f"body_{k}", "joint": "free_flyer", "mass": 1.0} | body for k, body in enumerate(bodies)],
+    } | given)  # fmt: skip
+    return found
+
+
+def axes_of(quaternions: Floats) -> Floats:
+    """Return rotation matrices (n, 3, 3) of quaternions (n, 4), (x, y, z, w)."""
+    u, w = quaternions[:, :3], quaternions[:, 3]
+    cross = np.array([np.cross(each, np.eye(3)).T for each in u])
+    return np.asarray(np.eye(3) + 2.0 * (w[:, None, None] * cross + cross @ cross))
+
+
+# --- torque-free motion ------------------------------------------------------------------------------------------
+I1, I2, I3 = MOMENTS = np.array([1e-3, 2e-3, 2.8e-3])
+
+
+@both
+@pytest.mark.parametrize(("spin", "duration"), [(10.0, 2.0), (100.0, 0.5), (1000.0, 0.02)])
+def test_an_asymmetric_top_turns_as_elliptic_functions_say(moved: Moved, spin: float, duration: float) -> None:
+    """Landau and Lifshitz, Mechanics, section 37: body rates by cn, sn, dn; turning about the momentum by a quadrature.
+
+    The truth's integrator errs by 1e-11 a step, the steps by rounding; an explicit bias errs by 1e-4 to 1 in a step.
+    """
+    start = spin * np.array([0.3, 0.0, 0.95])
+    time, q, v = moved(scene_of({"inertia": MOMENTS.tolist(), "velocity": [0, 0, 0, *start]}), duration)
+    M, E2 = np.linalg.norm(MOMENTS * start), MOMENTS @ start**2
+    above, below = E2 * I3 - M**2, M**2 - E2 * I1
+    rate, modulus = np.sqrt((I3 - I2) * below / (I1 * I2 * I3)), (I2 - I1) * above / ((I3 - I2) * below)
+
+    def rates(t: Any) -> Any:
+        sn, cn, dn, _ = ellipj(rate * t, modulus)
+        return (np.sqrt(above / (I1 * (I3 - I1))) * cn, np.sqrt(above / (I2 * (I3 - I2))) * sn,
+                np.sqrt(below / (I3 * (I3 - I1))) * dn)  # fmt: skip
+
+    def precession(t: float) -> float:
+        w1, w2, _ = rates(t)
+        return float(M * (I1 * w1**2 + I2 * w2**2) / ((I1 * w1) ** 2 + (I2 * w2) ** 2))
+
+    assert v[:, 3:] == pytest.approx(np.transpose(rates(time)), abs=1e-9 * spin)
+    axes, momentum = axes_of(q[:, 3:]), MOMENTS * start / M
+    assert axes @ (MOMENTS * v[:, 3:])[:, :, None] / M == pytest.approx(
+        np.broadcast_to(momentum[:, None], (len(time), 3, 1)), abs=1e-9)
+    third = axes[[0, -1], :, 2] - np.outer(axes[[0, -1], :, 2] @ momentum, momentum)  # its part across the momentum
+    turned = np.arctan2(np.cross(third[0], third[1]) @ momentum, third[0] @ third[1])
+    expected = quad(precession, 0.0, float(time[-1]), epsabs=1e-12, limit=1000)[0]
+    assert np.angle(np.exp(1j * (turned - expected))) == pytest.approx(0.0, abs=1e-7)
+
+
+@both
+@pytest.mark.parametrize("spin", [1.0, 100.0, 1000.0])
+def test_a_spinning_sphere_flies_straight(moved: Moved, spin: float) -> None:
+    """The first reference accelerated it from 3 to 434 m/s in a second at 100 rad/s: ω × v was explicit."""
+    ball = {"inertia": [4e-4] * 3, "velocity": [3, 0, 0, 0, 0.6 * spin, 0.8 * spin]}
+    time, q, v = moved(scene_of(ball), 0.1)
+    assert q[:, :3] == pytest.approx(np.outer(time, [3.0, 0.0, 0.0]), abs=1e-9)
+    velocity = axes_of(q[:, 3:]) @ v[:, :3, None]
+    assert velocity[:, :, 0] == pytest.approx(np.broadcast_to([3.0, 0.0, 0.0], (len(time), 3)), abs=1e-8)
+    assert np.linalg.norm(v[:, 3:], axis=1) == pytest.approx(spin, rel=1e-9)
+
+
+def test_ten_seconds_at_a_hundred_radians_per_second_change_nothing() -> None:
+    """Energy and both momenta about the world's origin, of a box whose centre of mass is off its origin."""
+    center = np.array([0.1, 0.02, -0.03])
+    box = {"inertia": MOMENTS.tolist(), "center_of_mass": center.tolist(), "velocity": [3, 0, 0, 60, 10, 79]}
+    _, q, v = by_steps(scene_of(box), 10.0)
+    axes, turning = axes_of(q[:, 3:]), v[:, 3:]
+    momentum = np.einsum("nij,nj->ni", axes, v[:, :3] + np.cross(turning, center))  # 1 kg
+    place = q[:, :3] + axes @ center
+    angular = np.einsum("nij,nj->ni", axes, MOMENTS * turning) + np.cross(place, momentum)
+    energy = 0.5 * (momentum**2).sum(axis=1) + 0.5 * turning**2 @ MOMENTS
+    # Each of 1e4 steps errs by a rounding or two, 4e-12 in all; the angular momentum has lever arms of 30 m.
+    for kept, size in ((momentum, 3.0), (angular, 30.0 * 3.0), (energy, energy[0])):
+        assert np.abs(kept - kept[0]).max() <= 5e-11 * size
+
+
+@both
+def test_a_thrown_body_flies_on_the_same_parabola_with_and_without_spin(moved: Moved) -> None:
+    """By steps, gravity acts at once at the start of each step: the body is g t Δt/2 below the parabola."""
+    given: dict[str, Any] = {"inertia": MOMENTS.tolist()}
+    thrown = [moved(scene_of(given | {"velocity": [1, 2, 5, *spin]}, gravity=G), 1.0)
+              for spin in ([0, 0, 0], [30, 40, -20])]  # fmt: skip
+    (time, still, _), (_, spinning, _) = thrown
+    assert spinning[:, :3] == pytest.approx(still[:, :3], abs=1e-9)
+    late = 0.5e-3 if moved is by_steps else 0.0
+    fallen = 0.5 * G * time * (time + 2.0 * late)
+    assert still[:, :3] == pytest.approx(np.outer(time, [1, 2, 5]) - np.outer(fallen, [0, 0, 1]), abs=1e-9)
+
+
+def test_a_floating_robot_that_turns_keeps_momentum_and_energy() -> None:
+    """A base and two links, in free motion for a second at up to 60 rad/s."""
+    links = [("upper", "base", [0.0, 0.0, 1.0]), ("lower", "upper", [1.0, 0.0, 0.0])]
+    place = (np.eye(3), np.array([0.2, 0.0, 0.1]))
+    mechanics = model_of(Mechanism([
+        Body("base", None, Joint("free_flyer"), mass=2.0, inertia=np.diag([0.02, 0.03, 0.04])),
+        *(Body(name, parent, Joint("revolute", axis), placement=place, mass=0.5, center_of_mass=[0.1, 0, 0],
+               inertia=np.diag([1e-3, 2e-3, 2e-3])) for name, parent, axis in links),
+    ]))  # fmt: skip
+    q, v = np.array([0, 0, 0, *UPRIGHT, 0.3, 0.5]), np.array([1.0, 0.0, -1.0, 3.0, 20.0, 10.0, 30.0, -10.0])
+    energy, momentum = mechanics.kinetic_energy(q, v), mechanics.centroidal_momentum(q, v)
+    for _ in range(1000):
+        q, v = free_motion(mechanics, q, v, 1e-3)
+    assert mechanics.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-11)
+    assert mechanics.centroidal_momentum(q, v) == pytest.approx(momentum, abs=1e-11 * np.abs(momentum).max())
+
+
+# --- with gravity and contact -------------------------------------------------------------------------------------
+A, C, ARM, TILT, PRECESSION = 2e-3, 1e-3, 0.05, 0.4, 3.0  # kg m² about the centre of mass, m, rad, rad/s
+
+
+@both
+def test_a_heavy_symmetric_top_precesses_steadily(moved: Moved) -> None:
+    """A' Ω² cos θ − C ω₃ Ω + m g l = 0 about the pivot, A' = A + m l²; L_z and L₃ are constant.
+
+    By steps, gravity acts at once at the start of a step. Then the axis nutates by about the share of this momentum in
+    that of the spin, and the energy by its square; L_z and L₃ are still exact.
+    """
+    pivot = A + ARM**2
+    spin = (pivot * PRECESSION**2 * np.cos(TILT) + G * ARM) / (C * PRECESSION)
+    turning = [0.0, PRECESSION * np.sin(TILT), spin]  # axes turned about x: the vertical is (0, sin θ, cos θ)
+    top = {"joint": "spherical", "inertia": [A, A, C], "center_of_mass": [0, 0, ARM], "velocity": turning,
+           "position": [np.sin(TILT / 2), 0.0, 0.0, np.cos(TILT / 2)]}  # fmt: skip
+    time, q, v = moved(scene_of(top, gravity=G), 1.0)
+    axes = axes_of(q)
+    upward = np.einsum("nij,nj->ni", axes, np.array([pivot, pivot, C]) * v)[:, 2]
+    assert upward == pytest.approx(upward[0], rel=1e-9) and v[:, 2] == pytest.approx(spin, rel=1e-9)
+    energy = 0.5 * v**2 @ [pivot, pivot, C] + G * ARM * axes[:, 2, 2]
+    size = 2.0 * G * ARM * 1e-3 / (C * spin) if moved is by_steps else 1e-9  # 5.6e-3
+    assert np.abs(energy - energy[0]).max() <= max(size**2, 1e-9) * G * ARM
+    assert np.arccos(axes[:, 2, 2]) == pytest.approx(TILT, abs=size)
+    around = np.unwrap(np.arctan2(axes[:, 1, 2], axes[:, 0, 2]))
+    assert around - around[0] == pytest.approx(PRECESSION * time, abs=size)
+
+
+RADIUS = 0.0285
+TABLE = {"walls": [{"name": "table", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+         "contact": {"restitution": 0.0, "friction": 0.2}}  # fmt: skip
+BALL: dict[str, Any] = {"mass": 0.17, "inertia": [0.4 * 0.17 * RADIUS**2] * 3, "position": [0, 0, RADIUS, *UPRIGHT],
+                        "shapes": [{"kind": "sphere", "radius": RADIUS}]}  # fmt: skip
+
+
+@pytest.mark.parametrize(("turning", "share"), [(2.0 / RADIUS, 1.0), (0.0, 5.0 / 7.0), (-2.0 / RADIUS, 3.0 / 7.0)])
+def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
+    """At 2 m/s, rolling, sliding, with back spin: v = (5 v₀ + 2 ω₀ r)/7 and x = v t + (v₀ − v)²/(2 μ g).
+
+    Friction acts at once at the start of a step, so sliding ends short by half a step at the lost speed.
+    """
+    run = simulate(scene_of(BALL | {"velocity": [2, 0, 0, 0, turning, 0]}, gravity=G, **TABLE),
+                   RigidConstraints(friction="coulomb"), steps=2000)  # fmt: skip
+    slid = (2.0 - 2.0 * share) ** 2 / (2.0 * 0.2 * G)
+    short = 0.5e-3 * (2.0 - 2.0 * share)
+    assert run.q[-1, :3] == pytest.approx([2.0 * share * 2.0 + slid - short, 0.0, RADIUS], abs=1e-9 + 0.02 * short)
+    assert np.linalg.norm(run.v[-1, :3]) == pytest.approx(2.0 * share, rel=1e-9)
+    assert np.linalg.norm(run.v[-1, 3:]) * RADIUS == pytest.approx(2.0 * share, rel=1e-9)
+
+
+@both
+def test_a_spinning_ball_slides_on_a_table_without_friction(moved: Moved) -> None:
+    _, q, v = moved(scene_of(BALL | {"velocity": [2, 0, 0, 50, 70, 20]}, gravity=G, **TABLE), 0.2)
+    assert q[-1, :3] == pytest.approx([0.4, 0.0, RADIUS], abs=1e-8)
+    assert np.linalg.norm(v[-1, :3]) == pytest.approx(2.0, rel=1e-8)
+
+
+@pytest.mark.parametrize("spin", [10.0, 1000.0])
+def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor(spin: float) -> None:
+    """No friction: (I + m c² cos² θ) θ'²/2 − m g c sin θ is constant, and the height is r − c sin θ.
+
+    Gravity holds it down against c θ'². The truth keeps the contact by an acceleration, J̇v, found by differences.
+    """
+    mass, inertia, radius, arm, gravity = 1.0, 2e-3, 0.05, 0.01, 0.024 * spin**2
+    disc = {"name": "disc", "joint": "planar", "mass": mass, "inertia": inertia, "position": [0, radius, 0],
+            "velocity": [0, -arm * spin, spin], "shapes": [{"kind": "circle", "radius": radius, "center": [arm, 0]}]}
+    scene = Scene.model_validate({
+        "name": "eccentric", "rate": 1000.0, "duration": 1.0, "gravity": [0, -gravity], "bodies": [disc],
+        "walls": [{"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}],
+        "contact": {"restitution": 0.0},
+    })  # fmt: skip
+    _, q, v = by_events(scene, 10.0 / spin)
+    angle, rate = q[:, 2], v[:, 2]
+    assert q[:, 1] == pytest.approx(radius - arm * np.sin(angle), abs=1e-10)
+    energy = 0.5 * (inertia + mass * arm**2 * np.cos(angle) ** 2) * rate**2 - mass * gravity * arm * np.sin(angle)
+    assert energy == pytest.approx(energy[0], rel=1e-9)
+
+
+# --- mechanisms without velocity terms, and limits ----------------------------------------------------------------
+def test_bias_is_found_where_it_is_and_nowhere_else() -> None:
+    """By trial here, by the structure of the mechanism in the engine: two ways to the same answer."""
+    found = [mechanism_of(load_scene(find_scene(name))) for name in scene_names()]
+    found += [random_mechanism(np.random.default_rng(seed), 1 + seed % 3) for seed in range(40)]
+    assert {(m.has_velocity_terms, model_of(m).has_bias) for m in found} <= {(True, True), (False, False)}
+
+
+def test_without_bias_a_step_is_straight_to_the_last_bit() -> None:
+    mechanics = model_of(mechanism_of(load_scene(find_scene("peg_corner"))))
+    q, v = np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 30.0])
+    moved, same = free_motion(mechanics, q, v, 1e-3)
+    assert same is v and np.array_equal(moved, mechanics.integrate(q, v, 1e-3))
+
+
+def test_a_motion_too_fast_for_the_step_is_an_error() -> None:
+    mechanics = model_of(Mechanism([Body("top", None, Joint("spherical"), mass=1.0, inertia=np.diag(MOMENTS))]))
+    with pytest.raises(SolverError, match="too fast for a step of 0.001 s"):
+        free_motion(mechanics, np.array(UPRIGHT), np.array([3e7, 1e7, 1e7]), 1e-3)
+
+
+@pytest.mark.parametrize("kind", ["free_flyer", "spherical", "planar_se2", "continuous"])
+def test_rates_are_those_of_the_exponential_map(kind: str) -> None:
+    """dq/dt of q ⊕ v t by differences over 1e-4 rad; their rounding errors are about 1e-10 of the rate."""
+    mechanics: PinocchioMechanism = model_of(Mechanism([Body("b", None, Joint(kind), mass=1.0, inertia=np.eye(3))]))
+    rng = np.random.default_rng(4)
+    q = mechanics.integrate(mechanics.normalize(np.ones(mechanics.nq)), rng.normal(size=mechanics.nv), 1.0)
+    v, h = rng.normal(size=mechanics.nv), 1e-4
+    near, far = ((mechanics.integrate(q, v, s * h) - mechanics.integrate(q, v, -s * h)) / (2.0 * s * h)
+                 for s in (1.0, 2.0))  # fmt: skip
+    assert (4.0 * near - far) / 3.0 == pytest.approx(mechanics.rate(q, 1000.0 * v) / 1000.0, abs=1e-8)
