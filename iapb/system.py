@@ -406,7 +406,9 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
     return block(Port(
         coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
         v_stop=v_stop, mechanism=device.block, body=device.workspace(),
-        varying_inertia=not device.has_constant_mass_matrix, device_q=q, device_v=v, device_mass=mass,
+        varying_inertia=not device.has_constant_mass_matrix,
+        free=block(make_free_motion(device.arrays, device.tree_of_body)),
+        trees=np.zeros(len(device.bodies), np.int64), device_q=q, device_v=v, device_mass=mass,
         device_lower=lower, sensed_q=q.copy(), measured_q=q.copy(), engaged=np.zeros(1, np.bool_),
         clock=np.zeros(1, np.int64), **_hand(system, device), **_gains(coupling, v_stop - v_start),
         **_actuators(scene, (q_stop - q_start, v_stop - v_start), on),
@@ -457,7 +459,7 @@ def _actuators(scene: Scene, sizes: tuple[int, int], on: frozenset[str]) -> dict
     return {
         "device_damping": _per_coordinate(settings.damping if settings and damped else None, size), "damped": damped,
         "force_limit": _per_coordinate(limit, size, np.inf), "limited": limited,
-        "resolution": _per_coordinate(settings.position_resolution if settings and quantised else None, nq),
+        "resolution": _per_coordinate(settings.position_resolution if settings and quantised else None, size),
         "quantised": quantised,
         "delayed_force": np.zeros((slots, size)), "delayed_q": np.zeros((slots, nq)),
         "delayed_v": np.zeros((slots, size)),

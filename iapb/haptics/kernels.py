@@ -11,8 +11,9 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import LARGEST_SPEED
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
-from iapb.mechanics.kernels.configuration import difference, integrate
+from iapb.mechanics.kernels.configuration import difference, integrate, integrate_body, is_vector
 from iapb.mechanics.kernels.dynamics import bias, mass_matrix
+from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.mechanics.kernels.vectors import add, dot, load, transform
 from iapb.run import FREE
@@ -40,6 +41,8 @@ class Port(NamedTuple):
     mechanism: MechanismArrays  # the device: kinematically the tool
     body: Workspace
     varying_inertia: bool
+    free: FreeMotion  # of the device alone
+    trees: np.ndarray  # (n_t,) int64 zeros: the device is one tree
     device_q: np.ndarray  # (nq_t,)
     device_v: np.ndarray  # (d_t,)
     device_mass: np.ndarray  # (d_t, d_t)
@@ -48,7 +51,7 @@ class Port(NamedTuple):
     damped: bool
     force_limit: np.ndarray  # (d_t,) [N, N m], inf = none
     limited: bool  # the actuators clip the commanded force to force_limit
-    resolution: np.ndarray  # (nq_t,) [m, rad] of the position sensors
+    resolution: np.ndarray  # (d_t,) [m, rad] of the position sensors, in the tangent where q is no vector
     quantised: bool
     pulsed: bool  # an impulse is rendered over more than one step
     pulse_weights: np.ndarray  # (w,) shares of an impulse in the w steps after it, sum 1
@@ -98,14 +101,26 @@ def sense(world, port, velocity):
     """Write positions rounded to the sensors' resolution, and velocities from their difference over one step.
 
     Both are exact where the resolution is 0. At the first reading, which has no predecessor, the velocity is exact too.
+    A joint whose coordinates are no vector (quaternions, cosine and sine) has sensors that count: each reading moves by
+    whole steps, in metres and radians of its tangent, to the one nearest to the true pose.
     """
-    first = port.clock[0] == 0
-    for k in range(port.sensed_q.shape[0]):
-        step = port.resolution[k]
-        read = round(port.device_q[k] / step) * step if step > 0.0 else port.device_q[k]
-        exact = first or step == 0.0
-        velocity[k] = port.device_v[k] if exact else (read - port.sensed_q[k]) / world.dt
-        port.sensed_q[k] = read
+    first, m = port.clock[0] == 0, port.mechanism
+    difference(m, port.sensed_q, port.device_q, port.error)
+    for b in range(m.kind.shape[0]):
+        i, k, vector = m.q_start[b], m.v_start[b], is_vector(m.kind[b])
+        for j in range(m.v_count[b]):
+            step = port.resolution[k + j]
+            exact, moved = step == 0.0, port.error[k + j]
+            if vector:
+                read = port.device_q[i + j] if exact else round(port.device_q[i + j] / step) * step
+                moved = read - port.sensed_q[i + j]
+                port.sensed_q[i + j] = read
+            elif not exact:
+                moved = round(moved / step) * step
+            port.error[k + j] = moved
+            velocity[k + j] = port.device_v[k + j] if first or exact else moved / world.dt
+        if not vector:
+            integrate_body(m, b, port.sensed_q, port.error, 1.0, port.sensed_q)
 
 
 # The forces on the tool in one step: the hand's and the position channels' (paper VI).
@@ -268,7 +283,10 @@ def command(port):
 
 @kernel
 def move_device(world, state, port):
-    """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged."""
+    """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged.
+
+    A free body as device keeps its momentum, as the tool does, where the world's integrator does.
+    """
     a = port.acceleration
     for i in range(a.shape[0]):
         a[i] = port.device_hand_force[i] + port.device_force[i]
@@ -288,7 +306,10 @@ def move_device(world, state, port):
         finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
     if port.pulsed:
         observe_work(world, port)
-    integrate(port.mechanism, port.device_q, port.device_v, world.dt, port.device_q)
+    if world.conserving and port.free.kind[0] == RIGID:
+        move_simple_trees(port.mechanism, port.free, port.trees, port.device_q, port.device_v, world.dt)
+    else:
+        integrate(port.mechanism, port.device_q, port.device_v, world.dt, port.device_q)
     port.clock[0] += 1
     if port.coupling == UNILATERAL and finite:
         engage(world, state, port)

@@ -2,8 +2,8 @@
 
 `momentum`, the default of a scene, applies forces at the start of a step and then moves the bodies freely
 (`iapb.mechanics.kernels.free_motion`): linear and angular momentum are kept to rounding in the world's axes. Trees
-without contact get half of gravity before and half after they move, so their motion is of second order, which is the
-order it declares. With contact, or under forces of a hand or device that depend on the motion, the order is 1.
+without contact get half of gravity before and half after they move, so they move with order 2 under gravity, and a
+free rigid body with order 4. With contact, or under forces of a hand or device, the order is 1.
 
 All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate
 the acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start
@@ -89,7 +89,7 @@ _STAGES_4 = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 INTEGRATORS: dict[str, Integrator] = {
     method.name: method
     for method in (
-        Integrator("momentum", 2, 2, (0.0,), (1.0,), semi_implicit=True, conserving=True),
+        Integrator("momentum", 1, 4, (0.0,), (1.0,), semi_implicit=True, conserving=True),
         Integrator("semi_implicit_euler", 1, 1, (0.0,), (1.0,), semi_implicit=True),
         Integrator("midpoint", 2, 2, (0.0, 0.5), (0.0, 1.0)),
         Integrator("runge_kutta_4", 4, 2, *_STAGES_4),

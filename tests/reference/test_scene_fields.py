@@ -38,7 +38,8 @@ def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str
     truth, errors = scene_truth(arm(), 0.6), []
     assert len(truth.events) >= 2  # both joints meet a limit
     for rate in (1000.0, 4000.0):
-        run = run_world(arm(rate=rate, **{"contact.stiffness": 5e4 * rate / 1000.0}), world)
+        stiffness = {"contact.forces": "paper", "contact.stiffness": 5e4 * rate / 1000.0}
+        run = run_world(arm(rate=rate, **stiffness), world)
         errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))
     assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too
 

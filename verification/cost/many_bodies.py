@@ -46,7 +46,7 @@ def field_of_discs(n: int) -> str:
     return "\n".join([
         "name: field_of_discs", "rate: 1000", "duration: 1", "bodies:", *bodies, "walls:",
         "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
-        "contact: {stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}", "",
+        "contact: {forces: paper, stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}", "",
     ])  # fmt: skip
 
 

@@ -67,7 +67,8 @@ bodies:
 walls:
   - {name: right_wall, kind: half_plane, point: [0, 0], normal: [1, 0]}
   - {name: floor, kind: half_plane, point: [0, 0], normal: [0, -1]}
-contact: {stiffness: 1000, damping: 50, restitution: 0, cluster_distance: 1.0e-4, coherence_distance: 1.0e-3}
+contact: {forces: paper, stiffness: 1000, damping: 50, restitution: 0, cluster_distance: 1.0e-4,
+          coherence_distance: 1.0e-3}
 hand: {body: peg, force: [-0.32, 0.4, 0]}
 """
     box = '<geom type="box" size="0.0105 0.00525 0.0105"/>'
@@ -99,7 +100,7 @@ bodies:
      shapes: [{kind: box, size: [0.1, 0.1, 0.1]}], position: [0, 0, 0.05, 0, 0, 0, 1]}
 walls:
   - {name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}
-contact: {stiffness: 10000, damping: 40, restitution: 0, coherence_distance: 1.0e-3}
+contact: {forces: paper, stiffness: 10000, damping: 40, restitution: 0, coherence_distance: 1.0e-3}
 """
 
     def model(solver: str) -> Any:
@@ -123,7 +124,7 @@ robots:
   - {{name: arm, urdf: {ARM_FILE.name}, collisions: urdf, position: {{{pose}}}}}
 walls:
   - {{name: block, kind: box, size: {list(size)}, center: {list(center)}}}
-contact: {{stiffness: 10000, damping: 100, restitution: 0, coherence_distance: 1.0e-3}}
+contact: {{forces: paper, stiffness: 10000, damping: 100, restitution: 0, coherence_distance: 1.0e-3}}
 hand: {{body: arm_link_7, point: {list(TOOL_CENTER)}, force: [{', '.join(map(str, TOOL_FORCE))}, 0, 0, 0]}}
 """
 

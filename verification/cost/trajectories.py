@@ -450,7 +450,7 @@ class Judge:
 
 def _fixed(scene: FixedScene, step: float) -> dict[str, Any]:
     """Return the paper's walls, the same at every step: 1000 N/m without damping."""
-    return dict(find_simulator("iapb").settings(scene, step).options)
+    return {"stiffness": 1e3, "damping": 0.0, "coherence_distance": 2e-3}
 
 
 def _stiffened(scene: FixedScene, step: float) -> dict[str, Any]:
@@ -470,7 +470,8 @@ def _compiled(law_name: str, integrator: str, walls: Callable[[FixedScene, float
     def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
         contact = walls(scene, step)
         law = getattr(laws, law_name)(integrator=integrator)
-        loop = RecordedLoop(Simulation(own_scene(scene, step, duration, **contact), law), round(duration / step))
+        made = own_scene(scene, step, duration, forces="paper", **contact)
+        loop = RecordedLoop(Simulation(made, law), round(duration / step))
         seconds = loop.sample() * loop.steps
         run = loop.recording.run("", "")
         keep = slice(None, None, steps_between_samples(step))

@@ -47,6 +47,7 @@ _STATEMENTS = {
                        "delassus_definite"),
     "consequences": ("single_contact_complementarity", "coordinate_invariance", "scaled_impulse",
                      "loss_without_stiffness"),
+    "resting_contact": ("resting_contact", "resting_energy"),
     "resolver": ("projector_form", "spectral_filter", "damped_impact", "any_truncation", "energy_clamp"),
     "impact_laws": ("unequal_restitution", "newton_lcp", "newton_lcp_equal", "poisson_two_lcps", "momentum",
                     "impact_friction", "islands"),

@@ -18,7 +18,17 @@ from verification.proofs.algebra import (
 )
 from verification.proofs.exact import Instance, Matrix
 from verification.proofs.statement import Line
-from verification.proofs.steps import Cancelling, Cofactor, Dividing, Exact, Identity, Pairing, Square, Step
+from verification.proofs.steps import (
+    Cancelling,
+    Cofactor,
+    Dividing,
+    Dominating,
+    Exact,
+    Identity,
+    Pairing,
+    Square,
+    Step,
+)
 from verification.proofs.steps import Term as SumTerm
 
 _SUPERSCRIPTS = {"⁻¹": "-1", "⁺": "+", "⁻": "-", "†": r"\dagger", "²": "2", "′": r"\prime"}
@@ -27,6 +37,7 @@ _SUBSCRIPTS = {**dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict
 _GREEK = {
     "α": r"\alpha", "β": r"\beta", "γ": r"\gamma", "λ": r"\lambda", "μ": r"\mu", "σ": r"\sigma", "ω": r"\omega",
     "δ": r"\delta", "Δ": r"\Delta", "Λ": r"\Lambda", "τ": r"\tau", "ρ": r"\rho", "Φ": r"\Phi", "η": r"\eta",
+    "φ": r"\varphi",
 }  # fmt: skip
 RELATIONS = {"=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥": r"\geq"}
 
@@ -145,6 +156,8 @@ def step_lines(step: Step) -> tuple[Line, ...]:
             return (Line("from " + " and ".join(f"'{fact.name}'" for fact in sources)),)
         case Dividing():
             return (Line(f"from '{step.product.name}' and '{step.divisor.name}'"),)
+        case Dominating():
+            return (Line(f"from '{step.product.name}' and '{step.factor.name}'"),)
         case Identity():
             return tuple(_cofactor_line(cofactor) for cofactor in step.cofactors)
     return tuple(_term_line(t) for t in step.terms) + tuple(_cofactor_line(c) for c in step.cofactors)

@@ -42,7 +42,7 @@ def plain(prose: str) -> str:
         r"\gamma": "γ", r"\delta": "δ", r"\Delta": "Δ", r"\sigma": "σ", r"\mu": "μ", r"\sum": "Σ", r"\sqrt": "√",
         r"\rho": "ρ", r"\tau": "τ", r"\eta": "η", r"\dot": "dot ", r"\quad": "  ", r"\,": " ", r"\;": " ",
         r"\infty": "∞", r"\to": "→", r"\times": "×", r"\hat": "^", r"\|": "‖", r"\theta": "θ", r"\ldots": "…",
-        r"\omega": "ω", r"\partial": "∂", r"\approx": "≈",
+        r"\omega": "ω", r"\partial": "∂", r"\approx": "≈", r"\varphi": "φ", r"\Phi": "Φ", r"\max": "max",
     }  # fmt: skip
     prose = re.sub(r"\\begin{pmatrix}(.*?)\\end{pmatrix}", lambda m: f"[{m[1].strip()}]", prose)
     prose = prose.replace(r" \\ ", "; ").replace(" & ", " ").replace(r"\{", "(").replace(r"\}", ")")

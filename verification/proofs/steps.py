@@ -3,6 +3,7 @@
 Identity      claim.lhs - claim.rhs = sum of  left * (equation.lhs - equation.rhs) * right   (cofactor certificate)
 Positivity    claim.value = sum of non-negative terms + cofactors                            (sum of squares)
 Cancelling    N' G N = 0 (or <= 0) with G positive definite, hence N = 0
+Dominating    q x >= x² with q >= 0, hence x >= 0
 Exact         a relation between two rational numbers
 
 A step raises `Refused` if its certificate does not expand to zero, or if it uses a fact that is not established yet.
@@ -206,6 +207,23 @@ class Dividing:
 
 
 @dataclass(frozen=True)
+class Dominating:
+    """x >= 0, because q x - x² >= 0 with q >= 0 (all scalars)."""
+
+    claim: NonNegative
+    factor: NonNegative
+    product: NonNegative
+    because: str = "x < 0 would make q x ≤ 0 < x²"
+
+    def verify(self, known: Known) -> None:
+        known.require(self.factor)
+        known.require(self.product)
+        q, x = self.factor.value, self.claim.value
+        if not (q.rows == x.rows == "*" and (q * x - x * x - self.product.value).vanishes()):
+            raise Refused(f"'{self.claim.name}': the product does not match")
+
+
+@dataclass(frozen=True)
 class Exact:
     """A relation between two computed rationals; `says` describes the comparison."""
 
@@ -226,7 +244,7 @@ class Exact:
             raise Refused(f"'{self.says}': {self.left} {self.relation} {self.right} is false")
 
 
-Step = Identity | Positivity | Cancelling | Dividing | Exact
+Step = Identity | Positivity | Cancelling | Dividing | Dominating | Exact
 
 
 def _require_zero(name: str, value: Expression, cofactors: Iterable[Cofactor]) -> None:
@@ -271,17 +289,24 @@ def identity(
 
 
 def positivity(
-    name: str, value: Operand, terms: Sequence[Term], rules: Sequence[Equation] = (), because: str = ""
+    name: str,
+    value: Operand,
+    terms: Sequence[Term],
+    rules: Sequence[Equation] = (),
+    because: str = "",
+    first: Sequence[Cofactor] = (),
 ) -> Positivity:
-    """Return the step value >= 0: subtract `terms` from value, then rewrite the rest to zero by `rules`."""
+    """Return the step value >= 0: subtract `terms` and the cofactors `first`, then rewrite the rest by `rules`."""
     claim = NonNegative(name, expression(value))
     remainder = claim.value
     for term in terms:
         remainder = remainder - term.value
+    for cofactor in first:
+        remainder = remainder - cofactor.value
     rest, cofactors = _reduced(remainder, rules)
     if not rest.vanishes():
         raise Refused(f"'{name}': {len(rest.canonical().terms)} terms remain after rewriting")
-    return Positivity(claim, tuple(terms), cofactors, because)
+    return Positivity(claim, tuple(terms), (*first, *cofactors), because)
 
 
 def _reduced(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:

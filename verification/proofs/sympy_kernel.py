@@ -24,6 +24,7 @@ from verification.proofs.steps import (
     RELATIONS,
     Cancelling,
     Dividing,
+    Dominating,
     Exact,
     Identity,
     Pairing,
@@ -70,6 +71,9 @@ def remainder(step: Step) -> Any:
     elif isinstance(step, Dividing):
         value = _of(step.divisor.value) * _difference(step.claim) - _difference(step.product)
         return _canonical(value, step.claim.difference.is_scalar)
+    elif isinstance(step, Dominating):
+        x = _of(step.claim.value)
+        return sympy.expand(_of(step.factor.value) * x - x**2 - _of(step.product.value))
     else:
         return None
     for cofactor in step.cofactors:

@@ -89,6 +89,12 @@ def integrate_planar_se2(q, i, v, k, dt, out):
 
 
 @kernel
+def is_vector(kind):
+    """Return whether the coordinates of a joint are a vector, with one entry for each velocity."""
+    return kind != CONTINUOUS and kind != SPHERICAL and kind != FREE_FLYER and kind != PLANAR_SE2
+
+
+@kernel
 def integrate_body(m, b, q, v, dt, out):
     """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity v."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]

@@ -6,8 +6,9 @@ STRAIGHT  M is constant and B = 0, such as a body in the plane or a slide: q mov
 RIGID     one rigid body that turns freely or about a fixed point. Its angular momentum l in body axes turns against the
           body, so R l is constant. With the principal moments I_1 <= I_2 <= I_3 the energy |l|²/2I_2 turns the body
           about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1² + ½(1/I_3 − 1/I_2) l_3², is split into turns about the axes
-          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997). The motion is exact for a ball and
-          for a body with two equal moments, and of second order otherwise. The centre of mass moves straight.
+          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997), three times with the steps of Yoshida
+          (Phys. Lett. A 150, 1990). The motion is exact for a ball and for a body with two equal moments, and of fourth
+          order otherwise. The centre of mass moves straight.
 LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both ends. The velocity of
           a root that moves freely then follows from the conserved momentum, its position from the straight path of
           the centre of mass, and the rates of the joints are scaled so that the kinetic energy is that before.
@@ -42,8 +43,10 @@ from iapb.mechanics.kernels.vectors import (
 from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia, rigid_part
 
 STRAIGHT, RIGID, LINKAGE = range(3)
-RIGID_ANGLE, LINKAGE_ANGLE = 0.02, 0.02  # rad: a tree that turns by more in a step moves in several smaller ones
+# rad in a step: below the first, one turn of second order is exact to rounding; beyond the others, several parts
+SLOW_ANGLE, RIGID_ANGLE, LINKAGE_ANGLE = 1e-4, 0.1, 0.02
 MOST_PARTS = 100
+YOSHIDA = 1.3512071919596578  # 1/(2 − 2^(1/3)), twice a step, with 1 − 2 × it in between
 STRETCH = 1.1  # largest factor on the rates of joints; a larger one would mean that the step is far too long
 
 
@@ -124,11 +127,11 @@ def turn_freely(free, t, q, i, v, k, dt):
     turn_quaternion(q, i, transform(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q)
     first, third = 1.0 / I[0] - 1.0 / I[1], 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
-        parts = 1
-        if first != 0.0 and third != 0.0:
-            parts = max(1, min(MOST_PARTS, ceil(dt * sqrt(dot(omega, omega)) / RIGID_ANGLE)))
-        h = dt / parts
-        for _ in range(parts):
+        turn = dt * sqrt(dot(omega, omega))
+        single = turn < SLOW_ANGLE or first == 0.0 or third == 0.0
+        parts = 1 if single else max(1, min(MOST_PARTS, ceil(turn / RIGID_ANGLE)))
+        for part in range(parts if single else 3 * parts):
+            h = dt if single else dt / parts * (1.0 - 2.0 * YOSHIDA if part % 3 == 1 else YOSHIDA)
             for half in range(2):
                 angle = 0.5 * h * first * l0
                 turn_quaternion(q, i, scale(angle, column(axes, t, 0)), q)

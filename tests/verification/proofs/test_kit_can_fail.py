@@ -14,6 +14,7 @@ from verification.proofs.statement import Statement
 from verification.proofs.steps import (
     Cancelling,
     Cofactor,
+    Dominating,
     Exact,
     Identity,
     Known,
@@ -42,6 +43,8 @@ def corrupted(statement: Statement, index: int) -> Statement:
     elif isinstance(step, Positivity):
         first, *rest = step.terms
         bad = replace(step, terms=(replace(first, weight=first.weight * 2), *rest))
+    elif isinstance(step, Dominating):
+        bad = replace(step, claim=replace(step.claim, value=2 * step.claim.value))
     elif hasattr(step, "claim") and not isinstance(step, Identity):
         bad = replace(
             step, claim=equation(step.claim.name, 3 * step.claim.lhs + step.claim.difference, step.claim.rhs)

@@ -33,7 +33,8 @@ def altered(statement: Statement, index: int) -> Statement:
     return replace(statement, steps=(*statement.steps[:index], wrong, *statement.steps[index + 1 :]))
 
 
-@pytest.mark.parametrize("name", ["theorem_1", "theorem_2", "independent_subset", "projector_form"])
+@pytest.mark.parametrize("name", [
+    "theorem_1", "theorem_2", "independent_subset", "projector_form", "resting_contact", "resting_energy"])  # fmt: skip
 def test_sympy_refuses_every_altered_certificate_and_so_does_the_kit(name: str) -> None:
     statement, tried = load(name), 0
     for index, step in enumerate(statement.steps):
