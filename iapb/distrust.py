@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.geometry import ENDLESS, Shapes
-from iapb.mechanics.energy import FORCES, energy_ledger
+from iapb.mechanics.energy import FORCES, energy_ledger, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
@@ -187,7 +187,8 @@ def _ledger(run: Run, parts: _Parts, tree: int) -> dict[str, Floats]:
     q = int(parts.mechanism.arrays.q_start[np.searchsorted(parts.mechanism.tree_of_body, tree)])
     forces = {name: getattr(run, f"{name}_force")[parts.begin :, dofs] for name in FORCES}
     states = run.q[parts.begin :, q : q + alone.nq], run.v[parts.begin :, dofs]
-    return energy_ledger(alone, parts.gravity, *states, forces, np.ascontiguousarray(run.impulse[parts.begin :, dofs]))
+    impulse = np.ascontiguousarray(run.impulse[parts.begin :, dofs])
+    return energy_ledger(alone, parts.gravity, *states, forces, impulse, straight=moved_straight(run))
 
 
 def _groups(run: Run, trees: Integers) -> Integers:

@@ -19,6 +19,7 @@ from iapb.effects import Effect
 from iapb.haptics.kernels import PLANNED
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store
+from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, blank, digests, quantities
 from iapb.scene.model import SpatialScene
 
@@ -27,6 +28,7 @@ Start = tuple[dict[str, Floats], dict[str, float]]  # state and energy at the fi
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
 _ROOM = 30e6  # bytes of consecutive chunks together, unless one chunk is larger
+_BATCH = 50_000_000  # bytes of mass matrices held at once
 _STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
 
 # Arrays that the loop writes; poses, energies and digests of M are computed from them.
@@ -342,11 +344,18 @@ class Recorder:
             body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states, **steps,
             contacts=ContactTable(offsets, **self.joined("contacts", copied=more)),
-            impacts=ImpactTable(**impacts, mass_digest=digests(mechanism.mass_matrices(struck))),
+            impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
             chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks, **later,
         )
         return run, ledger
+
+
+def _mass_digests(mechanism: Mechanism, places: Floats) -> NDArray[np.int64]:
+    """Return the digest of M at each of n configurations (n, nq), a few at a time: all of them may take gigabytes."""
+    few = max(1, _BATCH // max(1, 8 * mechanism.nv**2))
+    return np.concatenate([np.zeros(0, np.int64), *(digests(mechanism.mass_matrices(places[k : k + few]))
+                                                    for k in range(0, len(places), few))])
 
 
 def _rows(effects: Sequence[Effect], run: Run) -> tuple[EffectRow, ...]:

@@ -130,6 +130,11 @@ def _entry(before: Mapping[str, float] | None, name: str) -> float | None:
     return None if before is None else before[name]
 
 
+def moved_straight(run: Run) -> bool:
+    """Whether the free bodies of a run moved straight in each step (see `Mechanism.displacements`)."""
+    return run.law_settings.get("integrator") == "momentum"
+
+
 def energy_of_run(
     run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
     before: Mapping[str, float] | None = None,
@@ -140,8 +145,7 @@ def energy_of_run(
     energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
     """
     forces = {name: getattr(run, f"{name}_force") for name in FORCES}
-    straight = run.law_settings.get("integrator") == "momentum"
-    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before, straight)
+    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before, moved_straight(run))
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)

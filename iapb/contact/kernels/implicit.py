@@ -24,7 +24,6 @@ import numpy as np
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import group_of_contact, moving_tree
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
-from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.mechanics.kernels.vectors import add, load, scale, store
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
@@ -42,6 +41,8 @@ class RestWork(NamedTuple):
 
     first: np.ndarray  # (t,) int64 first contact of each group, by its first tree, −1 = none
     next: np.ndarray  # (c,) int64 contact of the same group that follows, −1 = none
+    next_tree: np.ndarray  # (t,) int64 tree of the same group that follows, −1 = none
+    trees: np.ndarray  # (t,) int64 trees of the group
     offset: np.ndarray  # (t,) int64 first local coordinate of each tree
     contact: np.ndarray  # (c,) int64 contacts of the group
     tree: np.ndarray  # (c, 2) int64 their two trees, −1 = none or the same
@@ -57,15 +58,17 @@ class RestWork(NamedTuple):
     change_of_v: np.ndarray  # (d,) v − v*
     step: np.ndarray  # (d,) Newton step
     given: np.ndarray  # (d,) M times a vector, or L⁻¹ of one
-    shortened: np.ndarray  # (1,) int64 number of groups, since the start, whose solution was shortened
+    energy: np.ndarray  # (1,) ½ v*ᵀ M v* [J]
+    count: np.ndarray  # (2,) int64 trees of the group; solutions that were shortened, since the start
 
 
 def make_rest_work(coordinates: int, contacts: int, rows: int, tree_size: int, trees: int) -> RestWork:
     """Allocate the scratch; `rows`: of each contact, `tree_size`: coordinates of the largest tree."""
     c, d = contacts, coordinates
-    whole = {"first": trees, "next": c, "offset": trees, "contact": c, "envelope": d, "shortened": 1}
+    whole = {"first": trees, "next": c, "next_tree": trees, "trees": trees, "offset": trees, "contact": c,
+             "envelope": d, "count": 2}
     vectors = {"speed": c * rows, "change": c * rows, "p": c * rows, "limit": c, "v": d, "free": d,
-               "balance": d, "change_of_v": d, "step": d, "given": d}
+               "balance": d, "change_of_v": d, "step": d, "given": d, "energy": 1}
     return RestWork(tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * rows, 2 * tree_size)),
                     **{name: np.zeros(size, np.int64) for name, size in whole.items()},
                     **{name: np.zeros(size) for name, size in vectors.items()})
@@ -93,6 +96,12 @@ def list_groups(world, state):
                                  state.group_of_tree)
         if group >= 0 and contacts.gap[i] <= 0.0:
             work.next[i], work.first[group], some = work.first[group], i, True
+    if some:
+        work.next_tree[:] = -1
+        for t in range(world.tree_start.shape[0] - 1, -1, -1):
+            group = state.group_of_tree[t]
+            if group != t:  # its first tree is the group's number
+                work.next_tree[t], work.next_tree[group] = work.next_tree[group], t
     return some
 
 
@@ -102,27 +111,30 @@ def rest_group(world, state, group, s):
     size = place_trees(world, state, group)
     count = gather_contacts(world, state, group, s)
     k = world.stiffness * world.dt + world.damping
-    solved = solve(world, state, group, size, count, s, k)
+    solved = solve(world, state, size, count, s, k)
     for _ in range(TURNS if s > 1 else 0):
         if not follow_limits(world, state, count, s):
             break
-        solved = solve(world, state, group, size, count, s, k)
-    guard(world, state, group, count, s, solved)
-    give_back(world, state, group, count, s)
+        solved = solve(world, state, size, count, s, k)
+    guard(world, state, size, count, s, solved)
+    give_back(world, state, count, s)
 
 
 @kernel
 def place_trees(world, state, group):
     """Number the coordinates of the group; copy v* and the first guess, the velocity before the forces of the step."""
-    work, size = state.rest_work, 0
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] != group:
-            continue
-        work.offset[t] = size
+    work, size, many, t = state.rest_work, 0, 0, group
+    while t >= 0:
+        work.trees[many], work.offset[t] = t, size
         for k in range(world.tree_start[t], world.tree_stop[t]):
             work.free[size], work.v[size] = state.v[k], state.start_v[k]
             work.envelope[size] = work.offset[t]
             size += 1
+        many, t = many + 1, work.next_tree[t]
+    work.count[0], work.energy[0] = many, 0.0
+    times_mass(world, state, work.free, work.given)
+    for i in range(size):
+        work.energy[0] += 0.5 * work.free[i] * work.given[i]
     return size
 
 
@@ -205,12 +217,11 @@ def along_rows(world, work, count, s, v, out):
 
 
 @kernel
-def times_mass(world, state, group, v, out):
+def times_mass(world, state, v, out):
     """out <- M v of local velocities, with Δt D of damped joints."""
     work = state.rest_work
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] != group:
-            continue
+    for h in range(work.count[0]):
+        t = work.trees[h]
         start, at = world.tree_start[t], work.offset[t]
         for i in range(world.tree_stop[t] - start):
             total = 0.0
@@ -253,27 +264,33 @@ def slope(world, state, count, s, k, share, linear, quadratic):
 
 
 @kernel
-def open_balance(world, state, group, size, count, s, k):
+def set_impulses(world, state, count, s, k):
+    """Write the impulses of the present speeds."""
+    work = state.rest_work
+    for r in range(count):
+        work.p[r * s] = push(world, state, r, k, work.speed[r * s])
+        if s > 1:
+            rubs, divisor = work.limit[r] > 0.0, 1.0
+            if rubs:
+                _, divisor = slide_length(work, r, s, 0.0)
+            for j in range(r * s + 1, (r + 1) * s):
+                work.p[j] = -work.speed[j] / divisor if rubs else 0.0
+
+
+@kernel
+def open_balance(world, state, size, count, s, k):
     """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that the balance would give the bodies.
 
     It is a share of the energy of the step, that of v* and of the springs.
     """
-    work, energy = state.rest_work, 0.0
+    work, energy = state.rest_work, state.rest_work.energy[0]
     width = work.rows.shape[1] // 2
     along_rows(world, work, count, s, work.v, work.speed)
-    times_mass(world, state, group, work.v, work.balance)
-    times_mass(world, state, group, work.free, work.step)
     for i in range(size):
-        energy += 0.5 * work.free[i] * work.step[i]
-        work.balance[i] -= work.step[i]
+        work.change_of_v[i] = work.v[i] - work.free[i]
+    times_mass(world, state, work.change_of_v, work.balance)
+    set_impulses(world, state, count, s, k)
     for r in range(count):
-        work.p[r * s] = push(world, state, r, k, work.speed[r * s])
-        if s > 1:
-            divisor = 1.0
-            if work.limit[r] > 0.0:
-                _, divisor = slide_length(work, r, s, 0.0)
-            for j in range(r * s + 1, (r + 1) * s):
-                work.p[j] = -work.speed[j] / divisor if work.limit[r] > 0.0 else 0.0
         for j in range(r * s, (r + 1) * s):
             for side in range(2):
                 t = work.tree[r, side]
@@ -286,15 +303,15 @@ def open_balance(world, state, group, size, count, s, k):
         if work.p[r * s] > 0.0:
             energy += 0.5 * work.p[r * s] * work.p[r * s] / (world.dt * k)
     wrong = 0.0
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] == group:
-            start, stop, at = world.tree_start[t], world.tree_stop[t], work.offset[t]
-            for i in range(start, stop):  # |L⁻¹ r|² = rᵀ M⁻¹ r
-                entry = work.balance[at + i - start]
-                for h in range(start, i):
-                    entry -= state.lower[i, h] * work.given[at + h - start]
-                work.given[at + i - start] = entry / state.lower[i, i]
-                wrong += 0.5 * work.given[at + i - start] * work.given[at + i - start]
+    for h in range(work.count[0]):
+        t = work.trees[h]
+        start, stop, at = world.tree_start[t], world.tree_stop[t], work.offset[t]
+        for i in range(start, stop):  # |L⁻¹ r|² = rᵀ M⁻¹ r
+            entry = work.balance[at + i - start]
+            for j in range(start, i):
+                entry -= state.lower[i, j] * work.given[at + j - start]
+            work.given[at + i - start] = entry / state.lower[i, i]
+            wrong += 0.5 * work.given[at + i - start] * work.given[at + i - start]
     return wrong / energy if energy > 0.0 else wrong
 
 
@@ -323,15 +340,14 @@ def add_square(world, state, r, one, other, factor):
 
 
 @kernel
-def newton_matrix(world, state, group, size, count, s, k):
+def newton_matrix(world, state, size, count, s, k):
     """Write M + Jᵀ (∂p/∂γ) J to the lower triangle of group_lower, within the envelope."""
     work, matrix = state.rest_work, state.group_lower
     for i in range(size):
         for j in range(work.envelope[i], i + 1):
             matrix[i, j] = 0.0
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] != group:
-            continue
+    for h in range(work.count[0]):
+        t = work.trees[h]
         start, at = world.tree_start[t], work.offset[t]
         for i in range(world.tree_stop[t] - start):
             for j in range(i + 1):
@@ -389,39 +405,60 @@ def solve_envelope(matrix, envelope, size, x):
 
 
 @kernel
-def solve(world, state, group, size, count, s, k):
+def solve(world, state, size, count, s, k):
     """Minimise for the present limits of friction, from work.v; return whether the balance is solved."""
     work = state.rest_work
-    worst = open_balance(world, state, group, size, count, s, k)
+    worst = open_balance(world, state, size, count, s, k)
     for _ in range(ITERATIONS):
         if worst <= EXACT:
             return True
-        newton_matrix(world, state, group, size, count, s, k)
+        newton_matrix(world, state, size, count, s, k)
         if not factor_envelope(state.group_lower, work.envelope, size):
             return worst <= GOOD
         for i in range(size):
             work.step[i] = -work.balance[i]
         solve_envelope(state.group_lower, work.envelope, size, work.step)
         along_rows(world, work, count, s, work.step, work.change)
-        share = line_search(world, state, group, size, count, s, k)
+        if is_quadratic(world, state, count, s, k):  # the step is exact
+            for i in range(size):
+                work.v[i] += work.step[i]
+            for j in range(count * s):
+                work.speed[j] += work.change[j]
+            set_impulses(world, state, count, s, k)
+            return True
+        share = line_search(world, state, size, count, s, k)
         for i in range(size):
             work.v[i] += share * work.step[i]
-        before, worst = worst, open_balance(world, state, group, size, count, s, k)
+        before, worst = worst, open_balance(world, state, size, count, s, k)
         if share == 1.0 and worst <= GOOD and worst > 0.5 * before:
             return True
     return worst <= GOOD
 
 
 @kernel
-def line_search(world, state, group, size, count, s, k):
+def is_quadratic(world, state, count, s, k):
+    """Return whether the same contacts push at the end of the Newton step as before, and all with friction stick."""
+    work = state.rest_work
+    for r in range(count):
+        j = r * s
+        if (work.p[j] > 0.0) != (push(world, state, r, k, work.speed[j] + work.change[j]) > 0.0):
+            return False
+        if s > 1 and work.limit[r] > 0.0:
+            before, _ = slide_length(work, r, s, 0.0)
+            after, _ = slide_length(work, r, s, 1.0)
+            if before > STICKING or after > STICKING:
+                return False
+    return True
+
+
+@kernel
+def line_search(world, state, size, count, s, k):
     """Return the share of the Newton step at which the slope vanishes, 1 if it is still negative there."""
     work, linear, quadratic = state.rest_work, 0.0, 0.0
-    for i in range(size):
-        work.change_of_v[i] = work.v[i] - work.free[i]
-    times_mass(world, state, group, work.change_of_v, work.given)
+    times_mass(world, state, work.change_of_v, work.given)
     for i in range(size):
         linear += work.given[i] * work.step[i]
-    times_mass(world, state, group, work.step, work.given)
+    times_mass(world, state, work.step, work.given)
     for i in range(size):
         quadratic += work.given[i] * work.step[i]
     low, high = 0.0, 1.0
@@ -467,54 +504,53 @@ def spring_energy(world, state, count, s, share):
 
 
 @kernel
-def guard(world, state, group, count, s, solved):
+def guard(world, state, size, count, s, solved):
     """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays as it is."""
-    work, after, before, size = state.rest_work, 0.0, 0.0, 0
+    work, after = state.rest_work, 0.0
     if solved:
         return
-    times_mass(world, state, group, work.v, work.balance)
-    times_mass(world, state, group, work.free, work.step)
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] == group:
-            size += world.tree_stop[t] - world.tree_start[t]
+    times_mass(world, state, work.v, work.balance)
     for i in range(size):
         after += 0.5 * work.v[i] * work.balance[i]
-        before += 0.5 * work.free[i] * work.step[i]
-    allowed, share = (before + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN), 1.0
+    allowed, share = (work.energy[0] + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN), 1.0
     while after * share * share + spring_energy(world, state, count, s, share) > allowed:
         share = 0.5 * share if share > 1e-3 else 0.0
         if share == 0.0:
             break
     if share < 1.0:
-        work.shortened[0] += 1
+        work.count[1] += 1
         for i in range(size):
             work.v[i] *= share
 
 
 @kernel
-def give_back(world, state, group, count, s):
+def give_back(world, state, count, s):
     """Write the group's velocity to v and mean_v, and the forces to the contacts and the generalized forces."""
-    work, contacts, m, w = state.rest_work, state.contacts, world.mechanism, state.body
-    width = work.rows.shape[1] // 2
-    for t in range(world.tree_start.shape[0]):
-        if state.group_of_tree[t] == group:
-            for k in range(world.tree_start[t], world.tree_stop[t]):
-                state.v[k] = state.mean_v[k] = work.v[work.offset[t] + k - world.tree_start[t]]
+    work, contacts = state.rest_work, state.contacts
+    for h in range(work.count[0]):
+        t = work.trees[h]
+        for k in range(world.tree_start[t], world.tree_stop[t]):
+            state.v[k] = state.mean_v[k] = work.v[work.offset[t] + k - world.tree_start[t]]
     for r in range(count):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / world.dt
-        for side in range(2):
-            t = work.tree[r, side]
-            if t >= 0:
-                for k in range(world.tree_start[t], world.tree_stop[t]):
-                    entry = work.rows[r * s, side * width + k - world.tree_start[t]]
-                    state.penalty_force[k] += entry * contacts.normal_force[i]
+        add_along_row(world, work, r, r * s, contacts.normal_force[i], state.penalty_force)
         if s == 1 or not work.limit[r] > 0.0:
             continue
         n = load(contacts.normal, i)
         for j in range(1, s):
-            force = add(force, scale(work.p[r * s + j] / world.dt, tangent_of(n, j - 1, s - 1)))
+            size = work.p[r * s + j] / world.dt
+            force = add(force, scale(size, tangent_of(n, j - 1, s - 1)))
+            add_along_row(world, work, r, r * s + j, size, state.friction_force)
         store(contacts.friction_force, i, force)
-        x = load(contacts.point, i)
-        add_point_force(m, w, contacts.body_a[i], x, force, state.friction_force)
-        add_point_force(m, w, contacts.body_b[i], x, scale(-1.0, force), state.friction_force)
+
+
+@kernel
+def add_along_row(world, work, r, j, size, out):
+    """out (d,) += size times row j, of contact r of the group."""
+    width = work.rows.shape[1] // 2
+    for side in range(2):
+        t = work.tree[r, side]
+        if t >= 0:
+            for k in range(world.tree_start[t], world.tree_stop[t]):
+                out[k] += work.rows[j, side * width + k - world.tree_start[t]] * size

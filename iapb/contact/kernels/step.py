@@ -298,6 +298,11 @@ def swing(world, state, h):
 @kernel
 def pull_free_trees(world, state):
     """Add half a step of gravity to the velocity of trees without contact; the other half acted before they moved."""
+    some = False
+    for t in range(world.tree_start.shape[0]):
+        some = some or state.state_of_tree[t] == FREE
+    if not some:
+        return
     forward_kinematics(world.mechanism, state.q, state.body)
     gravity(world.mechanism, state.body, world.gravity, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
