@@ -203,31 +203,32 @@ def write_row(world, state, r, j, i, direction):
 @kernel
 def along_rows(world, work, count, s, v, out):
     """out <- J v of local velocities."""
-    width = work.rows.shape[1] // 2
+    rows, tree, offset, start, stop = work.rows, work.tree, work.offset, world.tree_start, world.tree_stop
+    width = rows.shape[1] // 2
     for r in range(count):
+        a, b = tree[r, 0], tree[r, 1]
         for j in range(r * s, (r + 1) * s):
-            total = 0.0
-            for side in range(2):
-                t = work.tree[r, side]
-                if t >= 0:
-                    at = work.offset[t]
-                    for k in range(world.tree_stop[t] - world.tree_start[t]):
-                        total += work.rows[j, side * width + k] * v[at + k]
+            total, row = 0.0, rows[j]
+            for k in range(stop[a] - start[a]):
+                total += row[k] * v[offset[a] + k]
+            if b >= 0:
+                for k in range(stop[b] - start[b]):
+                    total += row[width + k] * v[offset[b] + k]
             out[j] = total
 
 
 @kernel
 def times_mass(world, state, v, out):
     """out <- M v of local velocities, with Δt D of damped joints."""
-    work = state.rest_work
+    work, mass, damped = state.rest_work, state.mass_matrix, world.switches.joint_damping
     for h in range(work.count[0]):
         t = work.trees[h]
-        start, at = world.tree_start[t], work.offset[t]
-        for i in range(world.tree_stop[t] - start):
-            total = 0.0
-            for j in range(world.tree_stop[t] - start):
-                total += state.mass_matrix[start + i, start + j] * v[at + j]
-            if world.switches.joint_damping:
+        start, at, size = world.tree_start[t], work.offset[t], world.tree_stop[t] - world.tree_start[t]
+        for i in range(size):
+            total, row = 0.0, mass[start + i]
+            for j in range(size):
+                total += row[start + j] * v[at + j]
+            if damped:
                 total += world.dt * world.joint_damping[start + i] * v[at + i]
             out[at + i] = total
 
