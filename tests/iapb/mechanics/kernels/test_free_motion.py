@@ -1,0 +1,110 @@
+"""Free motion keeps momentum to rounding, makes no energy, and converges with the order that it states."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.mechanics.kernels.free_motion import principal_axes
+from iapb.run import Run
+from iapb.scene import Scene
+from iapb.scene.mechanism import mechanism_of
+from iapb.scene.model import scene_kind
+from iapb.simulation import simulate
+
+
+def scene(*bodies: dict[str, Any], **values: Any) -> Scene:
+    given = {"name": "free", "rate": 1000.0, "duration": 1.0, "dimensions": 3, "bodies": list(bodies)} | values
+    if given["dimensions"] == 2:
+        del given["dimensions"]
+    return scene_kind(given).model_validate(given)
+
+
+def body(spin: float, **values: Any) -> dict[str, Any]:
+    return {"name": "body", "joint": "free_flyer", "mass": 1.3, "inertia": [1e-3, 2e-3, 2.5e-3],
+            "velocity": [3.0, 0.0, -1.0, 0.3 * spin, 0.8 * spin, 0.5 * spin]} | values
+
+
+LINK = {"joint": "revolute", "mass": 0.4, "center_of_mass": [0.1, 0, 0], "inertia": [1e-4, 2e-3, 2e-3]}
+ROBOT = (body(3.0, center_of_mass=[0.02, 0.01, -0.03]),
+         LINK | {"name": "one", "parent": "body", "axis": [0, 0.6, 0.8], "origin": [0.1, 0, 0], "velocity": [5.0]},
+         LINK | {"name": "two", "parent": "one", "axis": [1, 0, 1], "origin": [0.2, 0, 0], "velocity": [-8.0]})
+FLAT = {"joint": "revolute", "mass": 0.4, "center_of_mass": [0.1, 0], "inertia": 2e-3}
+FLAT_ROBOT = ({"name": "body", "joint": "planar", "mass": 1.0, "inertia": 1e-2, "velocity": [1.0, -2.0, 4.0]},
+              FLAT | {"name": "one", "parent": "body", "origin": [0.1, 0], "velocity": [5.0]},
+              FLAT | {"name": "two", "parent": "one", "origin": [0.2, 0], "velocity": [-9.0]})
+CASES = {
+    "a body at 100 rad/s": scene(body(100.0)), "a body at 1000 rad/s": scene(body(1000.0), duration=0.2),
+    "its centre elsewhere": scene(body(50.0, center_of_mass=[0.1, -0.2, 0.05])),
+    "turned inertia": scene(body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])),
+    "a floating robot": scene(*ROBOT), "a planar one": scene(*FLAT_ROBOT, dimensions=2),
+}
+
+
+def momenta(run: Run, given: Scene) -> np.ndarray:
+    mechanism = mechanism_of(given)
+    return np.array([mechanism.centroidal_momentum(q, v) for q, v in zip(run.q[::50], run.v[::50], strict=True)])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_both_momenta_are_kept_to_rounding_and_the_energy_nearly(name: str) -> None:
+    run = simulate(CASES[name])
+    found = momenta(run, CASES[name])
+    for part in (slice(0, 3), slice(3, 6)):
+        drift = np.abs(found[:, part] - found[0, part]).max()
+        assert drift <= 3e-15 * run.steps * np.abs(found[0]).max()
+    kinetic = run.energy["kinetic"]
+    assert np.abs(kinetic / kinetic[0] - 1.0).max() < (1e-12 if "robot" in name or "planar" in name else 1e-6)
+
+
+def test_the_centre_of_mass_goes_straight() -> None:
+    given = CASES["a floating robot"]
+    run, mechanism = simulate(given), mechanism_of(given)
+    masses = np.array([one.mass for one in given.bodies])
+
+    def center(q: np.ndarray) -> np.ndarray:
+        axes, places = mechanism.placements(q)
+        offsets = np.array([[*one.center_of_mass, 0, 0][:3] for one in given.bodies])
+        return masses @ (places + np.einsum("bij,bj->bi", axes, offsets)) / masses.sum()
+
+    path = np.array([center(q) for q in run.q[::100]])
+    straight = path[0] + np.linspace(0.0, 1.0, len(path))[:, None] * momenta(run, given)[0, :3] / masses.sum()
+    np.testing.assert_allclose(path, straight, atol=1e-11)
+
+
+@pytest.mark.parametrize(("bodies", "values"), [
+    (ROBOT, {"duration": 0.2}), (FLAT_ROBOT, {"duration": 0.2, "dimensions": 2}),
+    ((LINK | {"name": "one", "axis": [0, 1, 0]}, LINK | {"name": "two", "parent": "one", "axis": [0, 1, 0],
+                                                         "origin": [0.2, 0, 0]}), {"gravity": [0, 0, -9.81]}),
+    (({"name": "top", "joint": "spherical", "mass": 1.0, "center_of_mass": [0, 0, 0.05],
+       "inertia": [1e-3, 1.2e-3, 5e-4], "position": [0.28, 0, 0, 0.96], "velocity": [0, 0, 30.0]},),
+     {"gravity": [0, 0, -9.81], "duration": 0.2}),
+])  # fmt: skip
+def test_linkages_and_tops_converge_with_order_two(bodies: Any, values: dict[str, Any]) -> None:
+    given = scene(*bodies, **values)
+    ends = [simulate(given.with_values({"rate": rate})).q[-1] for rate in (2000.0, 4000.0, 8000.0, 64000.0)]
+    errors = [np.abs(end - ends[-1]).max() for end in ends[:-1]]
+    assert np.log2(errors[1] / errors[2]) > 1.7
+
+
+def test_a_thrown_body_falls_on_its_parabola() -> None:
+    run = simulate(scene(body(20.0), gravity=[0, 0, -9.81]))
+    start, time = run.q[0, :3], run.time[:, None]
+    path = start + time * run.v[0, :3] + 0.5 * time**2 * np.array([0, 0, -9.81])
+    np.testing.assert_allclose(run.q[:, :3], path, atol=1e-12)
+    total = run.energy["kinetic"] + run.energy["potential"]
+    assert np.ptp(total) < 1e-6 * total[0]
+
+
+def test_principal_axes_turn_the_inertia_into_its_moments() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        inertia = turn @ np.diag(10.0 ** rng.uniform(-6, 0, 3)) @ turn.T
+        inertia = 0.5 * (inertia + inertia.T)
+        moments, axes = principal_axes(inertia)
+        np.testing.assert_allclose(axes @ np.diag(moments) @ axes.T, inertia, atol=1e-15)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
+        assert (np.diff(moments) >= 0.0).all() and np.linalg.det(axes) > 0.0
