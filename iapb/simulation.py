@@ -244,6 +244,12 @@ class Simulation:
             raise ArgumentError(f"{law} result", result, "a StepResult")
         if result.state not in (FREE, COLLIDING, RESTING):
             raise ArgumentError(f"{law} state", result.state, "FREE, COLLIDING or RESTING")
+        logged = state.impacts.logged
+        for what, count, most in (("contact_count[0]", state.contact_count[0], len(state.contacts.gap)),
+                                  ("impacts.logged[0]", logged[0], len(state.impacts.rows))):
+            if not 0 <= count <= most:
+                state.contact_count[0] = logged[0] = 0
+                raise ArgumentError(f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer")
         for name in _STEP_VECTORS:
             target, values = getattr(state, name), np.asarray(getattr(result, name))
             if values.shape != target.shape or not np.all(np.isfinite(values)):
